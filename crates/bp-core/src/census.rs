@@ -1,0 +1,96 @@
+//! The 3x3 census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
+
+use crate::{Image, Model, Seed, StereoPair};
+
+/// Half length of the strip that is compared around the centre: the thesis's "length scan".
+const HALF_LENGTH: usize = 10;
+
+/// The census code of the pixel at (x, y): its eight neighbours in row order, from the highest bit to the lowest, 1
+/// where the neighbour's grey value is greater. Border pixels are repeated outward.
+///
+/// # Panics
+/// Where (x, y) lies outside.
+#[must_use]
+pub fn code(image: &Image, x: usize, y: usize) -> u8 {
+    let size = image.size();
+    let centre = image.grey(x, y);
+    let columns = [x.saturating_sub(1), x, (x + 1).min(size.width - 1)];
+    let rows = [y.saturating_sub(1), y, (y + 1).min(size.height - 1)];
+    let mut code = 0;
+    for (j, &row) in rows.iter().enumerate() {
+        for (i, &column) in columns.iter().enumerate() {
+            if (i, j) != (1, 1) {
+                code = code << 1 | u8::from(image.grey(column, row) > centre);
+            }
+        }
+    }
+    code
+}
+
+/// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the
+/// strip, shortened at the image's border, lies inside both images. `None` where no label's does.
+///
+/// # Panics
+/// Where (x, y) lies outside.
+#[must_use]
+pub fn find_match(pair: &StereoPair, model: &Model, (x, y): (usize, usize)) -> Option<Seed> {
+    let size = pair.size();
+    let half_width = HALF_LENGTH.min(x).min(size.width - 1 - x);
+    let half_height = 1.min(y).min(size.height - 1 - y);
+    let strip = |image: &Image, x: usize| -> Vec<u8> {
+        let rows = y - half_height..=y + half_height;
+        rows.flat_map(|row| (x - half_width..=x + half_width).map(move |column| code(image, column, row))).collect()
+    };
+    let left = strip(pair.left(), x);
+    let score = |label: u16| -> Option<u32> {
+        let column = model.matching_column(x, label, size.width)?;
+        let inside = column >= half_width && column + half_width < size.width;
+        inside.then(|| left.iter().zip(strip(pair.right(), column)).map(|(&l, r)| (l ^ r).count_ones()).sum())
+    };
+    let scores = (0..model.labels() as u16).filter_map(|label| Some((score(label)?, label)));
+    scores.min().map(|(_, label)| Seed { x, y, label })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Profile;
+
+    fn noise(x: usize, y: usize) -> u8 {
+        ((x * 7919 + y * 104_729 + x * x * 31 + y * x * 17) % 251) as u8
+    }
+
+    fn shifted_pair(width: usize, height: usize, shift: usize) -> StereoPair {
+        let view = |offset: usize| {
+            let pixel = |i| noise(i % width + offset, i / width);
+            Image::from_grey(width, height, &(0..width * height).map(pixel).collect::<Vec<_>>()).unwrap()
+        };
+        StereoPair::new(view(0), view(shift)).unwrap()
+    }
+
+    #[test]
+    fn bits_come_in_row_order_and_ties_give_0() {
+        let image = Image::from_grey(3, 3, &[6, 5, 4, 5, 5, 9, 1, 7, 5]).unwrap();
+        assert_eq!(code(&image, 1, 1), 0b1000_1010);
+        let flat = Image::from_grey(1, 1, &[5]).unwrap();
+        assert_eq!(code(&flat, 0, 0), 0);
+    }
+
+    #[test]
+    fn a_shifted_pair_gives_the_shift() {
+        let model = Model::new(Profile::Census, 30).unwrap();
+        let found = find_match(&shifted_pair(80, 21, 13), &model, (40, 10));
+        assert_eq!(found, Some(Seed { x: 40, y: 10, label: 13 }));
+    }
+
+    #[test]
+    fn tiny_images_have_a_match_at_label_0_and_none_without_candidates() {
+        let model = Model::new(Profile::Census, 3).unwrap();
+        for (width, height) in [(1, 1), (1, 5), (2, 1), (2, 3)] {
+            let pair = shifted_pair(width, height, 0);
+            let centre = (width / 2, height / 2);
+            assert_eq!(find_match(&pair, &model, centre).map(|seed| seed.label), Some(0), "{width}x{height}");
+            assert_eq!(find_match(&pair, &model.with_min_disparity(5).unwrap(), centre), None);
+        }
+    }
+}

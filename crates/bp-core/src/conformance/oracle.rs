@@ -1,0 +1,168 @@
+//! The same model computed the obvious way: unbounded integers, messages by their definition, nothing clipped.
+
+use std::ops::Range;
+
+use crate::{
+    Backend, DataCost, Device, DeviceInfo, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair,
+};
+
+/// A backend in `i64` that takes O(L^2) time for a message and neither normalises nor clips data costs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Oracle;
+
+impl Backend for Oracle {
+    fn name(&self) -> &'static str {
+        "oracle"
+    }
+
+    fn devices(&self) -> Vec<DeviceInfo> {
+        vec![DeviceInfo { name: "oracle".to_owned(), software_rasteriser: false }]
+    }
+
+    fn open(&self, _: usize) -> Result<Box<dyn Device>, Error> {
+        Ok(Box::new(Self))
+    }
+}
+
+impl Device for Oracle {
+    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+        let grid = |grid: usize| Grid {
+            costs: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
+            received: vec![
+                [const { Vec::new() }; 4].map(|_: Vec<i64>| vec![0; plan.model().labels()]);
+                plan.size(grid).pixels()
+            ],
+        };
+        Ok(Box::new(OracleSolver { grids: (0..plan.grids()).map(grid).collect(), plan: plan.clone() }))
+    }
+}
+
+type Messages = Vec<[Vec<i64>; 4]>;
+
+/// Costs [node][label] and received messages [node][side][label].
+struct Grid {
+    costs: Vec<Vec<i64>>,
+    received: Messages,
+}
+
+struct OracleSolver {
+    plan: Plan,
+    grids: Vec<Grid>,
+}
+
+impl OracleSolver {
+    /// The nodes of a grid: index, column and row.
+    fn nodes(&self, grid: usize) -> impl Iterator<Item = (usize, (usize, usize))> + use<> {
+        let width = self.plan.size(grid).width;
+        (0..self.plan.size(grid).pixels()).map(move |node| (node, (node % width, node / width)))
+    }
+
+    /// What `node` sends when its costs are `costs`: all but what it received from the receiver, `to`.
+    fn message(&self, costs: &[i64], received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
+        let model = self.plan.model();
+        let sources = || Side::ALL.into_iter().filter(|&side| side != to);
+        let h: Vec<i64> = (0..costs.len())
+            .map(|a| costs[a] + sources().map(|side| received[side as usize][a]).sum::<i64>())
+            .collect();
+        let offer = |a: usize, d: usize| h[a] + i64::from(model.smoothness(a as u16, d as u16));
+        let message: Vec<i64> = (0..h.len()).map(|d| (0..h.len()).map(|a| offer(a, d)).min().unwrap_or(0)).collect();
+        let least = message.iter().copied().min().unwrap_or(0);
+        message.into_iter().map(|value| value - least).collect()
+    }
+
+    /// One step that reads only messages of before it. Under `checkerboard` that is the same as in place, since the
+    /// nodes that send receive nothing in that half-step.
+    fn step(&mut self, grid: usize, step: u32) {
+        let before = self.grids[grid].received.clone();
+        for (node, (x, y)) in self.nodes(grid) {
+            let checkerboard = self.plan.settings().schedule == Schedule::Checkerboard;
+            if checkerboard && !(x + y + step as usize).is_multiple_of(2) {
+                continue;
+            }
+            for to in Side::ALL {
+                if let Some((to_x, to_y)) = self.plan.neighbour(grid, (x, y), to) {
+                    let message = self.message(&self.grids[grid].costs[node], &before[node], to);
+                    let receiver = to_y * self.plan.size(grid).width + to_x;
+                    self.grids[grid].received[receiver][to.opposite() as usize] = message;
+                }
+            }
+        }
+    }
+
+    /// The first message that the fine node at (x, y) holds from `side`.
+    fn first_message(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<Vec<i64>> {
+        let coarse = self.grids.get(grid + 1)?;
+        let (sender_x, sender_y) = self.plan.neighbour(grid, (x, y), side)?;
+        let receiver = match self.plan.settings().message_start {
+            MessageStart::Receiver => (x / 2, y / 2),
+            MessageStart::Sender => self.plan.neighbour(grid + 1, (sender_x / 2, sender_y / 2), side.opposite())?,
+        };
+        let receiver = receiver.1 * self.plan.size(grid + 1).width + receiver.0;
+        Some(coarse.received[receiver][side as usize].clone())
+    }
+}
+
+impl Solver for OracleSolver {
+    fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
+        let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
+        data_cost.load(pair, seed)?;
+        for (node, (x, y)) in self.nodes(0) {
+            for (label, cost) in self.grids[0].costs[node].iter_mut().enumerate() {
+                *cost = data_cost.at(x, y, label as u16).into();
+            }
+        }
+        Ok(())
+    }
+
+    fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
+        let (fine, coarse) = self.grids.split_at_mut(grid);
+        coarse[0].costs.iter_mut().for_each(|costs| costs.fill(0));
+        for (node, costs) in fine[grid - 1].costs.iter().enumerate() {
+            let width = self.plan.size(grid - 1).width;
+            let parent = (node / width / 2) * self.plan.size(grid).width + (node % width) / 2;
+            coarse[0].costs[parent].iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
+        }
+        Ok(())
+    }
+
+    fn refine(&mut self, grid: usize) -> Result<(), Error> {
+        for (node, position) in self.nodes(grid) {
+            for side in Side::ALL {
+                let zeros = || vec![0; self.plan.model().labels()];
+                let message = self.first_message(grid, position, side).unwrap_or_else(zeros);
+                self.grids[grid].received[node][side as usize] = message;
+            }
+        }
+        Ok(())
+    }
+
+    fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
+        steps.for_each(|step| self.step(grid, step));
+        Ok(())
+    }
+
+    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
+        let Grid { costs, received } = &self.grids[0];
+        for (node, label) in labels.iter_mut().enumerate() {
+            let belief = |label: &u16| {
+                let label = usize::from(*label);
+                costs[node][label] + received[node].iter().map(|message| message[label]).sum::<i64>()
+            };
+            *label = (0..costs[node].len() as u16).min_by_key(belief).unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
+        let all = self.grids[0].received.iter().flat_map(|received| &received[side as usize]);
+        for (out, &message) in messages.iter_mut().zip(all) {
+            // Out of range would be a counterexample to the proof: show it as a value no message has.
+            *out = u8::try_from(message).unwrap_or(u8::MAX);
+        }
+        Ok(())
+    }
+
+    fn allocated_bytes(&self) -> u64 {
+        self.grids.iter().map(|grid| 5 * 8 * (grid.costs.len() * self.plan.model().labels()) as u64).sum()
+    }
+}

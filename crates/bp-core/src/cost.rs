@@ -1,0 +1,171 @@
+//! Data costs D(p, d) of the profiles, before any normalising or clipping.
+
+use crate::{Error, Image, Model, Profile, Size, StereoPair, census, memory};
+
+/// A known match that CTBP and CTCSBP start from: the image is cut at (x, y), and `label` is what the census
+/// transform found for that pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seed {
+    /// Column of the cut.
+    pub x: usize,
+    /// Row of the cut.
+    pub y: usize,
+    /// Label of the match.
+    pub label: u16,
+}
+
+impl Seed {
+    /// Whether (x, y) is one of the up to four nodes around the point where the cuts cross.
+    #[must_use]
+    pub fn touches(&self, x: usize, y: usize) -> bool {
+        (x == self.x || x + 1 == self.x) && (y == self.y || y + 1 == self.y)
+    }
+}
+
+/// What a profile compares: one value a pixel of each image, [height][width].
+#[derive(Clone, Debug)]
+enum Planes {
+    Thesis([Vec<u8>; 2]),
+    Census([Vec<u8>; 2]),
+    Mrf([Vec<[u8; 3]>; 2]),
+}
+
+/// The data cost of every pixel and label of a pair; allocated once, loaded with pair after pair.
+#[derive(Clone, Debug)]
+pub struct DataCost {
+    size: Size,
+    model: Model,
+    planes: Planes,
+    seed: Option<Seed>,
+}
+
+impl DataCost {
+    /// Room for pairs of `size`, holding two black images.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(size: Size, model: Model) -> Result<Self, Error> {
+        let bytes = || memory::filled("images", size.pixels(), 0u8);
+        let planes = match model.profile() {
+            Profile::Thesis => Planes::Thesis([bytes()?, bytes()?]),
+            Profile::Census => Planes::Census([bytes()?, bytes()?]),
+            Profile::Mrf => Planes::Mrf([
+                memory::filled("images", size.pixels(), [0; 3])?,
+                memory::filled("images", size.pixels(), [0; 3])?,
+            ]),
+        };
+        Ok(Self { size, model, planes, seed: None })
+    }
+
+    /// The data cost of one pair, without a seed.
+    ///
+    /// # Errors
+    /// As [`DataCost::new`].
+    pub fn of_pair(pair: &StereoPair, model: Model) -> Result<Self, Error> {
+        let mut cost = Self::new(pair.size(), model)?;
+        cost.load(pair, None)?;
+        Ok(cost)
+    }
+
+    /// Takes in another pair. Without a seed every cost is the images' own.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] where the pair is of another size.
+    pub fn load(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
+        if pair.size() != self.size {
+            return Err(Error::WrongSize { what: "the pair", found: pair.size(), expected: self.size });
+        }
+        self.seed = seed;
+        for (side, view) in [pair.left(), pair.right()].into_iter().enumerate() {
+            match &mut self.planes {
+                Planes::Thesis(planes) => fill(&mut planes[side], view, |image, x, y| image.grey(x, y)),
+                Planes::Census(planes) => fill(&mut planes[side], view, census::code),
+                Planes::Mrf(planes) => planes[side].copy_from_slice(view.pixels()),
+            }
+        }
+        Ok(())
+    }
+
+    /// D(p, d) of the pixel at (x, y) for one label.
+    ///
+    /// # Panics
+    /// Where (x, y) lies outside.
+    #[must_use]
+    pub fn at(&self, x: usize, y: usize, label: u16) -> u16 {
+        if let Some(seed) = self.seed.filter(|seed| seed.touches(x, y)) {
+            return if label.abs_diff(seed.label) <= 1 { 0 } else { self.model.profile().max_cost() };
+        }
+        match self.model.matching_column(x, label, self.size.width) {
+            Some(column) => self.compare(y * self.size.width + x, y * self.size.width + column),
+            None => self.model.profile().out_of_range_cost(),
+        }
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        match &self.planes {
+            Planes::Thesis(planes) | Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Mrf(planes) => planes.iter().map(memory::bytes).sum(),
+        }
+    }
+
+    /// The cost of matching the left pixel at index `l` with the right one at index `r`.
+    fn compare(&self, l: usize, r: usize) -> u16 {
+        match &self.planes {
+            Planes::Thesis([left, right]) => {
+                let difference = u16::from(left[l].abs_diff(right[r]));
+                (7 * difference.min(15) + 5) / 10
+            }
+            Planes::Census([left, right]) => ((left[l] ^ right[r]).count_ones() as u16).min(6),
+            Planes::Mrf([left, right]) => left[l].iter().zip(&right[r]).map(|(&a, &b)| u16::from(a.abs_diff(b))).sum(),
+        }
+    }
+}
+
+fn fill(plane: &mut [u8], view: &Image, value: fn(&Image, usize, usize) -> u8) {
+    for (y, row) in plane.chunks_exact_mut(view.size().width).enumerate() {
+        for (x, out) in row.iter_mut().enumerate() {
+            *out = value(view, x, y);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cost(profile: Profile, left: &[u8], right: &[u8], seed: Option<Seed>) -> DataCost {
+        let grey = |values| Image::from_grey(left.len(), 1, values).unwrap();
+        let pair = StereoPair::new(grey(left), grey(right)).unwrap();
+        let mut cost = DataCost::new(pair.size(), Model::new(profile, 3).unwrap()).unwrap();
+        cost.load(&pair, seed).unwrap();
+        cost
+    }
+
+    #[test]
+    fn thesis_costs_are_rounded_tenths() {
+        let rounded: Vec<u16> = (0..=16).map(|v| cost(Profile::Thesis, &[v], &[0], None).at(0, 0, 0)).collect();
+        assert_eq!(rounded, [0, 1, 1, 2, 3, 4, 4, 5, 6, 6, 7, 8, 8, 9, 10, 11, 11]);
+    }
+
+    #[test]
+    fn costs_outside_the_right_image_are_the_profiles() {
+        for (profile, expected) in [(Profile::Thesis, 11), (Profile::Census, 3), (Profile::Mrf, 765)] {
+            let cost = cost(profile, &[9, 9], &[9, 9], None);
+            assert_eq!([cost.at(0, 0, 1), cost.at(1, 0, 2)], [expected; 2], "{}", profile.name());
+            assert_eq!(cost.at(1, 0, 1), 0);
+        }
+        assert_eq!(cost(Profile::Mrf, &[200], &[50], None).at(0, 0, 0), 450);
+    }
+
+    #[test]
+    fn a_seed_fixes_its_four_nodes_only() {
+        let seed = Seed { x: 2, y: 0, label: 2 };
+        let cost = cost(Profile::Census, &[0, 50, 0, 99], &[7, 7, 7, 7], Some(seed));
+        assert_eq!([0, 1, 2].map(|label| cost.at(1, 0, label)), [6, 0, 0]);
+        assert_eq!(cost.at(2, 0, 0), 6);
+        assert_eq!(cost.at(3, 0, 0), cost.compare(3, 3));
+        assert!(!seed.touches(0, 0) && !seed.touches(3, 0) && !seed.touches(2, 1));
+    }
+}

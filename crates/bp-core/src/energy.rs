@@ -1,0 +1,83 @@
+//! The energy of a labelling, in exact integers.
+
+use crate::{DataCost, Error, Model, StereoPair};
+
+/// The energy of a labelling in the units of its profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Energy {
+    /// Sum of D(p, f_p) over all pixels.
+    pub data: u64,
+    /// Sum of V(f_p, f_q) over all pairs of neighbours.
+    pub smoothness: u64,
+}
+
+impl Energy {
+    /// The energy of `labels` [height][width]: data costs are the images' own, without a seed, and the smoothness is
+    /// over all edges of the image, cut ones included, so that the energies of all plans compare.
+    ///
+    /// # Errors
+    /// [`Error::PixelCount`] where `labels` does not hold one label a pixel, [`Error::OutOfMemory`].
+    pub fn of(pair: &StereoPair, model: &Model, labels: &[u16]) -> Result<Self, Error> {
+        let size = pair.size();
+        if labels.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: labels.len() });
+        }
+        let cost = DataCost::of_pair(pair, *model)?;
+        let mut energy = Self { data: 0, smoothness: 0 };
+        for (i, &label) in labels.iter().enumerate() {
+            let (x, y) = (i % size.width, i / size.width);
+            energy.data += u64::from(cost.at(x, y, label));
+            let right = (x + 1 < size.width).then(|| labels[i + 1]);
+            let down = labels.get(i + size.width).copied();
+            let neighbours = right.into_iter().chain(down);
+            energy.smoothness += neighbours.map(|other| u64::from(model.smoothness(label, other))).sum::<u64>();
+        }
+        Ok(energy)
+    }
+
+    /// Data and smoothness together.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.data + self.smoothness
+    }
+}
+
+/// The label of least data cost of every pixel, the smallest on ties, [height][width]: what remains of matching
+/// without smoothness.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn cheapest_labels(pair: &StereoPair, model: &Model) -> Result<Vec<u16>, Error> {
+    let size = pair.size();
+    let cost = DataCost::of_pair(pair, *model)?;
+    let cheapest = |i| {
+        let labels = 0..model.labels() as u16;
+        labels.min_by_key(|&label| cost.at(i % size.width, i / size.width, label)).unwrap_or(0)
+    };
+    Ok((0..size.pixels()).map(cheapest).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, Profile};
+
+    #[test]
+    fn energy_counts_every_pixel_and_edge_once() {
+        let grey = |values: &[u8]| Image::from_grey(2, 2, values).unwrap();
+        let pair = StereoPair::new(grey(&[0, 10, 20, 30]), grey(&[0, 20, 20, 30])).unwrap();
+        let model = Model::new(Profile::Mrf, 3).unwrap();
+        let energy = Energy::of(&pair, &model, &[0, 0, 0, 0]).unwrap();
+        assert_eq!(energy, Energy { data: 30, smoothness: 0 });
+        let energy = Energy::of(&pair, &model, &[1, 1, 0, 2]).unwrap();
+        assert_eq!(energy, Energy { data: 765 + 30 + 765, smoothness: 20 + 20 + 40 });
+        assert!(Energy::of(&pair, &model, &[0; 3]).is_err());
+    }
+
+    #[test]
+    fn the_cheapest_label_is_the_smallest_on_ties() {
+        let grey = |values: &[u8]| Image::from_grey(3, 1, values).unwrap();
+        let pair = StereoPair::new(grey(&[7, 7, 9]), grey(&[9, 7, 7])).unwrap();
+        assert_eq!(cheapest_labels(&pair, &Model::new(Profile::Mrf, 3).unwrap()).unwrap(), [0, 0, 2]);
+    }
+}

@@ -1,0 +1,89 @@
+//! What can go wrong, sorted by who can mend it.
+
+use crate::{MAX_LABELS, MAX_TRUNCATION, Size, image::MAX_SIDE};
+
+/// An error of the model, a plan, a backend or the driver.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An image without pixels.
+    #[error("an image of {size} pixels is empty")]
+    Empty {
+        /// The size asked for.
+        size: Size,
+    },
+    /// A side longer than [`MAX_SIDE`].
+    #[error("an image of {size} pixels is too large: a side holds at most {MAX_SIDE}")]
+    TooLarge {
+        /// The size asked for.
+        size: Size,
+    },
+    /// Values that do not fill their image.
+    #[error("{found} values for {size} pixels")]
+    PixelCount {
+        /// The size asked for.
+        size: Size,
+        /// How many values there were.
+        found: usize,
+    },
+    /// Two images that should be of one size.
+    #[error("the left image has {left} pixels and the right one {right}: a rectified pair has one size")]
+    SizesDiffer {
+        /// Size of the left image.
+        left: Size,
+        /// Size of the right image.
+        right: Size,
+    },
+    /// Something of another size than was prepared or compared with.
+    #[error("{what} has {found} pixels where {expected} were expected")]
+    WrongSize {
+        /// What has the size.
+        what: &'static str,
+        /// Its size.
+        found: Size,
+        /// The size it should have.
+        expected: Size,
+    },
+    /// No labels, or more than [`MAX_LABELS`].
+    #[error("{labels} labels: from 1 to {MAX_LABELS} are possible")]
+    Labels {
+        /// How many were asked for.
+        labels: usize,
+    },
+    /// A least disparity so far out that no pixel of any image could match.
+    #[error("a least disparity of {min_disparity} px is beyond any image: from {low} to {high} are possible", low = -(MAX_SIDE as i64), high = MAX_SIDE)]
+    MinDisparity {
+        /// What was asked for.
+        min_disparity: i32,
+    },
+    /// A truncation K with which u8 would not be exact.
+    #[error("a truncation of {truncation} is above {MAX_TRUNCATION}, the most with which 8-bit messages are exact")]
+    Truncation {
+        /// What was asked for.
+        truncation: u8,
+    },
+    /// A plan setting that no run can follow.
+    #[error("{0}")]
+    Plan(&'static str),
+    /// More memory needed than there is.
+    #[error("out of memory: {needed} bytes are needed for {what}")]
+    OutOfMemory {
+        /// What the memory was for.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+    },
+    /// A device that is not there.
+    #[error("backend {backend} has no device {device}: {reason}")]
+    Unavailable {
+        /// Name of the backend.
+        backend: &'static str,
+        /// Index of the device.
+        device: usize,
+        /// Why.
+        reason: String,
+    },
+    /// The observer asked to stop.
+    #[error("interrupted")]
+    Stopped,
+}

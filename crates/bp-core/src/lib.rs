@@ -1,0 +1,56 @@
+//! Stereo matching by min-sum belief propagation on a 4-connected grid, in exact 8-bit integers.
+//!
+//! Two images in, a disparity map out:
+//!
+//! ```
+//! use bp_core::{Algorithm, Backend, Image, Matcher, Model, Plan, Profile, Schedule, StereoPair};
+//!
+//! # fn main() -> Result<(), bp_core::Error> {
+//! # let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * x * 31 + x * y * 17) % 251) as u8;
+//! # let view = |shift| (0..32 * 20).map(|i| noise(i % 32 + shift, i / 32)).collect::<Vec<u8>>();
+//! # let (left, right) = (view(0), view(3));
+//! let pair = StereoPair::new(Image::from_grey(32, 20, &left)?, Image::from_grey(32, 20, &right)?)?;
+//! let model = Model::new(Profile::Census, 16)?;
+//! let settings = Algorithm::Cfcsbp.settings(pair.size(), 16, 2, Schedule::Checkerboard);
+//! let plan = Plan::new(pair.size(), model, settings)?;
+//! println!("{} message entries, {} bytes", plan.message_updates(), plan.bytes());
+//! let device = bp_cpu_scalar::Scalar.open(0)?;
+//! let mut matcher = Matcher::new(device.as_ref(), plan)?;
+//! matcher.solve(&pair)?;
+//! assert_eq!(matcher.disparities().at(20, 10), Some(3.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A [`Model`] says what is minimised, a [`Plan`] what is run and what it will cost, a [`Backend`] where. All five
+//! algorithms of the thesis are [`Settings`] of one plan, and every backend gives the same labels and messages to the
+//! bit; [`exactness`] says why that is possible in 8 bits, [`worked_example`] follows a pair of 3x2 pixels by hand.
+
+mod backend;
+pub mod census;
+#[cfg(feature = "conformance")]
+pub mod conformance;
+mod cost;
+mod driver;
+mod energy;
+mod error;
+pub mod exactness;
+pub mod image;
+mod map;
+pub mod memory;
+mod metrics;
+mod model;
+mod plan;
+//pub mod synthetic;
+pub mod worked_example;
+
+pub use backend::{Backend, Device, DeviceInfo, Side, Solver};
+pub use cost::{DataCost, Seed};
+pub use driver::{Matcher, Observer, Progress, Stage, Times};
+pub use energy::{Energy, cheapest_labels};
+pub use error::Error;
+pub use image::{Image, Size, StereoPair};
+pub use map::DisparityMap;
+pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
+pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
+pub use plan::{Algorithm, Buffer, Cut, MAX_GRIDS, MessageStart, Plan, Schedule, Settings};

@@ -1,0 +1,73 @@
+//! Disparity maps.
+
+use crate::{Error, Model, Size};
+
+/// A disparity map [height][width] in pixels of its own size. Unknown or unanswered pixels hold [`DisparityMap::UNKNOWN`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct DisparityMap {
+    size: Size,
+    values: Vec<f32>,
+}
+
+impl DisparityMap {
+    /// The value of an unknown pixel, as in Middlebury's PFM files: plus infinity.
+    pub const UNKNOWN: f32 = f32::INFINITY;
+
+    /// A map from its values, [height][width]; whatever is not finite counts as unknown.
+    ///
+    /// # Errors
+    /// [`Error::PixelCount`] where `values` does not hold one value a pixel.
+    pub fn new(size: Size, mut values: Vec<f32>) -> Result<Self, Error> {
+        if values.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: values.len() });
+        }
+        for value in &mut values {
+            if !value.is_finite() {
+                *value = Self::UNKNOWN;
+            }
+        }
+        Ok(Self { size, values })
+    }
+
+    /// The disparities of labels [height][width] under a model.
+    ///
+    /// # Panics
+    /// Where `labels` does not hold one label a pixel.
+    #[must_use]
+    pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Self {
+        assert_eq!(labels.len(), size.pixels(), "one label a pixel");
+        Self { size, values: labels.iter().map(|&label| model.disparity(label) as f32).collect() }
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// All values, [height][width].
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The disparity at column `x`, row `y`; `None` where it is unknown.
+    ///
+    /// # Panics
+    /// Where (x, y) lies outside.
+    #[must_use]
+    pub fn at(&self, x: usize, y: usize) -> Option<f32> {
+        let value = self.values[y * self.size.width + x];
+        value.is_finite().then_some(value)
+    }
+
+    /// Least and largest known disparity; `None` where no pixel is known.
+    #[must_use]
+    pub fn range(&self) -> Option<(f32, f32)> {
+        let known = self.values.iter().copied().filter(|v| v.is_finite());
+        known.fold(None, |range, v| match range {
+            None => Some((v, v)),
+            Some((low, high)) => Some((v.min(low), v.max(high))),
+        })
+    }
+}

@@ -1,0 +1,171 @@
+//! Errors of a disparity map against ground truth (Scharstein and Szeliski 2002; the thesis's equations 2.82, 2.83).
+
+use crate::{DisparityMap, Error, Size};
+
+/// The error thresholds of the bad-pixel percentages, in pixels.
+pub const THRESHOLDS: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// Largest difference between left and right truth at a pixel that both cameras see, in pixels.
+const VISIBLE_WITHIN: f32 = 1.0;
+
+/// Ground truth of the left image, and which of its pixels the right camera sees too.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundTruth {
+    /// True disparities.
+    pub disparities: DisparityMap,
+    /// Visible pixels [height][width], where that is known.
+    pub visible: Option<Vec<bool>>,
+}
+
+impl GroundTruth {
+    /// Truth without knowledge of what is visible.
+    #[must_use]
+    pub fn new(disparities: DisparityMap) -> Self {
+        Self { disparities, visible: None }
+    }
+
+    /// Truth whose visible pixels are given, [height][width].
+    ///
+    /// # Errors
+    /// [`Error::PixelCount`] where `visible` does not hold one value a pixel.
+    pub fn with_mask(disparities: DisparityMap, visible: Vec<bool>) -> Result<Self, Error> {
+        let size = disparities.size();
+        if visible.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: visible.len() });
+        }
+        Ok(Self { disparities, visible: Some(visible) })
+    }
+
+    /// Truth whose visible pixels follow from the right image's truth: known dL at x, known dR at
+    /// `x' = floor(x - dL + 1/2)` inside the image, and `|dL - dR| <= 1`.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] where the two maps differ in size.
+    pub fn with_right(disparities: DisparityMap, right: &DisparityMap) -> Result<Self, Error> {
+        let size = disparities.size();
+        check_size("the right ground truth", right.size(), size)?;
+        let sees = |x: usize, y: usize| {
+            let truth = disparities.at(x, y)?;
+            let column = (x as f32 - truth + 0.5).floor();
+            let inside = column >= 0.0 && column < size.width as f32;
+            let other = right.at(inside.then_some(column as usize)?, y)?;
+            ((truth - other).abs() <= VISIBLE_WITHIN).then_some(())
+        };
+        let visible = (0..size.pixels()).map(|i| sees(i % size.width, i / size.width).is_some()).collect();
+        Ok(Self { disparities, visible: Some(visible) })
+    }
+
+    /// Errors of `map` over all pixels of known truth, and over the visible ones among them.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] where the map has another size than the truth.
+    pub fn errors(&self, map: &DisparityMap) -> Result<Errors, Error> {
+        check_size("the disparity map", map.size(), self.disparities.size())?;
+        let pixels = || map.values().iter().zip(self.disparities.values());
+        let all = MapErrors::over(pixels().map(|(&d, &truth)| (d, truth)));
+        let visible = self.visible.as_ref().map(|visible| {
+            let seen = pixels().zip(visible).filter(|(_, seen)| **seen);
+            MapErrors::over(seen.map(|((&d, &truth), _)| (d, truth)))
+        });
+        Ok(Errors { all, visible })
+    }
+}
+
+fn check_size(what: &'static str, found: Size, expected: Size) -> Result<(), Error> {
+    if found == expected { Ok(()) } else { Err(Error::WrongSize { what, found, expected }) }
+}
+
+/// Errors of a map over two sets of pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Over all pixels of known truth.
+    pub all: MapErrors,
+    /// Over those that the right camera sees too; `None` where that is not known.
+    pub visible: Option<MapErrors>,
+}
+
+/// Errors over a set of pixels of known truth. Without any such pixel, or any answered one, the figures over them are 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapErrors {
+    /// Pixels of known truth (N).
+    pub known: u64,
+    /// Those of them that the map answers; `answered / known` is its density.
+    pub answered: u64,
+    /// Root of the mean squared error over answered pixels, in pixels.
+    pub rmse: f64,
+    /// Percentage of answered pixels wrong by more than each of [`THRESHOLDS`].
+    pub bad: [f64; 4],
+    /// Percentage of known pixels unanswered or wrong by more than each of [`THRESHOLDS`].
+    pub bad_or_unanswered: [f64; 4],
+}
+
+impl MapErrors {
+    fn over(pixels: impl Iterator<Item = (f32, f32)>) -> Self {
+        let (mut known, mut answered, mut squares, mut wrong) = (0_u64, 0_u64, 0.0, [0_u64; 4]);
+        for (disparity, truth) in pixels.filter(|(_, truth)| truth.is_finite()) {
+            known += 1;
+            if disparity.is_finite() {
+                answered += 1;
+                let error = (disparity - truth).abs();
+                squares += f64::from(error) * f64::from(error);
+                for (wrong, threshold) in wrong.iter_mut().zip(THRESHOLDS) {
+                    *wrong += u64::from(error > threshold);
+                }
+            }
+        }
+        let percent = |part: u64, of: u64| 100.0 * part as f64 / of.max(1) as f64;
+        Self {
+            known,
+            answered,
+            rmse: (squares / answered.max(1) as f64).sqrt(),
+            bad: wrong.map(|wrong| percent(wrong, answered)),
+            bad_or_unanswered: wrong.map(|wrong| percent(wrong + known - answered, known)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: f32 = DisparityMap::UNKNOWN;
+
+    fn map(values: &[f32]) -> DisparityMap {
+        DisparityMap::new(Size { width: values.len(), height: 1 }, values.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn unknown_truth_is_left_out_and_unanswered_pixels_are_counted_apart() {
+        let truth = GroundTruth::new(map(&[1.0, 2.0, NONE, 4.0, 5.0]));
+        let errors = truth.errors(&map(&[1.0, 3.0, 9.0, NONE, 8.0])).unwrap();
+        assert_eq!((errors.all.known, errors.all.answered, errors.visible), (4, 3, None));
+        assert_eq!(errors.all.rmse, (10.0_f64 / 3.0).sqrt());
+        assert_eq!(errors.all.bad, [2, 1, 1, 0].map(|n: u32| 100.0 * f64::from(n) / 3.0));
+        assert_eq!(errors.all.bad_or_unanswered, [75.0, 50.0, 50.0, 25.0]);
+    }
+
+    #[test]
+    fn an_error_of_exactly_the_threshold_is_not_bad() {
+        let errors = GroundTruth::new(map(&[1.0])).errors(&map(&[2.0])).unwrap();
+        assert_eq!(errors.all.bad, [100.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn visible_pixels_agree_with_the_right_truth() {
+        let left = map(&[0.0, 1.5, 1.0, 1.0, NONE, 9.0]);
+        let right = map(&[0.0, 3.0, NONE, 1.0, 1.0, 1.0]);
+        let truth = GroundTruth::with_right(left, &right).unwrap();
+        // Pixel 1 lands on 0 and differs by 1.5, 2 differs by 2 there, 3 hits an unknown, 5 leaves the image.
+        assert_eq!(truth.visible.as_deref(), Some([true, false, false, false, false, false].as_slice()));
+        let errors = truth.errors(&map(&[0.0; 6])).unwrap();
+        assert_eq!(errors.visible.map(|visible| visible.known), Some(1));
+        assert!(GroundTruth::with_right(map(&[1.0]), &right).is_err());
+        assert!(GroundTruth::with_mask(map(&[1.0]), vec![]).is_err());
+    }
+
+    #[test]
+    fn nothing_known_gives_zeros_not_nan() {
+        let errors = GroundTruth::new(map(&[NONE])).errors(&map(&[1.0])).unwrap();
+        assert_eq!(errors.all, MapErrors::default());
+    }
+}

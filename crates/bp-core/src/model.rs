@@ -1,0 +1,204 @@
+//! The grid Markov random field: labels, data cost profile and smoothness.
+
+use crate::Error;
+
+/// Most labels of a model.
+pub const MAX_LABELS: usize = 1024;
+
+/// Largest truncation K with which u8 messages are exact, see [`crate::exactness`].
+pub const MAX_TRUNCATION: u8 = 63;
+
+/// A data cost D(p, d) with the smoothness that goes with it, all in whole units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Profile {
+    /// Truncated absolute grey difference in tenths of the literature's unit: `(7 min(|Il - Ir|, 15) + 5) div 10`,
+    /// after Felzenszwalb and Huttenlocher (2006): lambda 0.07, tau 15, s 1, K 1.7.
+    Thesis,
+    /// `min(Hamming distance of 3x3 census codes, 6)`; the census transform is Zabih and Woodfill's (1994).
+    Census,
+    /// Sum of absolute differences over R, G, B, untruncated: the default energy of the Middlebury MRF code
+    /// (Szeliski et al. 2008).
+    Mrf,
+}
+
+impl Profile {
+    /// All profiles.
+    pub const ALL: [Self; 3] = [Self::Thesis, Self::Census, Self::Mrf];
+
+    /// The name used in options and records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Thesis => "thesis",
+            Self::Census => "census",
+            Self::Mrf => "mrf",
+        }
+    }
+
+    /// The largest data cost.
+    #[must_use]
+    pub fn max_cost(self) -> u16 {
+        match self {
+            Self::Thesis => 11,
+            Self::Census => 6,
+            Self::Mrf => 765,
+        }
+    }
+
+    /// The data cost of a label whose match lies outside the right image.
+    #[must_use]
+    pub fn out_of_range_cost(self) -> u16 {
+        match self {
+            Self::Census => 3,
+            Self::Thesis | Self::Mrf => self.max_cost(),
+        }
+    }
+
+    /// Slope s and truncation K of the smoothness cost.
+    fn smoothness(self) -> (u8, u8) {
+        match self {
+            Self::Thesis => (10, 17),
+            Self::Census => (2, 10),
+            Self::Mrf => (20, 40),
+        }
+    }
+}
+
+/// What is to be minimised: the labels and the energy
+/// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Model {
+    profile: Profile,
+    labels: u16,
+    min_disparity: i32,
+    slope: u8,
+    truncation: u8,
+}
+
+impl Model {
+    /// A model of `labels` labels with the smoothness of its profile; label i is a disparity of i pixels.
+    ///
+    /// # Errors
+    /// [`Error::Labels`] where `labels` is 0 or above [`MAX_LABELS`].
+    pub fn new(profile: Profile, labels: usize) -> Result<Self, Error> {
+        if labels == 0 || labels > MAX_LABELS {
+            return Err(Error::Labels { labels });
+        }
+        let (slope, truncation) = profile.smoothness();
+        Ok(Self { profile, labels: labels as u16, min_disparity: 0, slope, truncation })
+    }
+
+    /// The same with label i standing for a disparity of `min_disparity + i` pixels.
+    ///
+    /// # Errors
+    /// [`Error::MinDisparity`] where it exceeds the longest side of an image either way.
+    pub fn with_min_disparity(self, min_disparity: i32) -> Result<Self, Error> {
+        if min_disparity.unsigned_abs() as usize > crate::image::MAX_SIDE {
+            return Err(Error::MinDisparity { min_disparity });
+        }
+        Ok(Self { min_disparity, ..self })
+    }
+
+    /// The same with another slope s and truncation K, in the units of the profile's data cost.
+    ///
+    /// # Errors
+    /// [`Error::Truncation`] where K exceeds [`MAX_TRUNCATION`].
+    pub fn with_smoothness(self, slope: u8, truncation: u8) -> Result<Self, Error> {
+        if truncation > MAX_TRUNCATION {
+            return Err(Error::Truncation { truncation });
+        }
+        Ok(Self { slope, truncation, ..self })
+    }
+
+    /// The data cost profile.
+    #[must_use]
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// Number of labels (L).
+    #[must_use]
+    pub fn labels(&self) -> usize {
+        usize::from(self.labels)
+    }
+
+    /// The disparity of label 0 in pixels.
+    #[must_use]
+    pub fn min_disparity(&self) -> i32 {
+        self.min_disparity
+    }
+
+    /// The disparity of a label in pixels.
+    #[must_use]
+    pub fn disparity(&self, label: u16) -> i32 {
+        self.min_disparity + i32::from(label)
+    }
+
+    /// Slope s of the smoothness cost.
+    #[must_use]
+    pub fn slope(&self) -> u8 {
+        self.slope
+    }
+
+    /// Truncation K of the smoothness cost.
+    #[must_use]
+    pub fn truncation(&self) -> u8 {
+        self.truncation
+    }
+
+    /// Cost of one step between neighbouring labels, `min(s, K)`: what the two passes of a message update add.
+    #[must_use]
+    pub fn step(&self) -> u8 {
+        self.slope.min(self.truncation)
+    }
+
+    /// The smoothness cost `min(s |a - b|, K)` of two neighbouring nodes.
+    #[must_use]
+    pub fn smoothness(&self, a: u16, b: u16) -> u32 {
+        (u32::from(self.slope) * u32::from(a.abs_diff(b))).min(u32::from(self.truncation))
+    }
+
+    /// The value `4K + 1` that stored data costs are clipped at: no label as dear as that is ever chosen.
+    #[must_use]
+    pub fn clip(&self) -> u8 {
+        4 * self.truncation + 1
+    }
+
+    /// Largest data cost on `grid`, where a node's cost is the sum over up to `4^grid` pixels.
+    #[must_use]
+    pub fn max_cost(&self, grid: usize) -> u64 {
+        u64::from(self.profile.max_cost()) << (2 * grid)
+    }
+
+    /// Column of the right image that column `x` of the left one matches under `label`, if it lies in an image
+    /// `width` pixels wide.
+    #[must_use]
+    pub fn matching_column(&self, x: usize, label: u16, width: usize) -> Option<usize> {
+        let column = x as i64 - i64::from(self.disparity(label));
+        usize::try_from(column).ok().filter(|&column| column < width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_enforced() {
+        assert_eq!(Model::new(Profile::Thesis, 0), Err(Error::Labels { labels: 0 }));
+        assert!(Model::new(Profile::Thesis, 512).is_ok());
+        assert!(Model::new(Profile::Thesis, MAX_LABELS + 1).is_err());
+        let model = Model::new(Profile::Mrf, 4).unwrap();
+        assert!(model.with_smoothness(1, 63).is_ok());
+        assert_eq!(model.with_smoothness(1, 64), Err(Error::Truncation { truncation: 64 }));
+        assert!(model.with_min_disparity(i32::MIN).is_err());
+    }
+
+    #[test]
+    fn columns_outside_the_right_image_match_nothing() {
+        let model = Model::new(Profile::Thesis, 4).unwrap().with_min_disparity(-2).unwrap();
+        let columns: Vec<_> = (0..4).map(|label| model.matching_column(1, label, 3)).collect();
+        assert_eq!(columns, [None, Some(2), Some(1), Some(0)]);
+        assert_eq!(model.matching_column(0, 3, 3), None);
+    }
+}

@@ -1,0 +1,399 @@
+//! One plan for every algorithm: what is run, and what it will cost in work and memory, known before anything runs.
+
+use crate::{Error, Model, Profile, Size};
+
+/// Most grids of a plan: the longest side allowed, [`crate::image::MAX_SIDE`], halves to 1 in as many.
+pub const MAX_GRIDS: usize = 25;
+
+/// The algorithms of Doan Van Tuan's thesis (2019). Each is a way to fill [`Settings`]; nothing else knows their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Algorithm {
+    /// Plain belief propagation: k loops on the full grid.
+    Bp,
+    /// Coarse to fine: `floor(log2 m)` grids, `floor(k / (floor(log2 m) + 1))` loops on each.
+    Cfbp,
+    /// Coarse to fine with Z'' times fewer loops.
+    Cfcsbp,
+    /// Four parts, cut at the image's centre, whose match the census transform finds.
+    Ctbp,
+    /// The same with Z'''' times fewer loops.
+    Ctcsbp,
+}
+
+impl Algorithm {
+    /// All algorithms, in the thesis's order.
+    pub const ALL: [Self; 5] = [Self::Bp, Self::Cfbp, Self::Cfcsbp, Self::Ctbp, Self::Ctcsbp];
+
+    /// The name used in options and records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bp => "bp",
+            Self::Cfbp => "cfbp",
+            Self::Cfcsbp => "cfcsbp",
+            Self::Ctbp => "ctbp",
+            Self::Ctcsbp => "ctcsbp",
+        }
+    }
+
+    /// Whether the loops are divided by a "coefficient of depth change" Z.
+    #[must_use]
+    pub fn divides_loops(self) -> bool {
+        matches!(self, Self::Cfcsbp | Self::Ctcsbp)
+    }
+
+    /// Whether it runs on several grids.
+    #[must_use]
+    pub fn is_coarse_to_fine(self) -> bool {
+        matches!(self, Self::Cfbp | Self::Cfcsbp)
+    }
+
+    /// Whether it cuts the image into four parts.
+    #[must_use]
+    pub fn is_cut(self) -> bool {
+        matches!(self, Self::Ctbp | Self::Ctcsbp)
+    }
+
+    /// The thesis's settings for an image of `size`: `k` loops in all (equations 2.37, 2.38, 2.50 and 2.71), divided by
+    /// `z` where the algorithm divides, under `schedule`, where a checkerboard loop is two half-steps. No count falls
+    /// below 1.
+    #[must_use]
+    pub fn settings(self, size: Size, k: u32, z: u32, schedule: Schedule) -> Settings {
+        let log2 = size.width.ilog2();
+        let levels = if self.is_coarse_to_fine() { log2 + 1 } else { 1 };
+        let z = if self.divides_loops() { z.max(1) } else { 1 };
+        let loops = (k / (z.saturating_mul(levels))).max(1);
+        Settings {
+            grids: if self.is_coarse_to_fine() { log2.max(1) as usize } else { 1 },
+            steps: loops.saturating_mul(schedule.steps_per_loop()),
+            schedule,
+            message_start: MessageStart::Receiver,
+            cut: self.is_cut().then(|| Cut::at_centre(size)),
+        }
+    }
+}
+
+/// In which order messages are updated. A loop is one update of every directed message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Schedule {
+    /// All messages of a loop come from those of the loop before.
+    Sync,
+    /// Half-step t, counted from 0 on every grid, updates in place what the nodes with (x + y + t) even send; two
+    /// half-steps are a loop (Felzenszwalb and Huttenlocher 2006).
+    Checkerboard,
+}
+
+impl Schedule {
+    /// All schedules.
+    pub const ALL: [Self; 2] = [Self::Sync, Self::Checkerboard];
+
+    /// The name used in options and records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sync => "sync",
+            Self::Checkerboard => "checkerboard",
+        }
+    }
+
+    /// Steps that update every directed message once: 1 loop, or 2 half-steps.
+    #[must_use]
+    pub fn steps_per_loop(self) -> u32 {
+        match self {
+            Self::Sync => 1,
+            Self::Checkerboard => 2,
+        }
+    }
+}
+
+/// Which of the parent's messages a node of the next finer grid starts with. The coarsest grid starts with zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MessageStart {
+    /// A node receives at first what its parent received last.
+    Receiver,
+    /// A node sends at first what its parent sent last (as in Felzenszwalb and Huttenlocher's program).
+    Sender,
+}
+
+impl MessageStart {
+    /// Both starts.
+    pub const ALL: [Self; 2] = [Self::Receiver, Self::Sender];
+
+    /// The name used in options and records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Receiver => "receiver",
+            Self::Sender => "sender",
+        }
+    }
+}
+
+/// A cut into four parts that exchange no message: columns `0..x` and `x..`, rows `0..y` and `y..`. A part without
+/// columns or rows does not exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Cut {
+    /// First column right of the cut.
+    pub x: usize,
+    /// First row below the cut.
+    pub y: usize,
+    /// Whether the census match of (x, y) fixes the data cost of the nodes around that point, see [`crate::Seed`].
+    pub seed_start: bool,
+}
+
+impl Cut {
+    /// The thesis's cut at `(floor(m / 2), floor(n / 2))`, with `seed_start`.
+    #[must_use]
+    pub fn at_centre(size: Size) -> Self {
+        Self { x: size.width / 2, y: size.height / 2, seed_start: true }
+    }
+}
+
+/// What a plan runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Settings {
+    /// Number of grids; grid 0 is the image, each further one has half the width and height, rounded up.
+    pub grids: usize,
+    /// Steps on each grid: loops under [`Schedule::Sync`], half-steps under [`Schedule::Checkerboard`].
+    pub steps: u32,
+    /// Order of the message updates.
+    pub schedule: Schedule,
+    /// What finer grids start with.
+    pub message_start: MessageStart,
+    /// Where the image is cut, if it is.
+    pub cut: Option<Cut>,
+}
+
+/// Settings checked against an image size and a model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    model: Model,
+    settings: Settings,
+    sizes: Vec<Size>,
+}
+
+impl Plan {
+    /// A plan for pairs of `size`.
+    ///
+    /// # Errors
+    /// [`Error::Plan`] where a count is 0, there are more than [`MAX_GRIDS`] grids, or a cut lies outside the image or
+    /// comes with more than one grid; those of [`Size::new`] for a size that is no image's.
+    pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
+        let size = Size::new(size.width, size.height)?;
+        if settings.grids == 0 || settings.steps == 0 {
+            return Err(Error::Plan("a plan needs at least one grid and one step on it"));
+        }
+        if settings.grids > MAX_GRIDS {
+            return Err(Error::Plan("a plan has at most 25 grids"));
+        }
+        if settings.cut.is_some_and(|cut| cut.x >= size.width || cut.y >= size.height) {
+            return Err(Error::Plan("the cut lies outside the image"));
+        }
+        if settings.cut.is_some() && settings.grids > 1 {
+            return Err(Error::Plan("an image that is cut into parts has one grid"));
+        }
+        let sizes = std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids).collect();
+        Ok(Self { model, settings, sizes })
+    }
+
+    /// Labels, data cost and smoothness.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// What is run.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Number of grids.
+    #[must_use]
+    pub fn grids(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// Size of the image, which is grid 0.
+    #[must_use]
+    pub fn image_size(&self) -> Size {
+        self.sizes[0]
+    }
+
+    /// Size of a grid.
+    ///
+    /// # Panics
+    /// Where there is no such grid.
+    #[must_use]
+    pub fn size(&self, grid: usize) -> Size {
+        self.sizes[grid]
+    }
+
+    /// Number of data costs of a grid: nodes times labels.
+    ///
+    /// # Panics
+    /// Where there is no such grid.
+    #[must_use]
+    pub fn volume(&self, grid: usize) -> usize {
+        self.sizes[grid].pixels().saturating_mul(self.model.labels())
+    }
+
+    /// Pairs of neighbouring nodes on a grid that exchange messages.
+    ///
+    /// # Panics
+    /// Where there is no such grid.
+    #[must_use]
+    pub fn edges(&self, grid: usize) -> u64 {
+        let Size { width, height } = self.sizes[grid];
+        let (width, height) = (width as u64, height as u64);
+        let all = (width - 1) * height + width * (height - 1);
+        let cut = self.settings.cut.map_or(0, |cut| {
+            let vertical = if cut.x > 0 { height } else { 0 };
+            vertical + if cut.y > 0 { width } else { 0 }
+        });
+        all - cut
+    }
+
+    /// Message entries that one step on a grid computes: a loop every directed message, a half-step half of them.
+    ///
+    /// # Panics
+    /// Where there is no such grid.
+    #[must_use]
+    pub fn updates_per_step(&self, grid: usize) -> u64 {
+        let messages = 2 / u64::from(self.settings.schedule.steps_per_loop()) * self.edges(grid);
+        messages.saturating_mul(self.model.labels() as u64)
+    }
+
+    /// Message entries that the whole plan computes.
+    #[must_use]
+    pub fn message_updates(&self) -> u64 {
+        let per_step = (0..self.grids()).map(|grid| self.updates_per_step(grid));
+        per_step.fold(0, |sum: u64, updates| sum.saturating_add(updates.saturating_mul(self.settings.steps.into())))
+    }
+
+    /// Whether the coarser grid's costs are summed from wide sums kept beside this grid's stored costs, because those
+    /// may have been clipped.
+    #[must_use]
+    pub fn keeps_sums(&self, grid: usize) -> bool {
+        grid + 1 < self.grids() && self.model.max_cost(grid) > u64::from(self.model.clip())
+    }
+
+    /// Bytes of one such sum: the fewest of 1, 2, 4 and 8 that hold the largest.
+    #[must_use]
+    pub fn sum_bytes(&self, grid: usize) -> usize {
+        match self.model.max_cost(grid) {
+            0..=0xff => 1,
+            0x100..=0xffff => 2,
+            0x1_0000..=0xffff_ffff => 4,
+            _ => 8,
+        }
+    }
+
+    /// The buffers that the plan asks for, without any padding a backend may add. Messages of two grids are held at a
+    /// time; under [`Schedule::Sync`] they are double buffered.
+    #[must_use]
+    pub fn buffers(&self) -> Vec<Buffer> {
+        let pixels = self.image_size().pixels() as u64;
+        let bytes_per_pixel = if self.model.profile() == Profile::Mrf { 6 } else { 2 };
+        let mut buffers = vec![
+            Buffer { name: "images", grid: 0, bytes: bytes_per_pixel * pixels },
+            Buffer { name: "labels", grid: 0, bytes: 2 * pixels },
+        ];
+        for grid in 0..self.grids() {
+            let volume = self.volume(grid) as u64;
+            buffers.push(Buffer { name: "data cost", grid, bytes: volume });
+            if self.keeps_sums(grid) {
+                let bytes = volume.saturating_mul(self.sum_bytes(grid) as u64);
+                buffers.push(Buffer { name: "data cost sums", grid, bytes });
+            }
+            if grid < 2 {
+                let copies = if self.settings.schedule == Schedule::Sync { 2 } else { 1 };
+                buffers.push(Buffer { name: "messages", grid, bytes: volume.saturating_mul(4 * copies) });
+            }
+        }
+        buffers
+    }
+
+    /// Sum over [`Plan::buffers`].
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.buffers().iter().fold(0, |sum, buffer| sum.saturating_add(buffer.bytes))
+    }
+}
+
+/// A buffer that a plan asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Buffer {
+    /// What it holds.
+    pub name: &'static str,
+    /// For which grid.
+    pub grid: usize,
+    /// Its size in bytes.
+    pub bytes: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BABY: Size = Size { width: 620, height: 555 };
+
+    fn plan(algorithm: Algorithm, schedule: Schedule) -> Plan {
+        let model = Model::new(Profile::Thesis, 112).unwrap();
+        Plan::new(BABY, model, algorithm.settings(BABY, 112, 2, schedule)).unwrap()
+    }
+
+    #[test]
+    fn the_thesis_counts_for_image_1() {
+        let counts = Algorithm::ALL.map(|algorithm| {
+            let settings = algorithm.settings(BABY, 112, 2, Schedule::Sync);
+            (settings.grids, settings.steps, settings.cut.is_some())
+        });
+        assert_eq!(counts, [(1, 112, false), (9, 11, false), (9, 5, false), (1, 112, true), (1, 56, true)]);
+        assert_eq!(Algorithm::Ctcsbp.settings(BABY, 112, 3, Schedule::Sync).steps, 37);
+        let tiny = Size { width: 1, height: 9 };
+        assert_eq!(Algorithm::Cfcsbp.settings(tiny, 1, 2, Schedule::Checkerboard).steps, 2);
+        assert_eq!(Algorithm::Cfcsbp.settings(tiny, 1, 2, Schedule::Sync).grids, 1);
+    }
+
+    #[test]
+    fn updates_follow_the_formulas() {
+        let all = 2 * (619 * 555 + 620 * 554) * 112;
+        assert_eq!(plan(Algorithm::Bp, Schedule::Sync).message_updates(), 112 * all);
+        assert_eq!(plan(Algorithm::Bp, Schedule::Checkerboard).message_updates(), 112 * all);
+        let cut = 2 * (620 + 555) * 112;
+        assert_eq!(plan(Algorithm::Ctbp, Schedule::Sync).message_updates(), 112 * (all - cut));
+        let ratio = |algorithm| {
+            let updates = plan(algorithm, Schedule::Sync).message_updates();
+            plan(Algorithm::Bp, Schedule::Sync).message_updates() as f64 / updates as f64
+        };
+        assert!((ratio(Algorithm::Cfbp) - 7.6).abs() < 0.1, "{}", ratio(Algorithm::Cfbp));
+        assert!((ratio(Algorithm::Cfcsbp) - 16.8).abs() < 0.1, "{}", ratio(Algorithm::Cfcsbp));
+    }
+
+    #[test]
+    fn sums_are_kept_where_costs_may_be_clipped() {
+        let plan = plan(Algorithm::Cfbp, Schedule::Sync);
+        let kept: Vec<_> = (0..9).map(|grid| (plan.keeps_sums(grid), plan.sum_bytes(grid))).collect();
+        let expected = [0, 0, 1, 2, 2, 2, 2, 4, 0].map(|bytes| bytes > 0);
+        assert_eq!(kept.iter().map(|k| k.0).collect::<Vec<_>>(), expected);
+        assert_eq!(kept.iter().map(|k| k.1).collect::<Vec<_>>(), [1, 1, 1, 2, 2, 2, 2, 4, 4]);
+    }
+
+    #[test]
+    fn impossible_settings_are_refused() {
+        let model = Model::new(Profile::Thesis, 4).unwrap();
+        let settings = Algorithm::Ctbp.settings(BABY, 4, 2, Schedule::Sync);
+        let with = |change: fn(&mut Settings)| {
+            let mut settings = settings;
+            change(&mut settings);
+            Plan::new(BABY, model, settings)
+        };
+        assert!(with(|_| ()).is_ok());
+        assert!(with(|s| s.grids = 0).is_err());
+        assert!(with(|s| s.steps = 0).is_err());
+        assert!(with(|s| s.grids = 2).is_err());
+        assert!(with(|s| s.cut = Some(Cut { x: 620, y: 0, seed_start: true })).is_err());
+        assert!(with(|s| (s.cut, s.grids) = (None, MAX_GRIDS + 1)).is_err());
+    }
+}

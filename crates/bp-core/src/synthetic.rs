@@ -1,0 +1,95 @@
+//! Six made-up stereo scenes with exact ground truth, the same to the bit on every machine.
+//!
+//! They stand in for six Middlebury scenes where those are not at hand: alike in size, range of disparity, content and
+//! difficulty, but not their images. Every scene is a list of surfaces over the left image; each surface knows which
+//! pixels it covers, its disparity there as a continuous function, and its texture. Both views look at the same
+//! surfaces, so the truth is exact to single precision, for hidden pixels too.
+
+mod render;
+mod scenes;
+mod surface;
+mod texture;
+
+use crate::{DisparityMap, Image, Size, StereoPair};
+use render::{Exposure, View, World};
+
+/// What the scenes show, in the order of [`scene`]'s index.
+pub const NAMES: [&str; 6] = ["doll", "leaves", "cloth", "pots", "bowling", "books"];
+
+/// Width and height of the scenes in pixels at full size, in the order of [`NAMES`].
+pub const SIZES: [[usize; 2]; 6] = [[620, 555], [641, 555], [626, 555], [656, 555], [665, 555], [695, 555]];
+
+/// No true disparity of either view exceeds this many pixels at full size.
+pub const MAX_DISPARITY: f64 = 111.0;
+
+/// A stereo pair with its ground truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What the scene shows, one of [`NAMES`].
+    pub name: &'static str,
+    /// The two views: different noise and a slightly different exposure.
+    pub pair: StereoPair,
+    /// True disparity of each left pixel [height][width], in pixels of this scene's size; known everywhere.
+    pub truth_left: DisparityMap,
+    /// True disparity of each right pixel [height][width], in pixels of this scene's size; known everywhere.
+    pub truth_right: DisparityMap,
+    /// Whether the right camera also sees what a left pixel shows, [height][width].
+    pub visible: Vec<bool>,
+}
+
+/// The scene `NAMES[index]` with both sides and all disparities divided by `divisor`, sides rounded up.
+///
+/// # Panics
+/// Where `index` is not below 6 or `divisor` is 0.
+#[must_use]
+pub fn scene(index: usize, divisor: usize) -> Scene {
+    let size = reduced(SIZES[index], divisor);
+    let world = scenes::world(index);
+    let [left, right] = exposures(index, divisor);
+    let image = |view, exposure: Exposure| {
+        let colours = exposure.develop(&world.photograph(view, size, divisor));
+        Image::from_rgb(size.width, size.height, colours).expect("one colour a pixel was rendered")
+    };
+    let pair = StereoPair::new(image(View::Left, left), image(View::Right, right)).expect("both views have one size");
+    let truth = |view| truth(&world, view, size, divisor);
+    Scene {
+        name: NAMES[index],
+        pair,
+        truth_left: truth(View::Left),
+        truth_right: truth(View::Right),
+        visible: visible(&world, size, divisor),
+    }
+}
+
+/// The size of a scene at one `divisor`-th.
+fn reduced([width, height]: [usize; 2], divisor: usize) -> Size {
+    Size { width: width.div_ceil(divisor), height: height.div_ceil(divisor) }
+}
+
+/// The full-size coordinate of a reduced pixel's centre.
+fn centre(i: usize, divisor: usize) -> f64 {
+    (i as f64 + 0.5) * divisor as f64 - 0.5
+}
+
+/// One value a pixel, from its centre in full-size coordinates, [height][width].
+fn per_pixel<T>(size: Size, divisor: usize, value: impl Fn(f64, f64) -> T) -> Vec<T> {
+    let pixels = 0..size.pixels();
+    pixels.map(|i| value(centre(i % size.width, divisor), centre(i / size.width, divisor))).collect()
+}
+
+fn truth(world: &World, view: View, size: Size, divisor: usize) -> DisparityMap {
+    let values = per_pixel(size, divisor, |x, y| (world.look(view, x, y).disparity / divisor as f64) as f32);
+    DisparityMap::new(size, values).expect("one value a pixel was computed")
+}
+
+fn visible(world: &World, size: Size, divisor: usize) -> Vec<bool> {
+    let columns = centre(0, divisor)..=centre(size.width - 1, divisor);
+    per_pixel(size, divisor, |x, y| world.is_shared(x, y, &columns))
+}
+
+/// The exposures of both views: as unlike as those of two shots with one camera. Averaging pixels averages noise.
+fn exposures(index: usize, divisor: usize) -> [Exposure; 2] {
+    let (gain, offset) = [(1.02, -1.0), (0.98, 1.5), (1.03, 0.5), (0.97, 1.0), (1.01, 2.0), (0.985, -1.0)][index];
+    let (noise, seed) = (1.6 / divisor as f64, 2 * index as u32);
+    [Exposure { gain: 1.0, offset: 0.0, noise, seed }, Exposure { gain, offset, noise, seed: seed + 1 }]
+}

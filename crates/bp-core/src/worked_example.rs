@@ -1,0 +1,1 @@
+//! A pair of 3x2 pixels, followed by hand.

@@ -1,0 +1,56 @@
+//! The data costs of one grid.
+
+use bp_core::{Error, Plan, memory};
+
+use crate::sums::{self, Sums};
+
+/// Data costs [node][label], each node's least one taken off, clipped at 4K + 1 (see [`bp_core::exactness`]); beside
+/// them the unclipped ones, where the next coarser grid is summed from those.
+pub(crate) struct Costs {
+    labels: usize,
+    clip: u64,
+    stored: Vec<u8>,
+    sums: Option<Sums>,
+}
+
+impl Costs {
+    /// Room for the costs of `grid`.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+        Ok(Self {
+            labels: plan.model().labels(),
+            clip: plan.model().clip().into(),
+            stored: memory::filled("data cost", plan.volume(grid), 0)?,
+            sums: plan.keeps_sums(grid).then(|| Sums::new(plan, grid)).transpose()?,
+        })
+    }
+
+    /// The costs of all labels of one node.
+    pub(crate) fn of(&self, node: usize) -> &[u8] {
+        &self.stored[node * self.labels..][..self.labels]
+    }
+
+    /// Stores the costs of one node.
+    pub(crate) fn store(&mut self, node: usize, costs: &[u64]) {
+        let least = costs.iter().copied().min().unwrap_or(0);
+        let stored = &mut self.stored[node * self.labels..][..self.labels];
+        for (stored, cost) in stored.iter_mut().zip(costs) {
+            *stored = (cost - least).min(self.clip) as u8;
+        }
+        if let Some(sums) = &mut self.sums {
+            sums.store(node, costs);
+        }
+    }
+
+    /// Adds the unclipped costs of one node to `costs`; without sums, the stored ones never were clipped.
+    pub(crate) fn add_unclipped(&self, node: usize, costs: &mut [u64]) {
+        match &self.sums {
+            Some(sums) => sums.add_to(node, costs),
+            None => sums::add(self.of(node), costs),
+        }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.stored) + self.sums.as_ref().map_or(0, Sums::bytes)
+    }
+}

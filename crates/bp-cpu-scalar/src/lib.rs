@@ -1,0 +1,44 @@
+//! The reference backend: one thread, the label loop innermost, written to be read.
+//!
+//! It is the baseline that all tables compare with, and its labels and messages are what every other backend must give
+//! to the bit. One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`.
+
+mod coarsen;
+mod costs;
+mod match_cost;
+mod messages;
+mod refine;
+mod select_labels;
+mod solver;
+mod sums;
+mod update_messages;
+
+use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
+
+/// The backend, and its one device.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scalar;
+
+impl Backend for Scalar {
+    fn name(&self) -> &'static str {
+        "scalar"
+    }
+
+    fn devices(&self) -> Vec<DeviceInfo> {
+        vec![DeviceInfo { name: "CPU, 1 thread".to_owned(), software_rasteriser: false }]
+    }
+
+    fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {
+        if device > 0 {
+            let reason = "the one device is 0".to_owned();
+            return Err(Error::Unavailable { backend: self.name(), device, reason });
+        }
+        Ok(Box::new(Self))
+    }
+}
+
+impl Device for Scalar {
+    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+        Ok(Box::new(solver::ScalarSolver::new(plan)?))
+    }
+}
