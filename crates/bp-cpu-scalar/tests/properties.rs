@@ -1,0 +1,255 @@
+//! What belief propagation must satisfy, whatever computes it.
+
+use bp_core::{
+    Algorithm, Backend, Cut, DataCost, Energy, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings,
+    Side, Size, StereoPair,
+    conformance::{Answer, Case, Oracle, assert_same, noise_pair, solve},
+};
+use bp_cpu_scalar::Scalar;
+use proptest::prelude::*;
+
+fn plan_settings(grids: usize, steps: u32, schedule: Schedule) -> Settings {
+    Settings { grids, steps, schedule, message_start: MessageStart::Receiver, cut: None }
+}
+
+fn answer(pair: &StereoPair, model: Model, settings: Settings) -> Answer {
+    let plan = Plan::new(pair.size(), model, settings).unwrap();
+    solve(&Scalar, &Case { pair: pair.clone(), plan }).unwrap()
+}
+
+fn any_model(labels: std::ops::Range<usize>) -> impl Strategy<Value = Model> {
+    let profile = prop::sample::select(Profile::ALL.to_vec());
+    (profile, labels, any::<u8>(), 0..=63_u8, -3..4_i32).prop_map(|(profile, labels, slope, truncation, min)| {
+        let model = Model::new(profile, labels).unwrap().with_min_disparity(min).unwrap();
+        model.with_smoothness(slope, truncation).unwrap()
+    })
+}
+
+fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
+    let schedule = prop::sample::select(Schedule::ALL.to_vec());
+    let start = prop::sample::select(MessageStart::ALL.to_vec());
+    let cut = prop::option::of((0..size.width, 0..size.height, any::<bool>()));
+    (1..5_usize, 1..6_u32, schedule, start, cut).prop_map(|(grids, steps, schedule, message_start, cut)| {
+        let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
+        let grids = if cut.is_some() { 1 } else { grids };
+        Settings { grids, steps, schedule, message_start, cut }
+    })
+}
+
+fn any_case() -> impl Strategy<Value = Case> {
+    (1..9_usize, 1..9_usize, any::<u32>(), any_model(1..20)).prop_flat_map(|(width, height, seed, model)| {
+        let pair = noise_pair(width, height, seed.into());
+        any_settings(pair.size()).prop_map(move |settings| Case {
+            plan: Plan::new(pair.size(), model, settings).unwrap(),
+            pair: pair.clone(),
+        })
+    })
+}
+
+/// The least energy of any labelling of a chain that gives node p label d, [node][label].
+fn min_marginals(cost: &DataCost, model: &Model, nodes: &[(usize, usize)]) -> Vec<Vec<i64>> {
+    let labels = 0..model.labels() as u16;
+    let data = |&(x, y): &(usize, usize)| labels.clone().map(|d| i64::from(cost.at(x, y, d))).collect::<Vec<_>>();
+    // Least energy of all nodes before one, for each of its labels.
+    let before = |order: &[(usize, usize)]| {
+        let mut sums = vec![vec![0; model.labels()]];
+        for node in &order[..order.len() - 1] {
+            let so_far: Vec<i64> = sums[sums.len() - 1].iter().zip(data(node)).map(|(sum, cost)| sum + cost).collect();
+            let reach = |d: u16| {
+                let offers = labels.clone().map(|a| so_far[usize::from(a)] + i64::from(model.smoothness(a, d)));
+                offers.min().unwrap()
+            };
+            sums.push(labels.clone().map(reach).collect());
+        }
+        sums
+    };
+    let backwards: Vec<_> = nodes.iter().rev().copied().collect();
+    let (ahead, behind) = (before(nodes), before(&backwards));
+    let all = ahead.into_iter().zip(behind.into_iter().rev()).zip(nodes);
+    all.map(|((ahead, behind), node)| {
+        ahead.iter().zip(behind).zip(data(node)).map(|((ahead, behind), cost)| ahead + behind + cost).collect()
+    })
+    .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn u8_equals_unbounded_integers(case in any_case()) {
+        assert_same(&Oracle, &Scalar, &case);
+    }
+
+    /// On a chain, belief propagation is dynamic programming: beliefs are min-marginals up to a constant a node.
+    #[test]
+    fn a_chain_is_solved_exactly(
+        len in 1..12_usize, upright in any::<bool>(), seed in any::<u32>(), model in any_model(1..9),
+    ) {
+        let (width, height) = if upright { (1, len) } else { (len, 1) };
+        let pair = noise_pair(width, height, seed.into());
+        let answer = answer(&pair, model, plan_settings(1, len as u32, Schedule::Sync));
+        let cost = DataCost::of_pair(&pair, model).unwrap();
+        let nodes: Vec<_> = (0..len).map(|i| (i % width, i / width)).collect();
+        let marginals = min_marginals(&cost, &model, &nodes);
+        let mut unique = true;
+        for (node, (&(x, y), marginals)) in nodes.iter().zip(&marginals).enumerate() {
+            let received = |d: usize| -> i64 {
+                answer.messages.iter().map(|side| i64::from(side[node * model.labels() + d])).sum()
+            };
+            let beliefs: Vec<_> = (0..model.labels()).map(|d| i64::from(cost.at(x, y, d as u16)) + received(d)).collect();
+            let (least, least_energy) = (*beliefs.iter().min().unwrap(), *marginals.iter().min().unwrap());
+            let above: Vec<_> = beliefs.iter().map(|belief| belief - least).collect();
+            prop_assert_eq!(&above, &marginals.iter().map(|energy| energy - least_energy).collect::<Vec<_>>());
+            unique &= above.iter().filter(|&&above| above == 0).count() == 1;
+        }
+        if unique {
+            let energy = Energy::of(&pair, &model, &answer.labels).unwrap().total();
+            prop_assert_eq!(energy as i64, *marginals[0].iter().min().unwrap());
+        }
+    }
+
+    /// The grid is bipartite: T half-steps from zero are one colour of T synchronous loops.
+    #[test]
+    fn half_steps_are_half_of_the_synchronous_loops(
+        width in 1..9_usize, height in 1..9_usize, steps in 1..7_u32, seed in any::<u32>(), model in any_model(1..9),
+    ) {
+        let pair = noise_pair(width, height, seed.into());
+        let sync = answer(&pair, model, plan_settings(1, steps, Schedule::Sync)).labels;
+        let half = answer(&pair, model, plan_settings(1, steps, Schedule::Checkerboard)).labels;
+        for node in (0..width * height).filter(|node| (node % width + node / width + steps as usize) % 2 == 0) {
+            prop_assert_eq!(half[node], sync[node]);
+        }
+    }
+
+    #[test]
+    fn one_part_or_one_grid_is_plain_bp(
+        width in 1..9_usize, height in 1..9_usize, seed in any::<u32>(), model in any_model(1..9),
+    ) {
+        let pair = noise_pair(width, height, seed.into());
+        let bp = plan_settings(1, 4, Schedule::Sync);
+        let one_part = Settings { cut: Some(Cut { x: 0, y: 0, seed_start: false }), ..bp };
+        prop_assert_eq!(answer(&pair, model, bp), answer(&pair, model, one_part));
+        let one_grid = Algorithm::Cfbp.settings(Size { width: 3, height: 3 }, 8, 2, Schedule::Sync);
+        prop_assert_eq!((one_grid.grids, one_grid.steps), (1, 4));
+        prop_assert_eq!(answer(&pair, model, bp), answer(&pair, model, one_grid));
+    }
+
+    /// No order of rows is built in. (Columns have one: disparities go one way.)
+    #[test]
+    fn a_pair_upside_down_gives_the_map_upside_down(
+        width in 1..9_usize, height in 1..9_usize, steps in 1..7_u32, seed in any::<u32>(), model in any_model(1..9),
+    ) {
+        let pair = noise_pair(width, height, seed.into());
+        let turn = |image: &Image| {
+            let rows: Vec<_> = image.pixels().chunks(width).rev().flatten().copied().collect();
+            Image::from_rgb(width, height, rows).unwrap()
+        };
+        let turned = StereoPair::new(turn(pair.left()), turn(pair.right())).unwrap();
+        let settings = plan_settings(1, steps, Schedule::Sync);
+        let expected: Vec<_> = answer(&pair, model, settings).labels.chunks(width).rev().flatten().copied().collect();
+        prop_assert_eq!(answer(&turned, model, settings).labels, expected);
+    }
+
+    /// What lies in one part of a cut image has no effect on the others.
+    #[test]
+    fn no_message_crosses_a_cut(width in 2..9_usize, height in 2..9_usize, seed in any::<u32>(), labels in 1..9_usize) {
+        let model = Model::new(Profile::Thesis, labels).unwrap();
+        let pair = noise_pair(width, height, seed.into());
+        let cut = Cut { seed_start: false, ..Cut::at_centre(pair.size()) };
+        let settings = Settings { cut: Some(cut), ..plan_settings(1, 9, Schedule::Checkerboard) };
+        let inside = |node: usize| node % width < cut.x && node / width < cut.y;
+        let pixels = pair.left().pixels().iter().enumerate();
+        let changed = pixels.map(|(node, &pixel)| if inside(node) { pixel.map(|v| !v) } else { pixel }).collect();
+        let left = Image::from_rgb(width, height, changed).unwrap();
+        let other = StereoPair::new(left, pair.right().clone()).unwrap();
+        let (a, b) = (answer(&pair, model, settings), answer(&other, model, settings));
+        for node in (0..width * height).filter(|&node| !inside(node)) {
+            prop_assert_eq!(a.labels[node], b.labels[node]);
+        }
+    }
+}
+
+#[test]
+fn a_shifted_random_dot_pair_gives_the_shift() {
+    let dots = |x: usize, y: usize| if (x * x * 7 + x * y * 13 + y * 31 + x * 5) % 11 < 5 { 230 } else { 20 };
+    let view = |shift: usize| {
+        let pixels: Vec<u8> = (0..40 * 24).map(|i| dots(i % 40 + shift, i / 40)).collect();
+        Image::from_grey(40, 24, &pixels).unwrap()
+    };
+    let pair = StereoPair::new(view(0), view(5)).unwrap();
+    for (profile, algorithm) in Profile::ALL.into_iter().flat_map(|p| Algorithm::ALL.map(|a| (p, a))) {
+        let model = Model::new(profile, 12).unwrap();
+        let labels = answer(&pair, model, algorithm.settings(pair.size(), 24, 2, Schedule::Sync)).labels;
+        let inner = (0..40 * 24).filter(|i| i % 40 >= 12);
+        let wrong = inner.filter(|&i| labels[i] != 5).count();
+        assert!(wrong <= 8, "{} {}: {wrong} of 672 pixels", profile.name(), algorithm.name());
+    }
+}
+
+/// Black against white is the dearest pair; 14 grids reach the widest sums.
+#[test]
+fn sums_hold_the_extreme_costs() {
+    let view = |value| Image::from_grey(67, 33, &[value; 67 * 33]).unwrap();
+    let pair = StereoPair::new(view(255), view(0)).unwrap();
+    for profile in Profile::ALL {
+        let plan = Plan::new(pair.size(), Model::new(profile, 4).unwrap(), plan_settings(14, 1, Schedule::Sync));
+        assert_same(&Oracle, &Scalar, &Case { pair: pair.clone(), plan: plan.unwrap() });
+    }
+}
+
+#[test]
+fn a_matcher_used_again_forgets_the_pair_before() {
+    for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
+        let pairs = [1, 2, 1].map(|seed| noise_pair(21, 17, seed));
+        let model = Model::new(Profile::Census, 9).unwrap();
+        // One loop: what an old message leaves behind is not yet washed out.
+        let plan = Plan::new(pairs[0].size(), model, algorithm.settings(pairs[0].size(), 1, 1, schedule)).unwrap();
+        let mut matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan.clone()).unwrap();
+        for pair in pairs {
+            matcher.solve(&pair).unwrap();
+            let messages = Side::ALL.map(|side| matcher.messages(side).unwrap());
+            let labels = matcher.labels().to_vec();
+            assert_eq!(Answer { labels, messages }, solve(&Scalar, &Case { pair, plan: plan.clone() }).unwrap());
+        }
+    }
+}
+
+#[test]
+fn memory_is_what_the_plan_predicts_and_one_nodes_scratch() {
+    for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
+        for profile in Profile::ALL {
+            let (size, labels) = (Size { width: 61, height: 47 }, 23);
+            let settings = algorithm.settings(size, 9, 2, schedule);
+            let plan = Plan::new(size, Model::new(profile, labels).unwrap(), settings).unwrap();
+            let planned = plan.bytes();
+            let matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan).unwrap();
+            assert_eq!(matcher.allocated_bytes(), planned + 9 * labels as u64);
+        }
+    }
+}
+
+#[test]
+fn a_stopped_solve_says_so_and_the_next_is_whole() {
+    let pair = noise_pair(9, 9, 3);
+    let model = Model::new(Profile::Census, 5).unwrap();
+    let plan = Plan::new(pair.size(), model, plan_settings(2, 3, Schedule::Checkerboard)).unwrap();
+    let mut matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan.clone()).unwrap();
+    let mut calls = 0;
+    let stopped = matcher.solve_observed(&pair, &mut |progress| {
+        calls += 1;
+        assert!(progress.done <= progress.total);
+        if calls == 4 { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
+    });
+    assert_eq!((stopped, calls), (Err(bp_core::Error::Stopped), 4));
+    let mut last = 0;
+    matcher
+        .solve_observed(&pair, &mut |progress| {
+            last = progress.done;
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert_eq!(last, plan.message_updates());
+    assert_eq!(matcher.labels(), solve(&Scalar, &Case { pair, plan }).unwrap().labels);
+    assert!(matcher.solve(&noise_pair(8, 9, 3)).is_err());
+    assert!(Scalar.open(1).is_err());
+}
