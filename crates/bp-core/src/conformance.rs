@@ -120,7 +120,8 @@ fn settings(size: Size) -> Vec<Settings> {
     all
 }
 
-/// A pair of coloured noise whose right view is the left one shifted in places; the same for the same arguments.
+/// A pair of coloured noise, the same for the same arguments. Blocks of 4x4 pixels are shifted by 0, 1 or 2, so that
+/// children of a coarse node disagree strongly; every fifth pixel matches nothing.
 ///
 /// # Panics
 /// Where the size is no image's.
@@ -131,13 +132,15 @@ pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z ^ (z >> 27)
     };
-    let view = |shift: u64| {
+    let view = |right: bool| {
         let pixel = |i: usize| {
-            let noise = hash(i as u64 + if i % 5 == 0 { 0 } else { shift }).to_le_bytes();
-            [noise[0], noise[1], noise[2]]
+            let shift = if right { (i % width / 4 + i / width / 4) % 3 } else { 0 };
+            let unmatched = right && i % 5 == 0;
+            let [r, g, b, ..] = hash(if unmatched { !(i as u64) } else { (i + shift) as u64 }).to_le_bytes();
+            [r, g, b]
         };
         Image::from_rgb(width, height, (0..width * height).map(pixel).collect())
     };
-    let pair = view(0).and_then(|left| StereoPair::new(left, view(2)?));
+    let pair = view(false).and_then(|left| StereoPair::new(left, view(true)?));
     pair.unwrap_or_else(|error| panic!("{error}"))
 }

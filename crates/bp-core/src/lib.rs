@@ -41,7 +41,7 @@ pub mod memory;
 mod metrics;
 mod model;
 mod plan;
-//pub mod synthetic;
+pub mod synthetic;
 pub mod worked_example;
 
 pub use backend::{Backend, Device, DeviceInfo, Side, Solver};

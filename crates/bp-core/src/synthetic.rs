@@ -11,7 +11,8 @@ mod surface;
 mod texture;
 
 use crate::{DisparityMap, Image, Size, StereoPair};
-use render::{Exposure, View, World};
+use render::{Exposure, World};
+use surface::View;
 
 /// What the scenes show, in the order of [`scene`]'s index.
 pub const NAMES: [&str; 6] = ["doll", "leaves", "cloth", "pots", "bowling", "books"];

@@ -53,7 +53,7 @@ impl Solver for ScalarSolver {
         if grid + 1 == self.plan.grids() {
             self.messages[grid % 2].clear(self.plan.size(grid).pixels());
         } else if let [even, odd] = self.messages.as_mut_slice() {
-            let (fine, coarse) = if grid % 2 == 0 { (even, odd) } else { (odd, even) };
+            let (fine, coarse) = if grid.is_multiple_of(2) { (even, odd) } else { (odd, even) };
             refine(&self.plan, grid, coarse, fine);
         }
         Ok(())

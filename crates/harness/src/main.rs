@@ -1,1 +1,7 @@
-fn main() {}
+//! The `bp` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    harness::main()
+}

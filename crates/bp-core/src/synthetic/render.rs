@@ -1,33 +1,17 @@
 //! From surfaces to two photographs and their ground truth.
 
-use super::MAX_DISPARITY;
-use super::surface::Surface;
+use super::surface::{Hit, Surface, View};
 use super::texture::uniform;
 use crate::Size;
 use std::ops::RangeInclusive;
 
 /// Places at which the way to the light is probed.
-const SHADOW_STEPS: u32 = 4;
+const SHADOW_STEPS: u32 = 3;
 
 /// What stands before the cameras. Of the surfaces that cover a line of sight the nearest is seen.
 pub(super) struct World {
     pub(super) backdrop: Surface,
     pub(super) objects: Vec<Surface>,
-}
-
-/// What a line of sight meets: a surface at column `x` of the left image.
-#[derive(Clone, Copy)]
-pub(super) struct Hit<'a> {
-    pub(super) surface: &'a Surface,
-    pub(super) x: f64,
-    pub(super) disparity: f64,
-}
-
-/// Which camera.
-#[derive(Clone, Copy)]
-pub(super) enum View {
-    Left,
-    Right,
 }
 
 /// An exposure: what a camera makes of radiance.
@@ -51,27 +35,16 @@ struct Radiance {
 impl World {
     /// What the given camera sees at (x, y) of its image.
     pub(super) fn look(&self, view: View, x: f64, y: f64) -> Hit<'_> {
-        let meet = |surface| match view {
-            View::Left => Hit { surface, x, disparity: surface.disparity(x, y) },
-            View::Right => {
-                let left_x = surface.left_x(x, y);
-                Hit { surface, x: left_x, disparity: left_x - x }
-            }
-        };
-        let reach = match view {
-            View::Left => 0.0,
-            View::Right => MAX_DISPARITY,
-        };
-        let near = self.objects.iter().filter(|surface| surface.may_cover(x, x + reach, y)).map(meet);
-        let covering = near.filter(|hit| hit.surface.covers(hit.x, y));
-        covering.fold(meet(&self.backdrop), |best, hit| if hit.disparity > best.disparity { hit } else { best })
+        let hits = self.objects.iter().filter_map(|object| object.seen_at(view, x, y));
+        let behind = self.backdrop.met_at(view, x, y);
+        hits.fold(behind, |best, hit| if hit.disparity > best.disparity { hit } else { best })
     }
 
     /// Whether the right camera sees what the left one sees at (x, y) within `columns` of its image.
     pub(super) fn is_shared(&self, x: f64, y: f64, columns: &RangeInclusive<f64>) -> bool {
         let seen = self.look(View::Left, x, y);
         let right_x = x - seen.disparity;
-        
+
         columns.contains(&right_x) && std::ptr::eq(self.look(View::Right, right_x, y).surface, seen.surface)
     }
 
@@ -88,17 +61,19 @@ impl World {
 
     /// The light on a surface: from the upper left and from the front.
     fn light(&self, hit: Hit<'_>, y: f64) -> f64 {
-        let at = |dx: f64, dy: f64| hit.surface.disparity(hit.x + dx, y + dy);
-        let facing = at(1.0, 0.0) - at(-1.0, 0.0) + at(0.0, 1.0) - at(0.0, -1.0);
+        let gain = |dx: f64, dy: f64| hit.surface.disparity(hit.x + dx, y + dy) - hit.disparity;
+        let facing = gain(1.0, 0.0) + gain(0.0, 1.0);
         let blocked = (1..=SHADOW_STEPS).filter(|&step| self.blocks(hit, y, f64::from(step))).count();
-        (1.0 + 0.35 * facing).clamp(0.4, 1.5) * (1.0 - 0.08 * blocked as f64)
+        (1.0 + 0.7 * facing).clamp(0.4, 1.5) * (1.0 - 0.1 * blocked as f64)
     }
 
-    /// Whether something stands in the light's way `step` steps from a surface.
+    /// Whether something stands in the light's way `step` steps from a surface. What stands far before the surface
+    /// does not count: its shadow falls elsewhere.
     fn blocks(&self, hit: Hit<'_>, y: f64, step: f64) -> bool {
-        let ray = hit.disparity + 3.0 * step;
-        let over = self.look(View::Left, hit.x - 7.0 * step, y - 8.0 * step).disparity - ray;
-        (1.0..40.0).contains(&over)
+        let ray = hit.disparity + 2.0 * step;
+        let (x, y) = (hit.x - 4.0 * step, y - 5.0 * step);
+        let mut hits = self.objects.iter().filter_map(|object| object.seen_at(View::Left, x, y));
+        hits.any(|over| (1.0..16.0).contains(&(over.disparity - ray)))
     }
 }
 

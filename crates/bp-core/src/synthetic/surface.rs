@@ -1,29 +1,56 @@
 //! Surfaces: where they lie in the left image, how near they are, what they show.
 
-use super::MAX_DISPARITY;
-use super::texture::{Paint, noise};
+use super::texture::{NOISE_BOUND, Paint, noise};
+
+/// Which camera.
+#[derive(Clone, Copy)]
+pub(super) enum View {
+    Left,
+    Right,
+}
 
 /// A surface over coordinates (x, y) of the full-size left image.
-#[derive(Clone)]
 pub(super) struct Surface {
-    outline: Option<Strip>,
+    strip: Strip,
+    bounds: Bounds,
     relief: Relief,
     paint: Paint,
+}
+
+/// What a line of sight meets: a place of a surface at column `x` of the left image.
+#[derive(Clone, Copy)]
+pub(super) struct Hit<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) x: f64,
+    pub(super) disparity: f64,
+}
+
+/// Cheap bounds of where a strip is seen.
+struct Bounds {
+    rows: (f64, f64),
+    /// Columns of each view, relative to the spine's in the left image.
+    columns: [(f64, f64); 2],
+    /// Pixels in x that the spine gains per row.
+    lean: f64,
 }
 
 /// The outline of a surface: a strip of varying width about a straight or bent spine.
 #[derive(Clone, Copy)]
 pub(super) struct Strip {
-    /// Ends of the spine, [x, y].
-    pub(super) from: [f64; 2],
-    pub(super) to: [f64; 2],
+    /// Start of the spine and the way to its end, [x, y].
+    from: [f64; 2],
+    way: [f64; 2],
+    length: f64,
     /// Greatest half width in pixels.
-    pub(super) half_width: f64,
-    pub(super) profile: Profile,
-    /// How far the spine's middle lies aside, in pixels.
-    pub(super) bend: f64,
-    /// How far both ends bulge along the spine in pixels: the rim of a pot seen from above.
-    pub(super) sag: f64,
+    half_width: f64,
+    profile: Profile,
+    /// How far the spine's middle lies aside, in half widths.
+    bend: f64,
+    /// How far both ends bulge along the spine, in lengths: the rim of a pot seen from above.
+    sag: f64,
+    /// What a pixel in [x, y] adds along the spine in lengths and across it in half widths.
+    axis: [f64; 2],
+    normal: [f64; 2],
 }
 
 /// Half width along a strip as a share of its greatest.
@@ -40,9 +67,9 @@ pub(super) enum Profile {
 }
 
 /// The disparity of a surface as a function of place, in pixels of the full-size image.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Relief {
-    /// At the start of the spine, or at (0, 0) without an outline.
+    /// At the start of the spine's rim.
     pub(super) level: f64,
     /// Gain from the start to the end of the spine.
     pub(super) rise: f64,
@@ -72,83 +99,117 @@ pub(super) struct Folds {
 pub(super) struct Spot {
     /// Share of the spine, 0..=1 inside.
     pub(super) t: f64,
-    /// Pixels along and across the spine; x and y without an outline.
+    /// Distance from the spine as a share of the greatest half width; with sign.
+    pub(super) aside: f64,
+    /// The half width here as a share of the greatest.
+    pub(super) rim: f64,
+    /// Pixels along and across the spine.
     pub(super) along: f64,
     pub(super) across: f64,
-    /// Half width here in pixels.
-    pub(super) half_width: f64,
 }
 
 impl Surface {
-    /// A surface behind all others that extends without end.
-    pub(super) fn backdrop(relief: Relief, paint: Paint) -> Self {
-        Self { outline: None, relief, paint }
+    pub(super) fn new(strip: Strip, relief: Relief, paint: Paint) -> Self {
+        Self { bounds: Bounds::new(&strip, &relief), strip, relief, paint }
     }
 
-    pub(super) fn new(outline: Strip, relief: Relief, paint: Paint) -> Self {
-        Self { outline: Some(outline), relief, paint }
+    /// What a view shows of the surface at (x, y), if it covers that place.
+    pub(super) fn seen_at(&self, view: View, x: f64, y: f64) -> Option<Hit<'_>> {
+        let [left, top] = self.strip.from;
+        if !self.bounds.hold(view, x - left, y - top) {
+            return None;
+        }
+        let x = self.left_x(view, x, y);
+        let spot = self.strip.spot(x, y);
+        spot.is_inside().then(|| Hit { surface: self, x, disparity: self.height(spot, x, y) })
+    }
+
+    /// What a view would show at (x, y) if the surface went on without end.
+    pub(super) fn met_at(&self, view: View, x: f64, y: f64) -> Hit<'_> {
+        let x = self.left_x(view, x, y);
+        Hit { surface: self, x, disparity: self.disparity(x, y) }
     }
 
     /// The disparity of the surface, or of its continuation beyond the outline.
     pub(super) fn disparity(&self, x: f64, y: f64) -> f64 {
-        let relief = &self.relief;
-        let mut sum = relief.level;
-        let mut origin = [0.0; 2];
-        if let Some(strip) = &self.outline {
-            let spot = strip.spot(x, y);
-            let (rim, place) = (spot.half_width / strip.half_width, spot.across.abs() / strip.half_width);
-            sum += relief.rise * spot.t;
-            sum += relief.bulge * (rim * rim - place * place).max(0.0) + relief.crease * (rim - place).max(0.0);
-            origin = strip.from;
+        self.height(self.strip.spot(x, y), x, y)
+    }
+
+    /// The disparity at (x, y), which is `spot`.
+    fn height(&self, spot: Spot, x: f64, y: f64) -> f64 {
+        let (relief, strip) = (&self.relief, &self.strip);
+        let (rim, aside) = (spot.rim, spot.aside.abs());
+        let round = relief.bulge * (rim * rim - aside * aside).max(0.0) + relief.crease * (rim - aside).max(0.0);
+        let plane = relief.slant[0] * (x - strip.from[0]) + relief.slant[1] * (y - strip.from[1]);
+        let smooth = relief.level + relief.rise * spot.t + round + plane;
+        relief.folds.iter().fold(smooth, |sum, folds| sum + folds.height(x, y))
+    }
+
+    /// The left image's column of what a view shows at (x, y): from the right one the root of
+    /// `left - disparity(left) - x`, by secants. It is the only one: disparity gains less than a pixel per pixel.
+    fn left_x(&self, view: View, x: f64, y: f64) -> f64 {
+        if matches!(view, View::Left) {
+            return x;
         }
-        sum += relief.slant[0] * (x - origin[0]) + relief.slant[1] * (y - origin[1]);
-        relief.folds.iter().fold(sum, |sum, folds| sum + folds.height(x, y))
-    }
-
-    /// Whether the surface covers (x, y).
-    pub(super) fn covers(&self, x: f64, y: f64) -> bool {
-        self.outline.is_none_or(|strip| {
-            let spot = strip.spot(x, y);
-            (0.0..=1.0).contains(&spot.t) && spot.across.abs() <= spot.half_width
-        })
-    }
-
-    /// A cheap test that never misses: whether the surface may cover any x in `from..=to` of row `y`.
-    pub(super) fn may_cover(&self, from: f64, to: f64, y: f64) -> bool {
-        self.outline.is_none_or(|strip| {
-            let [(left, right), (top, bottom)] = strip.bounds();
-            left <= to && from <= right && top <= y && y <= bottom
-        })
-    }
-
-    /// The x with `x - disparity(x, y) == right_x`, by secants. It is the only one: disparity gains less than a pixel
-    /// per pixel, so the left side rises strictly.
-    pub(super) fn left_x(&self, right_x: f64, y: f64) -> f64 {
-        let miss = |x: f64| x - self.disparity(x, y) - right_x;
-        let (mut a, mut b) = (right_x, right_x + 0.5 * MAX_DISPARITY);
-        let (mut miss_a, mut miss_b) = (miss(a), miss(b));
+        let miss = |left: f64| left - self.disparity(left, y) - x;
+        let mut a = x + self.relief.level;
+        let mut miss_a = miss(a);
+        let mut b = a - miss_a;
         for _ in 0..30 {
-            if miss_b.abs() < 1e-9 || miss_a == miss_b {
+            let miss_b = miss(b);
+            if miss_b.abs() < 1e-6 || miss_a == miss_b {
                 break;
             }
-            let next = b - miss_b * (b - a) / (miss_b - miss_a);
-            (a, miss_a) = (b, miss_b);
-            (b, miss_b) = (next, miss(next));
+            (a, b, miss_a) = (b, b - miss_b * (b - a) / (miss_b - miss_a), miss_b);
         }
         b
     }
 
     /// Unshaded colour at (x, y), [RGB] in grey levels.
     pub(super) fn colour(&self, x: f64, y: f64) -> [f64; 3] {
-        let flat = Spot { t: 0.0, along: y, across: x, half_width: f64::INFINITY };
-        self.paint.colour(self.outline.map_or(flat, |strip| strip.spot(x, y)))
+        self.paint.colour(self.strip.spot(x, y))
+    }
+}
+
+impl Bounds {
+    fn new(strip: &Strip, relief: &Relief) -> Self {
+        let (far, near) = relief.range(strip);
+        let (lean, reach) = strip.lean();
+        let [_, (top, bottom)] = strip.extent();
+        Self { rows: (top, bottom), columns: [(-reach, reach), (-reach - near, reach - far)], lean }
+    }
+
+    /// Whether the strip may be seen at (x, y) of a view, counted from its start; never wrongly false.
+    fn hold(&self, view: View, x: f64, y: f64) -> bool {
+        let within = |(low, high): (f64, f64), value: f64| low <= value && value <= high;
+        within(self.rows, y) && within(self.columns[view as usize], x - self.lean * y)
+    }
+}
+
+impl Spot {
+    fn is_inside(&self) -> bool {
+        0.0 <= self.t && self.t <= 1.0 && self.aside.abs() <= self.rim
     }
 }
 
 impl Strip {
-    /// A straight strip.
+    /// A straight strip between two points [x, y].
     pub(super) fn new(from: [f64; 2], to: [f64; 2], half_width: f64, profile: Profile) -> Self {
-        Self { from, to, half_width, profile, bend: 0.0, sag: 0.0 }
+        let way @ [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        let length = (dx * dx + dy * dy).sqrt();
+        let axis = way.map(|d| d / (length * length));
+        let normal = [dy, -dx].map(|d| d / (length * half_width));
+        Self { from, way, length, half_width, profile, bend: 0.0, sag: 0.0, axis, normal }
+    }
+
+    /// The strip with the middle of its spine bent aside by some pixels.
+    pub(super) fn bent(self, pixels: f64) -> Self {
+        Self { bend: pixels / self.half_width, ..self }
+    }
+
+    /// The strip with both ends bulging along the spine by some pixels.
+    pub(super) fn sagging(self, pixels: f64) -> Self {
+        Self { sag: pixels / self.length, ..self }
     }
 
     /// An upright ellipse.
@@ -156,23 +217,53 @@ impl Strip {
         Self::new([x, y - ry], [x, y + ry], rx, Profile::Round)
     }
 
-    fn spot(&self, x: f64, y: f64) -> Spot {
-        let [dx, dy] = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
-        let length = (dx * dx + dy * dy).sqrt();
-        let (rx, ry) = (x - self.from[0], y - self.from[1]);
-        let straight = (rx * dx + ry * dy) / length;
-        let share = straight / length;
-        let across = (rx * dy - ry * dx) / length - self.bend * 4.0 * share * (1.0 - share);
-        let aside = across / self.half_width;
-        let along = straight - self.sag * (1.0 - aside * aside).max(0.0);
-        let t = along / length;
-        Spot { t, along, across, half_width: self.half_width * self.profile.at(t.clamp(0.0, 1.0)) }
+    /// A bar alongside, its spine `aside` pixels across from this one's.
+    pub(super) fn beside(&self, aside: f64, half_width: f64) -> Self {
+        let ([x, y], [dx, dy]) = (self.from, self.way);
+        let from = [x + aside * dy / self.length, y - aside * dx / self.length];
+        Self::new(from, [from[0] + dx, from[1] + dy], half_width, Profile::Bar)
     }
 
-    /// Bounds in x and y.
-    fn bounds(&self) -> [(f64, f64); 2] {
-        let margin = self.half_width + self.bend.abs() + self.sag.abs();
-        [0, 1].map(|i| (self.from[i].min(self.to[i]) - margin, self.from[i].max(self.to[i]) + margin))
+    fn spot(&self, x: f64, y: f64) -> Spot {
+        let (rx, ry) = (x - self.from[0], y - self.from[1]);
+        let straight = rx * self.axis[0] + ry * self.axis[1];
+        let aside = rx * self.normal[0] + ry * self.normal[1] - self.bend * 4.0 * straight * (1.0 - straight);
+        let t = straight - self.sag * (1.0 - aside * aside).max(0.0);
+        let rim = self.profile.at(t.clamp(0.0, 1.0));
+        Spot { t, aside, rim, along: t * self.length, across: aside * self.half_width }
+    }
+
+    /// Pixels in x that the spine gains per row, and how far in x from that line the strip may reach. A spine along
+    /// the rows counts as upright and wide.
+    fn lean(&self) -> (f64, f64) {
+        let (aside, [dx, dy]) = (self.half_width * (1.0 + self.bend.abs()), self.way);
+        if dy.abs() < 0.2 * self.length {
+            return (0.0, self.length * (1.0 + self.sag.abs()) + aside);
+        }
+        (dx / dy, aside * self.length / dy.abs())
+    }
+
+    /// Bounds in [x, y], counted from the start of the spine.
+    fn extent(&self) -> [(f64, f64); 2] {
+        let margin = self.half_width * (1.0 + self.bend.abs()) + self.length * self.sag.abs();
+        self.way.map(|d| (d.min(0.0) - margin, d.max(0.0) + margin))
+    }
+}
+
+impl Relief {
+    /// Bounds of the disparity over a strip.
+    fn range(&self, strip: &Strip) -> (f64, f64) {
+        let (mut low, mut high) = (self.level, self.level);
+        let mut add = |a: f64, b: f64| {
+            low += a.min(b);
+            high += a.max(b);
+        };
+        [self.rise, self.bulge, self.crease].into_iter().for_each(|gain| add(0.0, gain));
+        let [(left, right), (top, bottom)] = strip.extent();
+        add(self.slant[0] * left, self.slant[0] * right);
+        add(self.slant[1] * top, self.slant[1] * bottom);
+        self.folds.iter().for_each(|folds| add(-NOISE_BOUND * folds.amplitude, NOISE_BOUND * folds.amplitude));
+        (low, high)
     }
 }
 
@@ -181,8 +272,8 @@ impl Profile {
         match self {
             Self::Bar => 1.0,
             Self::Round => 2.0 * (t * (1.0 - t)).sqrt(),
-            Self::Leaf => (0.25 + 3.0 * t) * (1.0 - t) / 0.88,
-            Self::Turned(values) => curve(values, t),
+            Self::Leaf => (0.28 + 3.4 * t) * (1.0 - t),
+            Self::Turned(values) => curve(values, t).clamp(0.0, 1.0),
         }
     }
 }

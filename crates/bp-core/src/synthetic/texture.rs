@@ -40,7 +40,7 @@ impl Paint {
         let value = self.pattern.value(self.seed, spot).clamp(0.0, 1.0) * 2.0;
         let (low, share) = if value < 1.0 { (0, value) } else { (1, value - 1.0) };
         let (p, q) = (spot.across, spot.along);
-        let fine = noise(self.seed ^ 0x51, p / 3.3, q / 3.3) + noise(self.seed ^ 0x52, p / 8.0, q / 8.0);
+        let fine = noise(self.seed ^ 0x51, p / 4.0, q / 4.0) + noise(self.seed ^ 0x52, p / 9.0, q / 9.0);
         std::array::from_fn(|c| {
             let (a, b) = (f64::from(self.ramp[low][c]), f64::from(self.ramp[low + 1][c]));
             a + (b - a) * share + self.grain * fine
@@ -59,14 +59,16 @@ impl Pattern {
                     + 0.3 * fractal(seed + 1, p / 14.0, q / 14.0)
             }
             Self::Stripes { period } => {
-                0.5 + 0.45 * ripple(q / period + 0.25 * noise(seed, p / 60.0, q / 60.0)) + 0.15 * noise(seed, p / 6.0, q / 6.0)
+                0.5 + 0.45 * ripple(q / period + 0.25 * noise(seed, p / 60.0, q / 60.0))
+                    + 0.15 * noise(seed, p / 6.0, q / 6.0)
             }
-            Self::Weave { pitch, print } => weave(seed, p, q, pitch) + 0.9 * fractal(seed, p / print, q / print),
+            Self::Weave { pitch, print } => weave(seed, p, q, pitch) + 0.7 * fractal(seed, p / print, q / print),
             Self::Planks { width } => planks(seed, p / width, q / width),
             Self::Veins { period } => {
                 let rib = soft_step(2.0 - p.abs());
-                let vein = ripple((q - 1.3 * p.abs()) / period);
-                0.4 + 0.5 * rib + 0.12 * vein + 0.35 * fractal(seed, p / 16.0, q / 40.0)
+                let vein = ripple((q - 1.3 * p.abs()) / period + 0.5 * noise(seed, p / 30.0, q / 30.0));
+                let age = 0.4 * uniform(seed, 0, 0);
+                0.2 + age + 0.4 * rib + 0.07 * vein + 0.5 * fractal(seed, p / 16.0, q / 32.0)
             }
             Self::Cover => cover(seed, spot),
         }
@@ -81,18 +83,18 @@ fn weave(seed: u32, p: f64, q: f64, pitch: f64) -> f64 {
 
 /// Planks one unit wide, each of its own shade, with long grain.
 fn planks(seed: u32, p: f64, q: f64) -> f64 {
-    let plank = p.floor();
-    let gap = soft_step(40.0 * (0.03 - (p - plank).min(plank + 1.0 - p)));
-    let shade = 0.3 * (uniform(seed, plank as i32, 0) - 0.5);
+    let (plank, place) = split(p);
+    let gap = soft_step(40.0 * (0.03 - place.min(1.0 - place)));
+    let shade = 0.3 * (uniform(seed, plank, 0) - 0.5);
     0.5 + shade - 0.6 * gap + 0.5 * fractal(seed, 6.0 * p, 0.5 * q + 7.0 * shade)
 }
 
 /// Two lines of lettering, a framed picture between them and a plain margin.
 fn cover(seed: u32, spot: Spot) -> f64 {
-    let (p, q, u) = (spot.across, spot.along, spot.across.abs() / spot.half_width);
+    let (p, q, u) = (spot.across, spot.along, spot.aside.abs() / spot.rim);
     let line = |from: f64, to: f64, wide: f64| {
         let inside = soft_step(60.0 * (spot.t - from).min(to - spot.t)) * soft_step(60.0 * (wide - u));
-        inside * soft_step(6.0 * noise(seed, p / 9.0, q / 22.0) + 0.3)
+        if inside > 0.0 { inside * soft_step(6.0 * noise(seed, p / 9.0, q / 22.0) + 0.3) } else { 0.0 }
     };
     let picture = soft_step(60.0 * (spot.t - 0.34).min(0.80 - spot.t)) * soft_step(60.0 * (0.72 - u));
     let lettering = line(0.08, 0.16, 0.8) + line(0.19, 0.26, 0.55) + line(0.87, 0.92, 0.4);
@@ -111,19 +113,28 @@ fn fractal(seed: u32, x: f64, y: f64) -> f64 {
     sum
 }
 
-/// Smooth noise in about -1..=1 with the wavelength 1: gradient noise on the integer lattice.
+/// [`noise`] lies between minus this and this; it seldom exceeds 1.
+pub(super) const NOISE_BOUND: f64 = 1.8;
+
+/// Smooth noise around 0 with the wavelength 1: gradient noise on the integer lattice.
 pub(super) fn noise(seed: u32, x: f64, y: f64) -> f64 {
-    let (left, top) = (x.floor(), y.floor());
-    let (u, v) = (x - left, y - top);
+    let ((left, u), (top, v)) = (split(x), split(y));
     let corner = |i: i32, j: i32| {
-        let h = hash(seed, left as i32 + i, top as i32 + j);
+        let h = hash(seed, left + i, top + j);
         let (gx, gy) = (f64::from(h & 0xffff) / 32767.5 - 1.0, f64::from(h >> 16) / 32767.5 - 1.0);
         gx * (u - f64::from(i)) + gy * (v - f64::from(j))
     };
     let (s, t) = (fade(u), fade(v));
     let upper = corner(0, 0) * (1.0 - s) + corner(1, 0) * s;
     let lower = corner(0, 1) * (1.0 - s) + corner(1, 1) * s;
-    1.8 * (upper * (1.0 - t) + lower * t)
+    NOISE_BOUND * (upper * (1.0 - t) + lower * t)
+}
+
+/// The integer below a number, and the rest. Not `floor`, which is a slow call where the processor may be any.
+fn split(x: f64) -> (i32, f64) {
+    let towards_zero = x as i32;
+    let below = towards_zero - i32::from(x < f64::from(towards_zero));
+    (below, x - f64::from(below))
 }
 
 /// Rises from 0 to 1 with no slope or bend at either end.
@@ -133,7 +144,7 @@ fn fade(t: f64) -> f64 {
 
 /// A sine-like wave of period 1 and amplitude 1, of parabolas.
 fn ripple(x: f64) -> f64 {
-    let h = 2.0 * (x - x.floor()) - 1.0;
+    let h = 2.0 * split(x).1 - 1.0;
     4.0 * h * (1.0 - h.abs())
 }
 

@@ -1,0 +1,231 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule};
+use clap::{
+    Args, Parser, Subcommand,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
+
+use crate::files::PixelLimit;
+
+/// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
+#[derive(Debug, Parser)]
+#[command(name = "bp", version, max_term_width = 110, after_help = AFTER_HELP)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const AFTER_HELP: &str = "\
+Examples:
+  bp match left.png right.png --output map.pfm --picture map.png
+  bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
+  bp evaluate map.png truth.png --scale 2
+  bp reproduce --quick
+
+Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable, 6 out of memory, 130 interrupted.";
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Compute the disparity map of a rectified pair.
+    Match(Box<MatchArgs>),
+    /// Measure the errors of a disparity map against ground truth.
+    Evaluate(EvaluateArgs),
+    /// Run all algorithms on six scenes and write every table, chart and figure of the thesis beside its numbers.
+    Reproduce(ReproduceArgs),
+    /// Write the report of a recorded run again, or the part of a README that comes from it.
+    Report(ReportArgs),
+    /// List the scenes and check the files of a data folder.
+    Scenes(ScenesArgs),
+}
+
+/// `bp match`.
+#[derive(Debug, Args)]
+pub(crate) struct MatchArgs {
+    /// The left image: PNG, PGM or PPM of 8 or 16 bits, grey or colour.
+    pub(crate) left: PathBuf,
+    /// The right image, of the same size; rows must correspond (a rectified pair).
+    pub(crate) right: PathBuf,
+    /// The disparity map to write: .pfm holds disparities in pixels, .png 256 times them in 16 bits.
+    #[arg(long, short, value_name = "MAP")]
+    pub(crate) output: PathBuf,
+    /// Also write the map as a coloured picture.
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) picture: Option<PathBuf>,
+    /// What to run.
+    #[command(flatten)]
+    pub(crate) plan: PlanArgs,
+    /// Ground truth of the left image: errors are measured where it is given.
+    #[arg(long, value_name = "MAP")]
+    pub(crate) ground_truth: Option<PathBuf>,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) truth: TruthArgs,
+    /// Print everything as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print a SHA-256 of all final messages: from the left, right, up and down, each [row][column][label].
+    #[arg(long)]
+    pub(crate) messages_hash: bool,
+    /// Refuse images of more megapixels.
+    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
+    pub(crate) max_megapixels: u32,
+}
+
+/// What to run.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Plan")]
+pub(crate) struct PlanArgs {
+    /// Algorithm of the thesis.
+    #[arg(long, default_value = "cfcsbp", value_parser = named(&Algorithm::ALL, Algorithm::name))]
+    pub(crate) algorithm: Algorithm,
+    /// Data cost, with the smoothness that goes with it.
+    #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
+    pub(crate) profile: Profile,
+    /// Backend.
+    #[arg(long, default_value = "scalar", value_name = "NAME")]
+    pub(crate) backend: String,
+    /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
+    /// up to a multiple of 16]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
+    pub(crate) labels: Option<u16>,
+    /// Disparity of the first label in pixels; may be negative.
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub(crate) min_disparity: i32,
+    /// Loops (k) that the algorithm derives its own from; with --grids, loops on each grid. [default: labels]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) loops: Option<u32>,
+    /// Half-steps on each grid, divided by nothing (schedule checkerboard).
+    #[arg(long, value_name = "N", conflicts_with = "loops", value_parser = clap::value_parser!(u32).range(1..=2_000_000))]
+    pub(crate) half_steps: Option<u32>,
+    /// Number of grids, coarse to fine; needs --loops or --half-steps, which then count on each grid.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=bp_core::MAX_GRIDS as i64))]
+    pub(crate) grids: Option<u8>,
+    /// What cfcsbp and ctcsbp divide the loops by (Z'', Z''''). [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) z: Option<u32>,
+    /// Order of message updates. [default: sync; checkerboard with --half-steps]
+    #[arg(long, value_parser = named(&Schedule::ALL, Schedule::name))]
+    pub(crate) schedule: Option<Schedule>,
+    /// By which side finer grids take over messages. [default: receiver]
+    #[arg(long, value_parser = named(&MessageStart::ALL, MessageStart::name))]
+    pub(crate) message_start: Option<MessageStart>,
+    /// Whether the census match of the centre is a prior (ctbp, ctcsbp). [default: on]
+    #[arg(long, value_parser = named(&[true, false], switch))]
+    pub(crate) seed_start: Option<bool>,
+    /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
+    #[arg(long, value_name = "N")]
+    pub(crate) slope: Option<u8>,
+    /// Truncation K of the smoothness cost. [default: the profile's]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
+    pub(crate) truncation: Option<u8>,
+}
+
+/// How ground truth is read.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Ground truth")]
+pub(crate) struct TruthArgs {
+    /// Ground truth of the right image: tells which pixels both cameras see.
+    #[arg(long, value_name = "MAP", conflicts_with = "mask")]
+    pub(crate) ground_truth_right: Option<PathBuf>,
+    /// Pixels that both cameras see: an 8-bit image, 255 where they do.
+    #[arg(long, value_name = "MAP")]
+    pub(crate) mask: Option<PathBuf>,
+    /// What stored ground truth is divided by to give pixels; 0 is unknown. [default: PFM 1, 8 bits 1, 16 bits 256]
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub(crate) scale: Option<f32>,
+}
+
+/// `bp evaluate`.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// The disparity map.
+    pub(crate) map: PathBuf,
+    /// Ground truth.
+    pub(crate) truth: PathBuf,
+    /// What the map's stored values are divided by to give pixels; 0 is unanswered. [default: as for --scale]
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub(crate) map_scale: Option<f32>,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) options: TruthArgs,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Refuse images of more megapixels.
+    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
+    pub(crate) max_megapixels: u32,
+}
+
+/// Which scenes.
+#[derive(Debug, Args)]
+pub(crate) struct DataArgs {
+    /// Folder of the public data sets (see scripts/fetch-middlebury); without it the synthetic scenes run.
+    #[arg(long, env = "BP_DATA", value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Run the synthetic scenes although there is a data folder.
+    #[arg(long)]
+    pub(crate) synthetic: bool,
+}
+
+/// `bp reproduce`.
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArgs {
+    /// Which scenes.
+    #[command(flatten)]
+    pub(crate) data: DataArgs,
+    /// Small images and few loops: within a minute on two cores. Says so in the output.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Backends, separated by commas.
+    #[arg(long, value_delimiter = ',', default_value = "scalar", value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
+    /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) samples: Option<u32>,
+    /// Folder for recorded runs; every run gets a new folder in it.
+    #[arg(long, default_value = "results", value_name = "DIR")]
+    pub(crate) results: PathBuf,
+    /// Name of this machine in that folder. [default: from its processor]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) machine: Option<String>,
+}
+
+/// `bp report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// A recorded run: the folder of a record.json.
+    pub(crate) run: PathBuf,
+    /// Instead of the report, write the run's chart and table between the markers of this file.
+    #[arg(long, value_name = "README.md")]
+    pub(crate) readme: Option<PathBuf>,
+}
+
+/// `bp scenes`.
+#[derive(Debug, Args)]
+pub(crate) struct ScenesArgs {
+    /// Which scenes.
+    #[command(flatten)]
+    pub(crate) data: DataArgs,
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("must be a number above 0".to_owned()),
+    }
+}
+
+/// A parser of the names of `all`.
+fn named<T: Copy + Send + Sync>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T> {
+    let names = PossibleValuesParser::new(all.iter().map(|&value| name(value)));
+    names.try_map(move |text| all.iter().copied().find(|&value| name(value) == text).ok_or("not one of the names"))
+}
+
+fn switch(on: bool) -> &'static str {
+    if on { "on" } else { "off" }
+}

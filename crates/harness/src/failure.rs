@@ -1,0 +1,104 @@
+//! How the program fails: a message that says what to do, and an exit code that says who can mend it.
+
+use std::{io, path::Path};
+
+/// Why a command ended without its result.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub(crate) struct Failure {
+    kind: Kind,
+    message: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    ReaderGone = 0,
+    Other = 1,
+    Usage = 2,
+    Input = 3,
+    Unavailable = 5,
+    OutOfMemory = 6,
+    Interrupted = 130,
+}
+
+impl Failure {
+    fn new(kind: Kind, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into() }
+    }
+
+    /// The fault of none of the below: a full disk, an output that cannot be written.
+    pub(crate) fn other(message: impl Into<String>) -> Self {
+        Self::new(Kind::Other, message)
+    }
+
+    /// Options that contradict each other.
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self::new(Kind::Usage, message)
+    }
+
+    /// A file that is missing, broken or does not fit.
+    pub(crate) fn input(message: impl Into<String>) -> Self {
+        Self::new(Kind::Input, message)
+    }
+
+    /// A file that cannot be read.
+    pub(crate) fn reading(path: &Path, error: &dyn std::fmt::Display) -> Self {
+        Self::input(format!("{}: {error}", path.display()))
+    }
+
+    /// A file that cannot be written.
+    pub(crate) fn writing(path: &Path, error: &dyn std::fmt::Display) -> Self {
+        Self::other(format!("cannot write {}: {error}", path.display()))
+    }
+
+    /// Too little memory.
+    pub(crate) fn out_of_memory(message: impl Into<String>) -> Self {
+        Self::new(Kind::OutOfMemory, message)
+    }
+
+    /// A backend or device that is not there.
+    pub(crate) fn unavailable(message: impl Into<String>) -> Self {
+        Self::new(Kind::Unavailable, message)
+    }
+
+    /// Stopped by the user.
+    pub(crate) fn interrupted() -> Self {
+        Self::new(Kind::Interrupted, "interrupted")
+    }
+
+    /// The exit code.
+    #[must_use]
+    pub(crate) fn code(&self) -> u8 {
+        self.kind as u8
+    }
+
+    /// Whether the user stopped the program.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        self.kind == Kind::Interrupted
+    }
+}
+
+impl From<bp_core::Error> for Failure {
+    fn from(error: bp_core::Error) -> Self {
+        let kind = match &error {
+            bp_core::Error::Stopped => Kind::Interrupted,
+            bp_core::Error::OutOfMemory { .. } => Kind::OutOfMemory,
+            bp_core::Error::Unavailable { .. } => Kind::Unavailable,
+            bp_core::Error::Plan(_)
+            | bp_core::Error::Labels { .. }
+            | bp_core::Error::Truncation { .. }
+            | bp_core::Error::MinDisparity { .. } => Kind::Usage,
+            _ => Kind::Input,
+        };
+        Self::new(kind, error.to_string())
+    }
+}
+
+/// Standard output that cannot be written to: a full disk, say. A reader that closed its end, as `head` does, has what
+/// it wanted.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        let kind = if error.kind() == io::ErrorKind::BrokenPipe { Kind::ReaderGone } else { Kind::Other };
+        Self::new(kind, format!("cannot write to standard output: {error}"))
+    }
+}

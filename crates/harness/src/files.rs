@@ -1,0 +1,70 @@
+//! Reading and writing files: whole or not at all.
+
+mod images;
+mod maps;
+mod picture;
+
+use std::{
+    fs,
+    io::{BufWriter, Write},
+    path::Path,
+};
+
+pub(crate) use images::{PixelLimit, hex, pixels_sha256, read_grey16, read_image};
+pub(crate) use maps::{MapFormat, read_map, read_mask, write_map};
+pub(crate) use picture::{colour, encode_picture, write_picture};
+
+use crate::failure::Failure;
+
+/// Writes a file beside its final place and renames it, so that nobody ever sees half of it; `write` fills it.
+pub(crate) fn write_whole<E: std::fmt::Display>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<(), Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::writing(path, error);
+    let mut file = temporary_beside(path)?;
+    let mut buffered = BufWriter::new(file.as_file_mut());
+    write(&mut buffered).map_err(|e| failed(&e))?;
+    buffered.flush().map_err(|e| failed(&e))?;
+    drop(buffered);
+    file.as_file().sync_all().map_err(|e| failed(&e))?;
+    set_usual_permissions(file.path()).map_err(|e| failed(&e))?;
+    file.persist(path).map_err(|e| failed(&e.error))?;
+    Ok(())
+}
+
+/// Fails where no file could be written at `path`; for telling so before the work is done.
+pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        return Err(Failure::writing(path, &"it is a folder"));
+    }
+    temporary_beside(path).map(drop)
+}
+
+/// An empty file in the folder of `path`, which vanishes unless it is kept.
+fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::Builder::new().prefix(".bp-").tempfile_in(folder).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Writes text as [`write_whole`] does.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    write_whole(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Creates a folder and those above it.
+pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(path).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Temporary files are made for their owner alone; a result is for all to read.
+#[cfg(unix)]
+fn set_usual_permissions(path: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}

@@ -1,0 +1,49 @@
+//! The `bp` program: commands, files, scenes, records, reports.
+//!
+//! `command` holds one file a command, `reproduce` runs the thesis's experiments and records them, `report` makes
+//! tables, charts and pages from records. `backends` is the only file that lists backends.
+
+mod args;
+mod backends;
+mod command;
+mod failure;
+mod files;
+mod interrupt;
+mod machine;
+pub mod record;
+pub mod report;
+pub mod reproduce;
+mod scenes;
+
+use std::{io::Write, process::ExitCode};
+
+use args::{Cli, Command};
+use clap::Parser;
+use failure::Failure;
+
+/// Runs the program; the exit codes are documented in `bp --help`.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(&cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if failure.code() != 0 {
+                // Standard error may be closed too; there is nobody left to tell then.
+                let _ = writeln!(std::io::stderr(), "bp: {failure}");
+            }
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn run(command: &Command) -> Result<(), Failure> {
+    interrupt::listen()?;
+    match command {
+        Command::Match(args) => command::match_pair(args),
+        Command::Evaluate(args) => command::evaluate(args),
+        Command::Reproduce(args) => reproduce::reproduce(args),
+        Command::Report(args) => report::command(args),
+        Command::Scenes(args) => command::scenes(args),
+    }
+}

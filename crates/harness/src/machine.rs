@@ -1,0 +1,58 @@
+//! This machine and this program, as records name them.
+
+use std::{fs, io};
+
+use sha2::{Digest, Sha256};
+use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
+
+use crate::{
+    failure::Failure,
+    files::hex,
+    record::{Machine, Program},
+};
+
+/// The machine; `name` replaces the one made from the processor's.
+pub(crate) fn machine(name: Option<&str>) -> Machine {
+    let what = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing()).with_memory(MemoryRefreshKind::everything());
+    // Where the system does not tell, the record says so rather than the run failing.
+    let system = System::new_with_specifics(what).ok();
+    let cpu = system.as_ref().and_then(|system| Some(system.cpus().first()?.brand().trim().to_owned()));
+    let cpu = cpu.unwrap_or_else(|| "unknown processor".to_owned());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let name = name.map_or_else(|| slug(&format!("{cpu} {cores} cores")), slug);
+    let system_name = System::long_os_version().unwrap_or_else(|_| std::env::consts::OS.to_owned());
+    let memory_bytes = system.map_or(0, |system| system.total_memory());
+    Machine { name, cpu, cores, memory_bytes, system: system_name }
+}
+
+/// Refuses what would not fit into the memory that is available now, before anything is allocated. Where the system does
+/// not tell how much that is, allocating will.
+pub(crate) fn check_memory(needed: u64, advice: &str) -> Result<(), Failure> {
+    let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
+    let Ok(system) = System::new_with_specifics(what) else { return Ok(()) };
+    let available = system.available_memory();
+    if needed <= available {
+        return Ok(());
+    }
+    Err(Failure::out_of_memory(format!("{needed} bytes are needed and {available} available; {advice}")))
+}
+
+/// The running program.
+pub(crate) fn program() -> Result<Program, Failure> {
+    let failed = |error: io::Error| Failure::other(format!("cannot read this program's own file: {error}"));
+    let file = std::env::current_exe().and_then(fs::read).map_err(failed)?;
+    Ok(Program {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        commit: env!("BP_COMMIT").to_owned(),
+        clean_tree: env!("BP_CLEAN_TREE") == "true",
+        sha256: hex(&Sha256::digest(file)),
+        rustc: env!("BP_RUSTC").to_owned(),
+        flags: env!("BP_FLAGS").to_owned(),
+    })
+}
+
+/// Lower-case letters, digits and single hyphens.
+fn slug(text: &str) -> String {
+    let parts = text.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty());
+    parts.map(str::to_lowercase).collect::<Vec<_>>().join("-")
+}

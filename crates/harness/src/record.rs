@@ -1,0 +1,338 @@
+//! What a recorded run holds. These types are the JSON of `results/*/record.json`; `results/schema.json` is their
+//! schema.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Version of the schema; changes with every change of meaning.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A run of `bp reproduce`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`SCHEMA_VERSION`] of the program that wrote it.
+    pub schema_version: u32,
+    /// Whether every cell has been run.
+    pub complete: bool,
+    /// When it was begun, RFC 3339.
+    pub started: String,
+    /// When it was last written to, RFC 3339.
+    pub updated: String,
+    /// The program.
+    pub program: Program,
+    /// The machine.
+    pub machine: Machine,
+    /// What was asked for.
+    pub run: Run,
+    /// The scenes, in order.
+    pub scenes: Vec<Scene>,
+    /// Every plan on every scene and backend.
+    pub cells: Vec<Cell>,
+    /// Labellings by others and ours under one energy (profile `mrf`), where the data holds theirs.
+    pub labellings: Vec<Labelling>,
+}
+
+/// The program that made a record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Program {
+    /// Package version.
+    pub version: String,
+    /// Git commit it was built from, or "unknown".
+    pub commit: String,
+    /// Whether the sources were those of the commit.
+    pub clean_tree: bool,
+    /// SHA-256 of the program file.
+    pub sha256: String,
+    /// Compiler.
+    pub rustc: String,
+    /// Optimisation level, target and flags.
+    pub flags: String,
+}
+
+/// The machine a record was made on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Machine {
+    /// Name used for the folder.
+    pub name: String,
+    /// Processor model.
+    pub cpu: String,
+    /// Processors that the program may use.
+    pub cores: usize,
+    /// Main memory in bytes.
+    pub memory_bytes: u64,
+    /// Operating system.
+    pub system: String,
+}
+
+/// What was asked for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Which scenes: "middlebury2006" (half size), "middlebury2006-thirdsize", "synthetic" or "synthetic-small".
+    pub data: String,
+    /// Whether it was a quick run on small images.
+    pub quick: bool,
+    /// Labels of every scene (L).
+    pub labels: usize,
+    /// Loops of plain BP (k).
+    pub k: u32,
+    /// Samples of a cell that takes less than [`crate::reproduce::ONE_SAMPLE_ABOVE_MS`]; longer ones get one.
+    pub samples: u32,
+    /// Backends, in order.
+    pub backends: Vec<String>,
+}
+
+/// A scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Its name.
+    pub name: String,
+    /// Pixels per row.
+    pub width: usize,
+    /// Pixels per column.
+    pub height: usize,
+    /// Largest true disparity in pixels.
+    pub largest_disparity: f32,
+    /// Pixels of known truth.
+    pub known: u64,
+    /// Pixels of known truth that both cameras see.
+    pub visible: u64,
+    /// SHA-256 of the decoded pixels of each image.
+    pub images: Vec<ImageSum>,
+}
+
+/// An image and its checksum.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSum {
+    /// Path below the data folder, or which view of a synthetic scene.
+    pub path: String,
+    /// SHA-256 of its decoded pixels, row by row, red, green and blue.
+    pub sha256: String,
+}
+
+/// A plan on a scene and a backend.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the plan in the tables: an algorithm, or one with other settings.
+    pub plan: String,
+    /// Name of the backend.
+    pub backend: String,
+    /// Name of the device.
+    pub device: String,
+    /// Whether the device is a CPU that pretends to be a GPU.
+    pub software_rasteriser: bool,
+    /// Data cost profile.
+    pub profile: String,
+    /// Labels (L).
+    pub labels: usize,
+    /// Slope of the smoothness cost.
+    pub slope: u8,
+    /// Truncation of the smoothness cost (K).
+    pub truncation: u8,
+    /// Algorithm.
+    pub algorithm: String,
+    /// Loops asked for (k), where the algorithm derives its own from them.
+    pub k: Option<u32>,
+    /// What the loops are divided by (Z'' or Z'''').
+    pub z: Option<u32>,
+    /// Number of grids.
+    pub grids: usize,
+    /// Loops (schedule sync) or half-steps (checkerboard) on each grid.
+    pub steps: u32,
+    /// Schedule.
+    pub schedule: String,
+    /// Side by which finer grids take over messages.
+    pub message_start: String,
+    /// Where the image is cut.
+    pub cut: Option<Cut>,
+    /// Message entries that the plan predicts to compute.
+    pub message_updates: u64,
+    /// Bytes that the plan predicts.
+    pub planned_bytes: u64,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// A cut into four parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// First column right of it.
+    pub x: usize,
+    /// First row below it.
+    pub y: usize,
+    /// Whether the census match was used as a prior.
+    pub seed_start: bool,
+}
+
+/// Numbers, or why there are none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Not run yet.
+    Pending,
+    /// It ran.
+    Measured(Box<Measurement>),
+    /// It could not run.
+    Error(String),
+}
+
+/// What was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// Every sample, in the order taken. Samples of one round were taken one plan after another.
+    pub samples: Vec<Sample>,
+    /// Bytes allocated, counted.
+    pub allocated_bytes: u64,
+    /// Energy of the labelling under its profile.
+    pub energy: Energy,
+    /// Errors over all pixels of known truth.
+    pub all: Errors,
+    /// Errors over those that both cameras see.
+    pub visible: Errors,
+    /// SHA-256 of the labels, two bytes each, low byte first.
+    pub labels_sha256: String,
+    /// The disparity map, a PNG of 16 bits (x256), beside the record.
+    pub map: String,
+}
+
+/// One timed solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sample {
+    /// Which round of taking turns it belongs to, from 0.
+    pub round: u32,
+    /// Which clock measured it.
+    pub clock: Clock,
+    /// Milliseconds to allocate, apart from the total.
+    pub prepare_ms: f64,
+    /// Milliseconds of each stage.
+    pub stages: Stages,
+    /// Milliseconds from images to labels.
+    pub total_ms: f64,
+}
+
+/// A clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Clock {
+    /// The host's monotonic clock.
+    Wall,
+}
+
+/// Milliseconds of each stage, over all grids.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
+pub struct Stages {
+    pub match_cost_ms: f64,
+    pub coarsen_ms: f64,
+    pub refine_ms: f64,
+    pub update_messages_ms: f64,
+    pub select_labels_ms: f64,
+}
+
+/// An energy in the units of its profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// Data and smoothness together.
+    pub total: u64,
+    /// Sum of the data costs.
+    pub data: u64,
+    /// Sum of the smoothness costs.
+    pub smoothness: u64,
+}
+
+/// Errors over a set of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// Pixels of known truth.
+    pub known: u64,
+    /// Those that were answered.
+    pub answered: u64,
+    /// Root of the mean squared error of answered pixels, in pixels.
+    pub rmse: f64,
+    /// Percentages of answered pixels wrong by more than 0.5, 1, 2 and 4 pixels.
+    pub bad: [f64; 4],
+    /// The same of known pixels, unanswered ones counted as wrong.
+    pub bad_or_unanswered: [f64; 4],
+}
+
+/// A labelling and its energy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Labelling {
+    /// Name of the scene.
+    pub scene: String,
+    /// Who made it, by which method.
+    pub method: String,
+    /// Whether this program did.
+    pub ours: bool,
+    /// Its energy.
+    pub energy: Energy,
+}
+
+impl From<bp_core::Energy> for Energy {
+    fn from(energy: bp_core::Energy) -> Self {
+        Self { total: energy.total(), data: energy.data, smoothness: energy.smoothness }
+    }
+}
+
+impl From<bp_core::MapErrors> for Errors {
+    fn from(errors: bp_core::MapErrors) -> Self {
+        let bp_core::MapErrors { known, answered, rmse, bad, bad_or_unanswered } = errors;
+        Self { known, answered, rmse, bad, bad_or_unanswered }
+    }
+}
+
+impl From<&bp_core::Times> for Stages {
+    fn from(times: &bp_core::Times) -> Self {
+        use bp_core::Stage::{Coarsen, MatchCost, Refine, SelectLabels, UpdateMessages};
+        let ms = |stage| 1000.0 * times.stage(stage).as_secs_f64();
+        Self {
+            match_cost_ms: ms(MatchCost),
+            coarsen_ms: ms(Coarsen),
+            refine_ms: ms(Refine),
+            update_messages_ms: ms(UpdateMessages),
+            select_labels_ms: ms(SelectLabels),
+        }
+    }
+}
+
+impl Stages {
+    /// Message passing: `refine` and `update_messages`.
+    #[must_use]
+    pub fn message_passing_ms(&self) -> f64 {
+        self.refine_ms + self.update_messages_ms
+    }
+}
+
+impl Cell {
+    /// The measurement, where there is one.
+    #[must_use]
+    pub fn measured(&self) -> Option<&Measurement> {
+        match &self.outcome {
+            Outcome::Measured(measurement) => Some(measurement),
+            Outcome::Pending | Outcome::Error(_) => None,
+        }
+    }
+}
+
+impl Record {
+    /// The cell of a plan on a scene and a backend.
+    #[must_use]
+    pub fn cell(&self, scene: &str, plan: &str, backend: &str) -> Option<&Cell> {
+        self.cells.iter().find(|cell| cell.scene == scene && cell.plan == plan && cell.backend == backend)
+    }
+}

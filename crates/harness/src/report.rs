@@ -1,0 +1,97 @@
+//! Tables, charts and pages, made from a record and from nothing else.
+
+mod chart;
+mod diagrams;
+mod figures;
+mod format;
+mod html;
+mod markdown;
+mod readme;
+mod results;
+mod tables;
+mod thesis;
+
+use std::path::Path;
+
+pub use readme::{BEGIN, END};
+
+use crate::{
+    args::ReportArgs,
+    failure::Failure,
+    files::write_text,
+    record::Record,
+    reproduce::{RECORD_FILE, load_record},
+};
+use results::Results;
+
+/// A drawing and the words around it.
+struct Drawing {
+    /// File name without ending, such as "diagram-4.1".
+    name: String,
+    /// Its heading.
+    title: String,
+    /// What it shows and where that comes from.
+    caption: String,
+    /// The picture.
+    svg: String,
+    /// The same in numbers.
+    table: Option<tables::Table>,
+}
+
+/// Everything a report shows.
+struct Report<'a> {
+    results: Results<'a>,
+    tables: Vec<tables::Table>,
+    figures: Vec<Drawing>,
+    diagrams: Vec<Drawing>,
+}
+
+impl<'a> Report<'a> {
+    fn new(folder: &Path, record: &'a Record) -> Result<Self, Failure> {
+        let results = Results::new(record)?;
+        Ok(Self {
+            tables: tables::all(&results),
+            figures: figures::all(folder, &results)?,
+            diagrams: diagrams::all(&results)?,
+            results,
+        })
+    }
+}
+
+/// Writes REPORT.md, report.html and the drawings beside a record.
+pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
+    let report = Report::new(folder, record)?;
+    for drawing in report.figures.iter().chain(&report.diagrams) {
+        write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
+    }
+    write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
+    write_text(&folder.join("report.html"), &html::page(&report))
+}
+
+/// `bp report`.
+pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
+    let record = load_record(&args.run)?;
+    match &args.readme {
+        None => write(&args.run, &record),
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|error| Failure::reading(path, &error))?;
+            let part = readme::part(&args.run, &Results::new(&record)?);
+            let missing = || Failure::reading(path, &format!("the markers {BEGIN} and {END} are not in it"));
+            write_text(path, &readme::splice(&text, &part).ok_or_else(missing)?)
+        }
+    }
+}
+
+/// A README with the part that comes from a run made anew; `None` where it has no markers or the run cannot be read.
+/// For checking that what is committed is what the record says.
+#[must_use]
+pub fn renewed_readme(text: &str, run: &Path, shown_as: &Path) -> Option<String> {
+    let record = load_record(run).ok()?;
+    readme::splice(text, &readme::part(shown_as, &Results::new(&record).ok()?))
+}
+
+/// Name of the record in a run's folder.
+#[must_use]
+pub fn record_file() -> &'static str {
+    RECORD_FILE
+}

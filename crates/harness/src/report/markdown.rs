@@ -1,0 +1,90 @@
+//! The report as Markdown.
+
+use std::fmt::Write as _;
+
+use super::{Drawing, Report, tables::Table};
+
+/// The whole page.
+pub(super) fn page(report: &Report<'_>) -> String {
+    let mut text = format!("# {}\n\n", title(report));
+    for line in facts(report) {
+        let _ = writeln!(text, "* {line}");
+    }
+    text += "\n## Tables\n\n";
+    for table in &report.tables {
+        text += &section(table);
+    }
+    text += "## Figures\n\n";
+    report.figures.iter().for_each(|figure| text += &drawing(figure));
+    text += "## Diagrams\n\n";
+    report.diagrams.iter().for_each(|diagram| text += &drawing(diagram));
+    text
+}
+
+/// The heading of both pages.
+pub(super) fn title(report: &Report<'_>) -> String {
+    let quick = if report.results.record.run.quick { "Quick run: " } else { "" };
+    format!("{quick}belief propagation for stereo matching, on {}", report.results.record.machine.cpu)
+}
+
+/// What a reader must know of a run before its numbers.
+pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
+    let record = report.results.record;
+    let (run, program, machine) = (&record.run, &record.program, &record.machine);
+    let mut facts = vec![
+        format!("Images: {}; L = {} labels, k = {} loops of BP.", report.results.data(), run.labels, run.k),
+        format!("Machine: {}, {} cores, {}.", machine.cpu, machine.cores, machine.system),
+        format!(
+            "Program: bp {}, commit {}{}, {}, {}.",
+            program.version,
+            program.commit,
+            if program.clean_tree { "" } else { " with changes" },
+            program.rustc,
+            program.flags
+        ),
+        format!("Begun {}, last written {}.", record.started, record.updated),
+        "Printed numbers are the thesis's (GeForce GTX 750 Ti, CUDA); all others were measured in this run. Times are of \
+         the wall clock. Machines are noisy: compare ratios, and mind the ranges."
+            .to_owned(),
+    ];
+    if run.quick {
+        let k = run.k;
+        facts.push(format!(
+            "A quick run: small images, and k = {k} instead of k = L. Its numbers are not the thesis's experiment."
+        ));
+    }
+    if !record.complete {
+        facts.push("The run is not complete: \"not run\" marks what is missing.".to_owned());
+    }
+    let software = record.cells.iter().filter(|cell| cell.software_rasteriser).map(|cell| cell.device.as_str());
+    if let Some(device) = software.into_iter().next() {
+        facts.push(format!("{device} is a CPU that pretends to be a GPU: its times are not a GPU's."));
+    }
+    facts
+}
+
+/// A table's heading.
+pub(super) fn heading(table: &Table) -> String {
+    format!("Table {}: {}", table.number, table.title)
+}
+
+fn section(table: &Table) -> String {
+    let note = if table.note.is_empty() { String::new() } else { format!("{}\n\n", table.note) };
+    format!("### {}\n\n{note}{}\n", heading(table), grid(table))
+}
+
+/// The lines of a table.
+pub(super) fn grid(table: &Table) -> String {
+    let line = |cells: &[String]| {
+        let cells: Vec<_> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let rule = format!("|{}\n", "---|".repeat(table.columns.len()));
+    line(&table.columns) + &rule + &table.rows.iter().map(|row| line(row)).collect::<String>()
+}
+
+fn drawing(drawing: &Drawing) -> String {
+    let Drawing { name, title, caption, table, .. } = drawing;
+    let table = table.as_ref().map_or(String::new(), |table| format!("{}\n", grid(table)));
+    format!("### {title}\n\n{caption}\n\n![{title}]({name}.svg)\n\n{table}")
+}

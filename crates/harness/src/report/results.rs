@@ -1,0 +1,110 @@
+//! A record, seen as the tables ask for it.
+
+use super::{format::Spread, thesis::Thesis};
+use crate::{
+    failure::Failure,
+    record::{Cell, Measurement, Outcome, Record, Sample, Scene},
+    scenes::Source,
+};
+
+/// Which part of a solve a time is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// The stages `refine` and `update_messages`.
+    MessagePassing,
+    /// From images to labels.
+    Total,
+}
+
+impl Part {
+    /// Its time in a sample, in milliseconds.
+    pub(super) fn ms(self, sample: &Sample) -> f64 {
+        match self {
+            Self::MessagePassing => sample.stages.message_passing_ms(),
+            Self::Total => sample.total_ms,
+        }
+    }
+}
+
+/// A record and the numbers that the thesis prints.
+pub(super) struct Results<'a> {
+    pub(super) record: &'a Record,
+    pub(super) thesis: Thesis,
+}
+
+impl<'a> Results<'a> {
+    pub(super) fn new(record: &'a Record) -> Result<Self, Failure> {
+        Ok(Self { record, thesis: Thesis::read()? })
+    }
+
+    /// The scenes with their number in the thesis, from 0.
+    pub(super) fn scenes(&self) -> impl Iterator<Item = (usize, &'a Scene)> + use<'a> {
+        self.record.scenes.iter().enumerate()
+    }
+
+    /// The backends.
+    pub(super) fn backends(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.record.run.backends.iter().map(String::as_str)
+    }
+
+    /// All scenes on all backends.
+    pub(super) fn rows(&self) -> impl Iterator<Item = Row<'_>> {
+        self.scenes().flat_map(move |(index, scene)| {
+            self.backends().map(move |backend| Row { record: self.record, index, scene, backend })
+        })
+    }
+
+    /// Where the images come from, in words.
+    pub(super) fn data(&self) -> &'static str {
+        Source::describe(&self.record.run.data)
+    }
+}
+
+/// A scene on a backend.
+#[derive(Clone, Copy)]
+pub(super) struct Row<'a> {
+    record: &'a Record,
+    /// Number of the scene in the thesis, from 0.
+    pub(super) index: usize,
+    pub(super) scene: &'a Scene,
+    pub(super) backend: &'a str,
+}
+
+impl<'a> Row<'a> {
+    /// A plan's cell.
+    pub(super) fn cell(&self, plan: &str) -> Option<&'a Cell> {
+        self.record.cell(&self.scene.name, plan, self.backend)
+    }
+
+    /// A plan's measurement.
+    pub(super) fn measured(&self, plan: &str) -> Option<&'a Measurement> {
+        self.cell(plan)?.measured()
+    }
+
+    /// Why a plan has no numbers here.
+    pub(super) fn missing(&self, plan: &str) -> &'a str {
+        match self.cell(plan).map(|cell| &cell.outcome) {
+            Some(Outcome::Error(error)) => error,
+            _ => "not run",
+        }
+    }
+
+    /// A plan's times.
+    pub(super) fn time(&self, plan: &str, part: Part) -> Option<Spread> {
+        Spread::of(self.measured(plan)?.samples.iter().map(|sample| part.ms(sample)))
+    }
+
+    /// How many times faster than BP a plan is. The value is the ratio of medians; its range is that of the ratios of
+    /// samples taken in the same round, where there are at least three such rounds.
+    pub(super) fn speed_up(&self, plan: &str, part: Part) -> Option<Spread> {
+        let (bp, other) = (self.measured("bp")?, self.measured(plan)?);
+        let same_round = |a: &Sample| {
+            let b = other.samples.iter().find(|b| b.round == a.round)?;
+            Some(part.ms(a) / part.ms(b))
+        };
+        let ratios = Spread::of(bp.samples.iter().filter_map(same_round))?;
+        let median = self.time("bp", part)?.median / self.time(plan, part)?.median;
+        let (low, high) = if ratios.count >= 3 { (ratios.low, ratios.high) } else { (median, median) };
+        Some(Spread { median, low: low.min(median), high: high.max(median), count: ratios.count })
+    }
+}

@@ -1,0 +1,104 @@
+//! The tables of the thesis, 3.1 to 3.29, and ours.
+
+mod compared;
+mod measured;
+pub(super) mod ours;
+mod setting;
+
+use super::results::Results;
+
+/// A table.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Table {
+    /// Its number, such as "3.18".
+    pub(super) number: String,
+    /// Its heading.
+    pub(super) title: String,
+    /// What a reader must know to read it.
+    pub(super) note: String,
+    pub(super) columns: Vec<String>,
+    pub(super) rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub(super) fn new(number: &str, title: impl Into<String>, columns: &[&str]) -> Self {
+        let columns = columns.iter().map(|&column| column.to_owned()).collect();
+        Self { number: number.to_owned(), title: title.into(), columns, ..Self::default() }
+    }
+
+    /// The same with a note.
+    pub(super) fn note(self, note: impl Into<String>) -> Self {
+        Self { note: note.into(), ..self }
+    }
+
+    /// The same with rows.
+    pub(super) fn rows(self, rows: impl IntoIterator<Item = Vec<String>>) -> Self {
+        Self { rows: rows.into_iter().collect(), ..self }
+    }
+}
+
+/// A plan as tables name it.
+#[derive(Clone, Copy)]
+pub(super) struct Named {
+    /// Name in the record.
+    pub(super) plan: &'static str,
+    /// Name in tables.
+    pub(super) title: &'static str,
+    /// The thesis's algorithm, where it prints numbers for this plan.
+    pub(super) printed: Option<&'static str>,
+}
+
+pub(super) const BP: Named = Named { plan: "bp", title: "BP", printed: Some("bp") };
+pub(super) const CFBP: Named = Named { plan: "cfbp", title: "CFBP", printed: Some("cfbp") };
+pub(super) const CFCSBP: Named = Named { plan: "cfcsbp", title: "CFCSBP, Z''=2", printed: Some("cfcsbp") };
+pub(super) const CTBP: Named = Named { plan: "ctbp", title: "CTBP", printed: Some("ctbp") };
+/// The thesis's Z'''' lost its digit: its printed numbers stand beside each of the three.
+pub(super) const CTCSBP: [Named; 3] = [
+    Named { plan: "ctcsbp", title: "CTCSBP, Z''''=2", printed: Some("ctcsbp") },
+    Named { plan: "ctcsbp-z3", title: "CTCSBP, Z''''=3", printed: Some("ctcsbp") },
+    Named { plan: "ctcsbp-z4", title: "CTCSBP, Z''''=4", printed: Some("ctcsbp") },
+];
+
+/// All tables, in order.
+pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
+    let mut tables = vec![setting::computer(results), setting::images(results)];
+    let single: [(&[Named], [&str; 3]); 5] = [
+        (&[BP], ["3.3", "3.4", "3.5"]),
+        (&[CFBP], ["3.6", "3.7", "3.8"]),
+        (&[CFCSBP], ["3.9", "3.10", "3.11"]),
+        (&[CTBP], ["3.12", "3.13", "3.14"]),
+        (&CTCSBP, ["3.15", "3.16", "3.17"]),
+    ];
+    for (plans, [speed, memory, reliability]) in single {
+        tables.push(measured::speed(results, speed, plans));
+        tables.push(measured::memory(results, memory, plans));
+        tables.push(measured::reliability(results, reliability, plans));
+    }
+    let against_bp: [(&[Named], [&str; 3]); 4] = [
+        (&[CFBP], ["3.18", "3.19", "3.20"]),
+        (&[CFCSBP], ["3.21", "3.22", "3.23"]),
+        (&[CTBP], ["3.24", "3.25a", "3.25"]),
+        (&CTCSBP, ["3.26", "3.27", "3.28"]),
+    ];
+    for (plans, [speed, memory, reliability]) in against_bp {
+        tables.push(compared::speed(results, speed, plans));
+        tables.push(compared::memory(results, memory, plans));
+        tables.push(compared::reliability(results, reliability, plans));
+    }
+    tables.push(compared::all_speeds(results));
+    tables.push(compared::all_memory(results));
+    tables.push(compared::all_reliability(results));
+    tables.push(ours::profiles(results));
+    tables.extend(ours::energies(results));
+    tables
+}
+
+/// All plans of the thesis.
+pub(super) fn thesis_plans() -> Vec<Named> {
+    [BP, CFBP, CFCSBP, CTBP].into_iter().chain(CTCSBP).collect()
+}
+
+/// The algorithm that plans belong to.
+fn family(plans: &[Named]) -> &'static str {
+    plans.first().map_or("", |plan| plan.title.split(',').next().unwrap_or(plan.title))
+}

@@ -1,0 +1,210 @@
+//! Algorithms against BP, and all of them together.
+
+use super::{
+    Named, Table, family,
+    measured::{mib, which},
+    thesis_plans,
+};
+use crate::report::{
+    format::{Spread, mebibytes, number, or, whole},
+    results::{Part, Results, Row},
+};
+
+/// `(T_BP / T - 1) * 100`, the thesis's speed-up in percent.
+fn percent(ratio: f64) -> String {
+    number((ratio - 1.0) * 100.0, 2)
+}
+
+fn speed_up(row: &Row<'_>, plan: &str, part: Part) -> String {
+    let text = |ratio: Spread| match ratio.count {
+        0..=2 => percent(ratio.median),
+        _ => format!("{} ({} to {})", percent(ratio.median), percent(ratio.low), percent(ratio.high)),
+    };
+    or(row.speed_up(plan, part).map(text), row.missing(plan))
+}
+
+fn bad(row: &Row<'_>, plan: &str) -> String {
+    or(row.measured(plan).map(|measured| number(measured.all.bad[1], 2)), row.missing(plan))
+}
+
+fn time(row: &Row<'_>, plan: &str, part: Part) -> String {
+    or(row.time(plan, part).map(|time| time.to_string()), row.missing(plan))
+}
+
+/// Every scene and backend with every plan.
+fn pairs<'a>(results: &'a Results<'a>, plans: &'a [Named]) -> impl Iterator<Item = (Row<'a>, &'a Named)> {
+    results.rows().flat_map(|row| plans.iter().map(move |plan| (row, plan)))
+}
+
+/// Tables 3.18, 3.21, 3.24, 3.26.
+pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
+    let columns = [
+        "#",
+        "scene",
+        "backend",
+        "plan",
+        "printed: BP, ms",
+        "plan, ms",
+        "speed-up, %",
+        "ours: fewer updates",
+        "message passing: BP, ms",
+        "plan, ms",
+        "speed-up, %",
+        "total: BP, ms",
+        "plan, ms",
+        "speed-up, %",
+        "B>1 all: BP, %",
+        "plan, %",
+    ];
+    let rows = pairs(results, plans).map(|(row, plan)| {
+        let printed = |name: &str| or(results.thesis.time_ms(name, row.index).map(|ms| format!("{ms}")), "not printed");
+        let name = plan.printed.unwrap_or("");
+        let printed_percent = results.thesis.speed_up_percent(name, row.index);
+        let mut cells = which(&row, plan);
+        cells.extend([
+            printed("bp"),
+            printed(name),
+            or(printed_percent.map(|percent| format!("{percent:.2}")), "not printed"),
+            or(fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2} x")), ""),
+        ]);
+        for part in [Part::MessagePassing, Part::Total] {
+            cells.extend([time(&row, "bp", part), time(&row, plan.plan, part), speed_up(&row, plan.plan, part)]);
+        }
+        cells.extend([bad(&row, "bp"), bad(&row, plan.plan)]);
+        cells
+    });
+    let note = "Speed-up is (T_BP / T - 1) * 100. Both run on one worker of the same backend; the range, where there is \
+                one, is over rounds in which the two took turns.";
+    Table::new(number, format!("{} against BP: processing speed", family(plans)), &columns).note(note).rows(rows)
+}
+
+/// Message entries of BP over those of a plan, as predicted.
+fn fewer_updates(row: &Row<'_>, plan: &Named) -> Option<f64> {
+    Some(row.cell("bp")?.message_updates as f64 / row.cell(plan.plan)?.message_updates as f64)
+}
+
+/// Tables 3.19, 3.22, 3.25a, 3.27.
+pub(super) fn memory(results: &Results<'_>, number_of: &str, plans: &[Named]) -> Table {
+    let columns = ["#", "scene", "backend", "plan", "printed", "ours: BP, MiB", "plan, MiB", "plan / BP"];
+    let rows = pairs(results, plans).map(|(row, plan)| {
+        let bytes = |plan: &str| row.measured(plan).map(|measured| measured.allocated_bytes);
+        let ratio = bytes("bp").zip(bytes(plan.plan)).map(|(bp, other)| number(other as f64 / bp as f64, 3));
+        let mut cells = which(&row, plan);
+        cells.push("not printed".to_owned());
+        cells.extend(["bp", plan.plan].map(|plan| or(bytes(plan).map(mib), row.missing(plan))));
+        cells.push(or(ratio, ""));
+        cells
+    });
+    let ours = if number_of == "3.25a" { " (ours: the thesis has no such table)" } else { "" };
+    Table::new(number_of, format!("{} against BP: required memory{ours}", family(plans)), &columns)
+        .note("Bytes allocated, counted. Parts are held all at once, as if they ran side by side.")
+        .rows(rows)
+}
+
+/// Tables 3.20, 3.23, 3.25, 3.28.
+pub(super) fn reliability(results: &Results<'_>, number_of: &str, plans: &[Named]) -> Table {
+    let columns = [
+        "#",
+        "scene",
+        "backend",
+        "plan",
+        "printed",
+        "ours: R all, BP",
+        "plan",
+        "B>1 all, BP",
+        "plan",
+        "B>1 visible, BP",
+        "plan",
+        "energy, BP",
+        "plan",
+    ];
+    let rows = pairs(results, plans).map(|(row, plan)| {
+        let mut cells = which(&row, plan);
+        cells.push("not printed".to_owned());
+        let Some((bp, other)) = row.measured("bp").zip(row.measured(plan.plan)) else {
+            cells.push(row.missing(plan.plan).to_owned());
+            return cells;
+        };
+        cells.extend([number(bp.all.rmse, 2), number(other.all.rmse, 2)]);
+        cells.extend([number(bp.all.bad[1], 2), number(other.all.bad[1], 2)]);
+        cells.extend([number(bp.visible.bad[1], 2), number(other.visible.bad[1], 2)]);
+        cells.extend([whole(bp.energy.total), whole(other.energy.total)]);
+        cells
+    });
+    Table::new(number_of, format!("{} against BP: reliability", family(plans)), &columns)
+        .note("R in pixels, B in percent; all plans here run under the same schedule.")
+        .rows(rows)
+}
+
+/// Table 3.29.
+pub(super) fn all_speeds(results: &Results<'_>) -> Table {
+    let columns = [
+        "#",
+        "scene",
+        "backend",
+        "plan",
+        "printed, ms",
+        "speed-up, %",
+        "ours: message passing, ms",
+        "speed-up, %",
+        "total, ms",
+        "speed-up, %",
+        "B>1 all, %",
+    ];
+    let plans = thesis_plans();
+    let rows = pairs(results, &plans).map(|(row, plan)| {
+        let name = plan.printed.unwrap_or("");
+        let printed_percent = results.thesis.speed_up_percent(name, row.index);
+        let mut cells = which(&row, plan);
+        cells.extend([
+            or(results.thesis.time_ms(name, row.index).map(|ms| format!("{ms}")), "not printed"),
+            or(printed_percent.map(|percent| format!("{percent:.2}")), ""),
+        ]);
+        for part in [Part::MessagePassing, Part::Total] {
+            let ours = if plan.plan == "bp" { String::new() } else { speed_up(&row, plan.plan, part) };
+            cells.extend([time(&row, plan.plan, part), ours]);
+        }
+        cells.push(bad(&row, plan.plan));
+        cells
+    });
+    Table::new("3.29", "All algorithms: processing speed", &columns).rows(rows.collect::<Vec<_>>())
+}
+
+/// Table 3.30, ours.
+pub(super) fn all_memory(results: &Results<'_>) -> Table {
+    let plans = thesis_plans();
+    let columns: Vec<_> = ["#", "scene", "backend"].into_iter().chain(plans.iter().map(|plan| plan.title)).collect();
+    let rows = results.rows().map(|row| {
+        let bytes = |plan: &Named| row.measured(plan.plan).map(|measured| mebibytes(measured.allocated_bytes));
+        let cells = plans.iter().map(|plan| or(bytes(plan).map(|mib| number(mib, 1)), row.missing(plan.plan)));
+        let which = [(row.index + 1).to_string(), row.scene.name.clone(), row.backend.to_owned()];
+        which.into_iter().chain(cells).collect()
+    });
+    Table::new("3.30", "All algorithms: required memory, MiB (ours: the thesis has no such table)", &columns)
+        .note("Bytes allocated, counted. Not printed in the thesis.")
+        .rows(rows)
+}
+
+/// Table 3.31, ours.
+pub(super) fn all_reliability(results: &Results<'_>) -> Table {
+    let columns =
+        ["#", "scene", "backend", "plan", "R all, px", "R visible, px", "B>1 all, %", "B>1 visible, %", "energy"];
+    let plans = thesis_plans();
+    let rows = pairs(results, &plans).map(|(row, plan)| {
+        let mut cells = which(&row, plan);
+        match row.measured(plan.plan) {
+            None => cells.push(row.missing(plan.plan).to_owned()),
+            Some(measured) => cells.extend([
+                number(measured.all.rmse, 2),
+                number(measured.visible.rmse, 2),
+                number(measured.all.bad[1], 2),
+                number(measured.visible.bad[1], 2),
+                whole(measured.energy.total),
+            ]),
+        }
+        cells
+    });
+    Table::new("3.31", "All algorithms: reliability (ours: the thesis has no such table)", &columns)
+        .note("Not printed in the thesis.")
+        .rows(rows.collect::<Vec<_>>())
+}

@@ -1,0 +1,123 @@
+//! One algorithm: speed, memory, reliability.
+
+use super::{Named, Table, family};
+use crate::{
+    record::{Cell, Errors},
+    report::{
+        format::{mebibytes, number, or, whole},
+        results::{Part, Results, Row},
+    },
+};
+
+const NOT_PRINTED: &str = "not printed";
+
+/// The columns that say which measurement a row is of.
+const WHICH: [&str; 4] = ["#", "scene", "backend", "plan"];
+
+/// The cells under [`WHICH`].
+pub(super) fn which(row: &Row<'_>, plan: &Named) -> Vec<String> {
+    vec![(row.index + 1).to_string(), row.scene.name.clone(), row.backend.to_owned(), plan.title.to_owned()]
+}
+
+/// A table with a row for every scene, backend and plan.
+fn table<'a>(
+    results: &'a Results<'a>,
+    (number, title): (&str, String),
+    plans: &[Named],
+    columns: &[&str],
+    cells: impl Fn(&Row<'a>, &Named) -> Vec<String>,
+) -> Table {
+    let rows = results.rows().flat_map(|row| plans.iter().map(move |plan| (row, plan)));
+    let rows = rows.map(|(row, plan)| [which(&row, plan), cells(&row, plan)].concat());
+    Table::new(number, title, &[WHICH.as_slice(), columns].concat()).rows(rows)
+}
+
+/// Tables 3.3, 3.6, 3.9, 3.12, 3.15.
+pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
+    let columns = ["grids x loops", "printed, ms", "ours: message passing, ms", "total, ms", "samples"];
+    let title = format!("{}: processing speed", family(plans));
+    let note = "Median, and range from three samples on. Message passing is the stages refine and update_messages; total \
+                goes from the images to the labels.";
+    let table = table(results, (number, title), plans, &columns, |row, plan| {
+        let printed = plan.printed.and_then(|name| results.thesis.time_ms(name, row.index));
+        let time = |part| or(row.time(plan.plan, part).map(|time| time.to_string()), row.missing(plan.plan));
+        vec![
+            or(row.cell(plan.plan).map(grids_and_loops), ""),
+            or(printed.map(|ms| format!("{ms}")), NOT_PRINTED),
+            time(Part::MessagePassing),
+            time(Part::Total),
+            or(row.measured(plan.plan).map(|measured| measured.samples.len().to_string()), "0"),
+        ]
+    });
+    let side_by_side = " Parts run one after another; running them side by side needs a backend with threads, and this \
+                        run has none.";
+    let cut = plans.iter().any(|plan| plan.plan.starts_with("ct"));
+    table.note(format!("{note}{}", if cut { side_by_side } else { "" }))
+}
+
+fn grids_and_loops(cell: &Cell) -> String {
+    format!("{} x {}", cell.grids, cell.steps)
+}
+
+/// Tables 3.4, 3.7, 3.10, 3.13, 3.16.
+pub(super) fn memory(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
+    let columns = ["printed", "ours: predicted, MiB", "allocated, MiB"];
+    let title = format!("{}: required memory", family(plans));
+    let note =
+        "Predicted by the plan's formulas before the run; allocated is counted. The thesis prints no memory figure.";
+    table(results, (number, title), plans, &columns, |row, plan| {
+        let allocated = row.measured(plan.plan).map(|measured| measured.allocated_bytes);
+        vec![
+            NOT_PRINTED.to_owned(),
+            or(row.cell(plan.plan).map(|cell| mib(cell.planned_bytes)), ""),
+            or(allocated.map(mib), row.missing(plan.plan)),
+        ]
+    })
+    .note(note)
+}
+
+/// Bytes in MiB, as a table shows them.
+pub(super) fn mib(bytes: u64) -> String {
+    number(mebibytes(bytes), 1)
+}
+
+/// Tables 3.5, 3.8, 3.11, 3.14, 3.17.
+pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
+    let title = format!("{}: reliability", family(plans));
+    let note = "R is the root mean squared error in pixels (equation 2.82), B the percentage of pixels wrong by more than \
+                so many pixels (2.83), over all pixels of known truth and over those that both cameras see. Energies are \
+                under the plan's own schedule. The thesis prints no reliability figure.";
+    table(results, (number, title), plans, &reliability_columns(), |row, plan| {
+        let Some(measured) = row.measured(plan.plan) else {
+            return vec![NOT_PRINTED.to_owned(), row.missing(plan.plan).to_owned()];
+        };
+        let mut cells = vec![NOT_PRINTED.to_owned()];
+        cells.extend(errors(&measured.all));
+        cells.extend(errors(&measured.visible));
+        cells.push(whole(measured.energy.total));
+        cells
+    })
+    .note(note)
+}
+
+fn reliability_columns() -> [&'static str; 12] {
+    [
+        "printed",
+        "R all",
+        "B>0.5 all",
+        "B>1 all",
+        "B>2 all",
+        "B>4 all",
+        "R visible",
+        "B>0.5 visible",
+        "B>1 visible",
+        "B>2 visible",
+        "B>4 visible",
+        "energy",
+    ]
+}
+
+fn errors(errors: &Errors) -> Vec<String> {
+    let bad = errors.bad.iter().map(|&bad| number(bad, 2));
+    std::iter::once(number(errors.rmse, 2)).chain(bad).collect()
+}

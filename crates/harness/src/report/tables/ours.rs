@@ -1,0 +1,66 @@
+//! Tables that the thesis has no counterpart of.
+
+use super::{Named, Table, thesis_plans};
+use crate::report::{
+    format::{Spread, number, or, whole},
+    results::{Part, Results, Row},
+};
+
+/// Our plan with census costs.
+pub(in crate::report) const CENSUS: Named =
+    Named { plan: "census", title: "ours: census cost, 5 grids x 2 loops", printed: None };
+
+/// Means over the scenes for every plan.
+pub(super) fn profiles(results: &Results<'_>) -> Table {
+    let columns = ["backend", "plan", "B>1 visible, %", "B>1 all, %", "R all, px", "message passing, ms", "total, ms"];
+    let plans: Vec<_> = thesis_plans().into_iter().chain([CENSUS]).collect();
+    let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
+    let rows = rows.map(|(backend, plan)| {
+        let cells = means(results, backend, plan).map(|mean| or(mean.map(|mean| number(mean, 2)), "not run"));
+        [vec![backend.to_owned(), plan.title.to_owned()], cells.to_vec()].concat()
+    });
+    let note = "Means over the scenes, of medians where there are several samples. The thesis's plans use its grey \
+                difference; ours uses the 3x3 census transform that CTBP computes for one pixel as the data cost of all.";
+    Table::new("A.1", "Accuracy and time, means (ours)", &columns).note(note).rows(rows)
+}
+
+/// Mean visible and total bad-pixel percentage, error, message passing time and total time of a plan.
+pub(in crate::report) fn means(results: &Results<'_>, backend: &str, plan: &Named) -> [Option<f64>; 5] {
+    let rows: Vec<Row<'_>> = results.rows().filter(|row| row.backend == backend).collect();
+    let mean = |value: &dyn Fn(&Row<'_>) -> Option<f64>| {
+        let values: Option<Vec<f64>> = rows.iter().map(value).collect();
+        Spread::mean(values?)
+    };
+    [
+        mean(&|row| Some(row.measured(plan.plan)?.visible.bad[1])),
+        mean(&|row| Some(row.measured(plan.plan)?.all.bad[1])),
+        mean(&|row| Some(row.measured(plan.plan)?.all.rmse)),
+        mean(&|row| Some(row.time(plan.plan, Part::MessagePassing)?.median)),
+        mean(&|row| Some(row.time(plan.plan, Part::Total)?.median)),
+    ]
+}
+
+/// Labellings by others and ours under one energy; none where the data held none.
+pub(super) fn energies(results: &Results<'_>) -> Option<Table> {
+    let labellings = &results.record.labellings;
+    if labellings.is_empty() {
+        return None;
+    }
+    let rows = labellings.iter().map(|labelling| {
+        let energy = &labelling.energy;
+        vec![
+            labelling.scene.clone(),
+            labelling.method.clone(),
+            if labelling.ours { "this program" } else { "reference" }.to_owned(),
+            whole(energy.total),
+            whole(energy.data),
+            whole(energy.smoothness),
+        ]
+    });
+    let note = "Profile mrf, 16 labels: sum of absolute colour differences + 20 min(|a - b|, 2). The references are label \
+                maps made by the Middlebury MRF code (Szeliski et al. 2008) from the same images, all-zero labels, and the \
+                cheapest label of each pixel (WTA); their energies are computed here from the maps. Ours runs plain BP \
+                with the checkerboard schedule.";
+    let columns = ["scene", "method", "labels by", "energy", "data", "smoothness"];
+    Some(Table::new("A.2", "Energies beside those of other optimisers (ours)", &columns).note(note).rows(rows))
+}

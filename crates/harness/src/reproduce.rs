@@ -1,0 +1,45 @@
+//! `bp reproduce`: the thesis's experiments, run and recorded.
+
+mod energies;
+mod plans;
+mod run;
+mod storage;
+
+pub use run::ONE_SAMPLE_ABOVE_MS;
+pub(crate) use storage::{RECORD_FILE, load_record};
+
+use crate::{args::ReproduceArgs, backends, failure::Failure, interrupt, machine, record::Run, report, scenes::Source};
+
+/// Loops of plain BP in a quick run. A whole k = L would take minutes on one thread.
+const QUICK_LOOPS: u32 = 20;
+
+/// Samples of a cell that takes little time.
+const SAMPLES: u32 = 5;
+
+/// Runs the command.
+pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
+    let source = Source::new(&args.data, args.quick)?;
+    for name in &args.backend {
+        backends::by_name(name)?;
+    }
+    let run = Run {
+        data: source.name.to_owned(),
+        quick: args.quick,
+        labels: source.labels,
+        k: if args.quick { QUICK_LOOPS } else { source.labels as u32 },
+        samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
+        backends: args.backend.clone(),
+    };
+    eprintln!("scenes: {}", Source::describe(source.name));
+    let machine = machine::machine(args.machine.as_deref());
+    let mut storage = storage::open(&args.results, machine, run)?;
+    let outcome = run::run(&source, &mut storage);
+    if outcome.as_ref().is_err_and(Failure::is_interrupted) {
+        eprintln!("what was run is kept in {}; the same command goes on from there", storage.folder().display());
+    }
+    outcome?;
+    interrupt::check()?;
+    report::write(storage.folder(), storage.record())?;
+    eprintln!("report: {}", storage.folder().join("report.html").display());
+    Ok(())
+}

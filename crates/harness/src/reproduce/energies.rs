@@ -1,0 +1,67 @@
+//! Labellings by other programs and ours under one energy: profile `mrf`, 16 labels.
+
+use std::path::Path;
+
+use bp_core::{Algorithm, Backend, Energy, Matcher, Model, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels};
+
+use crate::{
+    failure::Failure,
+    files::{PixelLimit, read_grey16},
+    interrupt::{self, ProgressBar},
+    record::Labelling,
+    scenes::Manifest,
+};
+
+/// The scenes, their labels, and the methods whose labellings the data folder holds.
+const SCENES: [&str; 3] = ["tsukuba", "venus", "teddy"];
+const LABELS: usize = 16;
+const METHODS: [&str; 6] = ["ICM", "BP-S", "BP-M", "Swap", "Expansion", "TRW-S"];
+
+/// Our own: plain BP, that many checkerboard loops.
+const LOOPS: u32 = 75;
+
+/// All labellings of all three scenes; none where the data folder does not hold them.
+pub(crate) fn compare(folder: &Path, bar: &ProgressBar) -> Result<Vec<Labelling>, Failure> {
+    let mut labellings = Vec::new();
+    if !folder.join("mrf-benchmark").is_dir() {
+        return Ok(labellings);
+    }
+    for scene in SCENES {
+        interrupt::check()?;
+        let pair = load_pair(folder, scene)?;
+        let model = Model::new(Profile::Mrf, LABELS)?;
+        let mut add = |method: &str, ours: bool, labels: &[u16]| -> Result<(), Failure> {
+            let energy = Energy::of(&pair, &model, labels)?.into();
+            labellings.push(Labelling { scene: scene.to_owned(), method: method.to_owned(), ours, energy });
+            Ok(())
+        };
+        add("all-zero", false, &vec![0; pair.size().pixels()])?;
+        add("WTA", false, &cheapest_labels(&pair, &model)?)?;
+        for method in METHODS {
+            add(method, false, &load_labels(folder, scene, method, pair.size())?)?;
+        }
+        let settings = Algorithm::Bp.settings(pair.size(), LOOPS, 1, Schedule::Checkerboard);
+        let device = bp_cpu_scalar::Scalar.open(0)?;
+        let mut matcher = Matcher::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
+        matcher.solve_observed(&pair, &mut |progress| bar.update(progress.done))?;
+        add(&format!("BP, {LOOPS} checkerboard loops"), true, matcher.labels())?;
+    }
+    Ok(labellings)
+}
+
+fn load_pair(folder: &Path, scene: &str) -> Result<StereoPair, Failure> {
+    let manifest = Manifest::read()?;
+    let image = |name: &str| manifest.checked(folder, &folder.join(format!("middlebury2001-2003/{scene}/{name}")));
+    Ok(StereoPair::new(image("imL.png")?, image("imR.png")?)?)
+}
+
+/// Labels stored as 17 times their number.
+fn load_labels(folder: &Path, scene: &str, method: &str, size: Size) -> Result<Vec<u16>, Failure> {
+    let path = folder.join(format!("mrf-benchmark/{scene}/{scene}-{method}.png"));
+    Manifest::read()?.checked(folder, &path)?;
+    let (found, values, _) = read_grey16(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+    if found != size || values.iter().any(|value| value % 17 != 0) {
+        return Err(Failure::reading(&path, &"not a label map of this scene"));
+    }
+    Ok(values.into_iter().map(|value| value / 17).collect())
+}

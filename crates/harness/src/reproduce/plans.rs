@@ -1,0 +1,61 @@
+//! What is run on every scene.
+
+use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
+
+use crate::record::Run;
+
+/// Z'' and Z'''' where nothing else is said: the digit that the thesis lost is most likely this one.
+const Z: u32 = 2;
+
+/// A plan of the tables.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Planned {
+    /// Its name in records.
+    pub(crate) name: &'static str,
+    /// Its algorithm.
+    pub(crate) algorithm: Algorithm,
+    profile: Profile,
+    /// What loops are divided by.
+    pub(crate) z: Option<u32>,
+    /// Grids and loops on each, in place of the thesis's rule.
+    fixed: Option<(usize, u32)>,
+}
+
+/// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and the same model
+/// with the census transform as data cost, on few grids with few loops, which is ours.
+pub(crate) fn all() -> Vec<Planned> {
+    let thesis = |name, algorithm: Algorithm, z: u32| Planned {
+        name,
+        algorithm,
+        profile: Profile::Thesis,
+        z: algorithm.divides_loops().then_some(z),
+        fixed: None,
+    };
+    let mut plans: Vec<_> = Algorithm::ALL.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
+    plans.push(thesis("ctcsbp-z3", Algorithm::Ctcsbp, 3));
+    plans.push(thesis("ctcsbp-z4", Algorithm::Ctcsbp, 4));
+    let census = thesis(CENSUS, Algorithm::Cfbp, Z);
+    plans.push(Planned { profile: Profile::Census, fixed: Some((5, 2)), ..census });
+    plans
+}
+
+/// Name of our plan with census costs.
+pub(crate) const CENSUS: &str = "census";
+
+impl Planned {
+    /// The plan for images of `size`.
+    pub(crate) fn plan(&self, size: Size, run: &Run) -> Result<Plan, Error> {
+        let model = Model::new(self.profile, run.labels)?;
+        let settings = self.algorithm.settings(size, run.k, self.z.unwrap_or(1), Schedule::Sync);
+        let settings = match self.fixed {
+            Some((grids, steps)) => Settings { grids, steps, ..settings },
+            None => settings,
+        };
+        Plan::new(size, model, settings)
+    }
+
+    /// The loops that its own are derived from.
+    pub(crate) fn k(&self, run: &Run) -> Option<u32> {
+        self.fixed.is_none().then_some(run.k)
+    }
+}

@@ -1,0 +1,125 @@
+//! The folder of a run: begun once, gone on with after an interruption, never overwritten.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use jiff::{Timestamp, Zoned};
+
+use crate::{
+    failure::Failure,
+    files::{create_folder, write_text},
+    machine,
+    record::{Machine, Record, Run, SCHEMA_VERSION},
+};
+
+/// Name of the record in a run's folder.
+pub(crate) const RECORD_FILE: &str = "record.json";
+
+/// Name of the folder of disparity maps in a run's folder.
+pub(crate) const MAPS_FOLDER: &str = "maps";
+
+/// A run being recorded.
+pub(crate) struct Storage {
+    folder: PathBuf,
+    record: Record,
+}
+
+/// Goes on with an interrupted run of the same program, machine and settings, or begins a new one.
+pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
+    let program = machine::program()?;
+    let same = |record: &Record| {
+        !record.complete && record.program == program && record.machine == machine && record.run == run
+    };
+    for folder in runs(results) {
+        if let Ok(record) = load_record(&folder)
+            && same(&record)
+        {
+            eprintln!("going on with the interrupted run in {}", folder.display());
+            return Ok(Storage { folder, record });
+        }
+    }
+    let folder = new_folder(results, &machine, &run)?;
+    let now = Timestamp::now().to_string();
+    let record = Record {
+        schema_version: SCHEMA_VERSION,
+        complete: false,
+        started: now.clone(),
+        updated: now,
+        program,
+        machine,
+        run,
+        scenes: Vec::new(),
+        cells: Vec::new(),
+        labellings: Vec::new(),
+    };
+    let mut storage = Storage { folder, record };
+    storage.save()?;
+    Ok(storage)
+}
+
+/// Reads the record of a run's folder.
+pub(crate) fn load_record(folder: &Path) -> Result<Record, Failure> {
+    let path = folder.join(RECORD_FILE);
+    let text = fs::read_to_string(&path).map_err(|error| Failure::reading(&path, &error))?;
+    let record: Record = serde_json::from_str(&text).map_err(|error| Failure::reading(&path, &error))?;
+    if record.schema_version != SCHEMA_VERSION {
+        let found = record.schema_version;
+        return Err(Failure::reading(&path, &format!("schema version {found}, this program reads {SCHEMA_VERSION}")));
+    }
+    Ok(record)
+}
+
+/// Folders of recorded runs, in order of their names.
+fn runs(results: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(results).into_iter().flatten().flatten();
+    let mut folders: Vec<_> =
+        entries.map(|entry| entry.path()).filter(|path| path.join(RECORD_FILE).exists()).collect();
+    folders.sort();
+    folders
+}
+
+/// A folder that is not there yet: date, machine, data, and a number from the second run of a day on.
+fn new_folder(results: &Path, machine: &Machine, run: &Run) -> Result<PathBuf, Failure> {
+    let name = format!("{}-{}-{}", Zoned::now().date(), machine.name, run.data);
+    let numbered = (2..).map(|number| format!("{name}-{number}"));
+    create_folder(results)?;
+    for name in std::iter::once(name.clone()).chain(numbered) {
+        let folder = results.join(name);
+        match fs::create_dir(&folder) {
+            Ok(()) => {
+                create_folder(&folder.join(MAPS_FOLDER))?;
+                return Ok(folder);
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(Failure::writing(&folder, &error)),
+        }
+    }
+    Err(Failure::other(format!("{}: no name is left for another run", results.display())))
+}
+
+impl Storage {
+    /// The run's folder.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The record so far.
+    pub(crate) fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// The record, to be changed and then saved.
+    pub(crate) fn record_mut(&mut self) -> &mut Record {
+        &mut self.record
+    }
+
+    /// Writes the record.
+    pub(crate) fn save(&mut self) -> Result<(), Failure> {
+        self.record.updated = Timestamp::now().to_string();
+        let path = self.folder.join(RECORD_FILE);
+        let json = serde_json::to_string_pretty(&self.record).map_err(|error| Failure::writing(&path, &error))?;
+        write_text(&path, &(json + "\n"))
+    }
+}

@@ -1,0 +1,180 @@
+//! The scenes that results are made from: six public ones, or six synthetic ones where those are not at hand.
+
+use std::path::{Path, PathBuf};
+
+use bp_core::{DisparityMap, GroundTruth, Image, StereoPair, synthetic};
+use serde::Deserialize;
+
+use crate::{
+    args::DataArgs,
+    failure::Failure,
+    files::{PixelLimit, pixels_sha256, read_image, read_map},
+    record::{self, ImageSum},
+};
+
+/// The thesis's six scenes as we identify them, in its order.
+pub(crate) const THESIS_SCENES: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
+
+/// Labels at full and at reduced size: above the largest true disparity of all six scenes, a multiple of 8.
+const LABELS: [(&str, usize); 4] =
+    [("middlebury2006", 112), ("middlebury2006-thirdsize", 80), ("synthetic", 112), ("synthetic-small", 56)];
+
+/// What the small synthetic scenes are divided by.
+const SMALL_DIVISOR: usize = 2;
+
+/// A pair with its ground truth.
+pub(crate) struct Scene {
+    pub(crate) pair: StereoPair,
+    pub(crate) truth: GroundTruth,
+    pub(crate) record: record::Scene,
+}
+
+/// Where scenes come from.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    /// The data folder; `None` for synthetic scenes.
+    folder: Option<PathBuf>,
+    /// The set's name, as in [`record::Run::data`].
+    pub(crate) name: &'static str,
+    /// Labels of every scene.
+    pub(crate) labels: usize,
+}
+
+impl Source {
+    /// What the options ask for: the data folder's scenes where one is given, at half size or, when `quick`, at third
+    /// size; else the synthetic scenes.
+    pub(crate) fn new(args: &DataArgs, quick: bool) -> Result<Self, Failure> {
+        let folder = args.data.clone().filter(|_| !args.synthetic);
+        let (name, labels) = LABELS[if folder.is_some() { 0 } else { 2 } + usize::from(quick)];
+        if let Some(folder) = &folder
+            && !folder.join(name).is_dir()
+        {
+            let (folder, what) = (folder.display(), "see scripts/fetch-middlebury, or use --synthetic");
+            return Err(Failure::input(format!("--data {folder}: there is no folder {name} in it; {what}")));
+        }
+        Ok(Self { folder, name, labels })
+    }
+
+    /// The folder of public data, where that is used.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// What the scenes are, in words.
+    pub(crate) fn describe(name: &str) -> &'static str {
+        match name {
+            "middlebury2006" => "the thesis's six Middlebury scenes at half size, the thesis's own sizes",
+            "middlebury2006-thirdsize" => "the thesis's six Middlebury scenes at third size, smaller than the thesis's",
+            "synthetic" => "six synthetic scenes of the thesis's sizes; not the thesis's images",
+            _ => "six synthetic scenes at half of the thesis's sizes; not the thesis's images",
+        }
+    }
+
+    /// Loads scene `index` of six.
+    pub(crate) fn load(&self, index: usize) -> Result<Scene, Failure> {
+        match &self.folder {
+            Some(folder) => middlebury(folder, &format!("{}/{}", self.name, THESIS_SCENES[index])),
+            None => Ok(made_up(index, if self.name == "synthetic" { 1 } else { SMALL_DIVISOR })),
+        }
+    }
+}
+
+/// A scene's record, computed from what was loaded.
+fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<ImageSum>) -> record::Scene {
+    let known = |&(_, value): &(usize, &f32)| value.is_finite();
+    let seen = |i: usize| truth.visible.as_ref().is_some_and(|visible| visible[i]);
+    let pixels = || truth.disparities.values().iter().enumerate().filter(known);
+    record::Scene {
+        name: name.to_owned(),
+        width: pair.size().width,
+        height: pair.size().height,
+        largest_disparity: truth.disparities.range().map_or(0.0, |(_, high)| high),
+        known: pixels().count() as u64,
+        visible: pixels().filter(|&(i, _)| seen(i)).count() as u64,
+        images,
+    }
+}
+
+fn made_up(index: usize, divisor: usize) -> Scene {
+    let synthetic::Scene { name, pair, truth_left, visible, .. } = synthetic::scene(index, divisor);
+    let truth = GroundTruth { disparities: truth_left, visible: Some(visible) };
+    let sum = |path: &str, image: &Image| ImageSum { path: path.to_owned(), sha256: pixels_sha256(image) };
+    let images = vec![sum("left", pair.left()), sum("right", pair.right())];
+    Scene { record: described(name, &pair, &truth, images), pair, truth }
+}
+
+/// Loads and checks the four images of a scene of the 2005 and 2006 sets.
+fn middlebury(folder: &Path, scene: &str) -> Result<Scene, Failure> {
+    let manifest = Manifest::read()?;
+    let mut images = Vec::new();
+    let mut load = |file: &str| -> Result<(PathBuf, f32), Failure> {
+        let entry = manifest.entry(&format!("{scene}/{file}"))?;
+        images.push(ImageSum { path: entry.path.clone(), sha256: entry.sha256.clone() });
+        Ok((folder.join(&entry.path), entry.scale.unwrap_or(1.0)))
+    };
+    let [left, right, truth, truth_right] = ["view1.png", "view5.png", "disp1.png", "disp5.png"].map(&mut load);
+    let image = |file: Result<(PathBuf, f32), Failure>| manifest.checked(folder, &file?.0);
+    let (left, right) = (image(left)?, image(right)?);
+    let map = |file: Result<(PathBuf, f32), Failure>| -> Result<DisparityMap, Failure> {
+        let (path, scale) = file?;
+        manifest.checked(folder, &path)?;
+        read_map(&path, Some(scale), PixelLimit::megapixels(PixelLimit::MEGAPIXELS))
+    };
+    let truth = GroundTruth::with_right(map(truth)?, &map(truth_right)?)?;
+    let pair = StereoPair::new(left, right)?;
+    let name = scene.rsplit('/').next().unwrap_or(scene);
+    Ok(Scene { record: described(name, &pair, &truth, images), pair, truth })
+}
+
+/// What the public data files should be: `bench-data/middlebury.json`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Manifest {
+    #[expect(dead_code, reason = "for readers of the file")]
+    about: String,
+    pub(crate) files: Vec<ManifestEntry>,
+}
+
+/// A data file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ManifestEntry {
+    /// Path below the data folder.
+    pub(crate) path: String,
+    width: usize,
+    height: usize,
+    /// Of a disparity map: stored value over disparity in pixels.
+    pub(crate) scale: Option<f32>,
+    /// Of the decoded pixels.
+    sha256: String,
+}
+
+impl Manifest {
+    /// The manifest of this build.
+    pub(crate) fn read() -> Result<Self, Failure> {
+        let text = include_str!("../../../bench-data/middlebury.json");
+        serde_json::from_str(text).map_err(|error| Failure::other(format!("bench-data/middlebury.json: {error}")))
+    }
+
+    fn entry(&self, path: &str) -> Result<&ManifestEntry, Failure> {
+        let entry = self.files.iter().find(|entry| entry.path == path);
+        entry.ok_or_else(|| Failure::other(format!("bench-data/middlebury.json does not list {path}")))
+    }
+
+    /// Reads a listed image and fails, with its name, where it is not the one listed.
+    pub(crate) fn checked(&self, folder: &Path, path: &Path) -> Result<Image, Failure> {
+        let below = path.strip_prefix(folder).unwrap_or(path);
+        let entry = self.entry(&below.to_string_lossy().replace('\\', "/"))?;
+        let image = read_image(path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+        let (width, height) = (image.size().width, image.size().height);
+        if (width, height) != (entry.width, entry.height) {
+            let expected = format!("{}x{}", entry.width, entry.height);
+            return Err(Failure::reading(path, &format!("{width}x{height} pixels instead of {expected}")));
+        }
+        if pixels_sha256(&image) != entry.sha256 {
+            let what = "its pixels are not those that bench-data/middlebury.json lists; fetch it again";
+            return Err(Failure::reading(path, &what));
+        }
+        Ok(image)
+    }
+}
