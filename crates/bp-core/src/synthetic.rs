@@ -8,6 +8,8 @@
 mod render;
 mod scenes;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod texture;
 
 use crate::{DisparityMap, Image, Size, StereoPair};
@@ -90,7 +92,7 @@ fn visible(world: &World, size: Size, divisor: usize) -> Vec<bool> {
 
 /// The exposures of both views: as unlike as those of two shots with one camera. Averaging pixels averages noise.
 fn exposures(index: usize, divisor: usize) -> [Exposure; 2] {
-    let (gain, offset) = [(1.02, -1.0), (0.98, 1.5), (1.03, 0.5), (0.97, 1.0), (1.01, 2.0), (0.985, -1.0)][index];
+    let (gain, offset) = [(1.02, -1.0), (0.98, 1.5), (1.03, 0.5), (0.985, 0.5), (1.01, 0.5), (0.985, -1.0)][index];
     let (noise, seed) = (1.6 / divisor as f64, 2 * index as u32);
     [Exposure { gain: 1.0, offset: 0.0, noise, seed }, Exposure { gain, offset, noise, seed: seed + 1 }]
 }

@@ -13,7 +13,7 @@ pub(crate) fn select_labels(costs: &Costs, messages: &Messages, labels: &mut [u1
                 *belief = belief.saturating_add(message);
             }
         }
-        let least = belief.iter().zip(0..).min_by_key(|&(belief, _)| belief);
-        *label = least.map_or(0, |(_, label)| label);
+        let least = belief.iter().copied().min();
+        *label = belief.iter().position(|&belief| Some(belief) == least).unwrap_or(0) as u16;
     }
 }

@@ -4,6 +4,7 @@ use super::surface::{Hit, Surface, View};
 use super::texture::uniform;
 use crate::Size;
 use std::ops::RangeInclusive;
+use std::ptr;
 
 /// Places at which the way to the light is probed.
 const SHADOW_STEPS: u32 = 3;
@@ -44,8 +45,7 @@ impl World {
     pub(super) fn is_shared(&self, x: f64, y: f64, columns: &RangeInclusive<f64>) -> bool {
         let seen = self.look(View::Left, x, y);
         let right_x = x - seen.disparity;
-
-        columns.contains(&right_x) && std::ptr::eq(self.look(View::Right, right_x, y).surface, seen.surface)
+        columns.contains(&right_x) && ptr::eq(self.look(View::Right, right_x, y).surface, seen.surface)
     }
 
     /// The image of one camera before exposure, [height][width]: `divisor` squared samples a pixel.
@@ -73,7 +73,7 @@ impl World {
         let ray = hit.disparity + 2.0 * step;
         let (x, y) = (hit.x - 4.0 * step, y - 5.0 * step);
         let mut hits = self.objects.iter().filter_map(|object| object.seen_at(View::Left, x, y));
-        hits.any(|over| (1.0..16.0).contains(&(over.disparity - ray)))
+        hits.any(|over| !ptr::eq(over.surface, hit.surface) && (1.0..16.0).contains(&(over.disparity - ray)))
     }
 }
 

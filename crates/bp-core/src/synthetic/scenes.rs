@@ -34,7 +34,7 @@ fn ball(centre: [f64; 2], radii: [f64; 2], level: f64, bulge: f64, paint: Paint)
     Surface::new(Strip::ellipse(centre, radii), Relief { level, bulge, ..Relief::default() }, paint)
 }
 
-/// A horizontal plane from row `top` down past the image, `slope` disparities nearer every row.
+/// A level plane from row `top` down past the image, nearer towards the bottom.
 fn ground(top: f64, level: f64, slant: [f64; 2], paint: Paint) -> Surface {
     let strip = Strip::new([0.0, top], [0.0, top + 600.0], 2000.0, Profile::Bar);
     Surface::new(strip, Relief { level, slant, ..Relief::default() }, paint)
@@ -156,9 +156,9 @@ fn cloth() -> World {
 
 /// Flower pots of bare clay before plaster: large areas almost without texture.
 fn pots() -> World {
-    let plaster = paint(PLASTER, Pattern::Mottle { across: 120.0, along: 120.0 }, 1.6, 50);
+    let plaster = paint(PLASTER, Pattern::Mottle { across: 90.0, along: 90.0 }, 4.5, 50);
     let backdrop = backdrop(Relief { level: 8.05, slant: [-0.01, 0.0], ..Relief::default() }, plaster);
-    let boards = paint(WOOD, Pattern::Planks { width: 74.0 }, 4.0, 51);
+    let boards = paint(WOOD, Pattern::Planks { width: 74.0 }, 7.0, 51);
     let mut objects = vec![ground(320.0, 8.05, [-0.01, 0.3], boards)];
     objects.extend(pot(335.0, [236.0, 378.0], 56.0, 24.0, 11.0, 52));
     objects.extend(pot(452.0, [250.0, 430.0], 80.0, 38.0, 15.0, 53));
@@ -173,7 +173,7 @@ fn pots() -> World {
 fn pot(x: f64, rows: [f64; 2], half_width: f64, level: f64, bulge: f64, seed: u32) -> [Surface; 3] {
     const TAPER: Profile = Profile::Turned(&[1.0, 0.95, 0.9, 0.84, 0.77, 0.7]);
     let sag = 0.16 * half_width;
-    let clay = paint(CLAY, Pattern::Mottle { across: 90.0, along: 40.0 }, 1.5, seed);
+    let clay = paint(CLAY, Pattern::Mottle { across: 70.0, along: 40.0 }, 5.0, seed);
     let dark = paint([[60, 40, 32], [70, 48, 38], [84, 58, 46]], Pattern::Plain, 2.0, seed);
     let turned = |top: f64, bottom: f64, half_width: f64, profile, level| {
         let strip = Strip::new([x, top], [x, bottom], half_width, profile).sagging(sag);
@@ -204,14 +204,10 @@ fn sprout(foot: [f64; 2], level: f64, seed: u32) -> Vec<Surface> {
 
 /// A large ball and pins on a lane: curved, shiny-smooth objects with weak texture.
 fn bowling() -> World {
-    let wall = paint(
-        [[96, 104, 116], [116, 124, 136], [138, 146, 156]],
-        Pattern::Mottle { across: 160.0, along: 60.0 },
-        2.2,
-        60,
-    );
+    let grey = [[96, 104, 116], [116, 124, 136], [138, 146, 156]];
+    let wall = paint(grey, Pattern::Mottle { across: 120.0, along: 60.0 }, 3.6, 60);
     let backdrop = backdrop(Relief { level: 19.5, slant: [0.01, 0.0], ..Relief::default() }, wall);
-    let lane = paint(WOOD, Pattern::Planks { width: 44.0 }, 3.0, 61);
+    let lane = paint(WOOD, Pattern::Planks { width: 44.0 }, 5.0, 61);
     let mut objects = vec![ground(250.0, 19.5, [0.01, 0.2], lane)];
     let places = [(330.0, 320.0), (425.0, 324.0), (525.0, 330.0), (380.0, 372.0), (480.0, 380.0), (430.0, 440.0)];
     for (i, (x, bottom)) in places.into_iter().enumerate() {
@@ -224,14 +220,20 @@ fn bowling() -> World {
             62 + i as u32,
         ));
     }
-    objects.extend(pin([648.0, 424.0], [494.0, 472.0], 1.0, 60.0, 70));
-    let marble = paint([[32, 38, 92], [42, 50, 110], [54, 66, 130]], Pattern::Contours { wavelength: 110.0 }, 1.2, 71);
-    objects.push(ball([178.0, 372.0], [112.0, 112.0], 67.0, 30.0, marble));
-    for [x, y] in [[160.0, 330.0], [196.0, 326.0], [182.0, 366.0]] {
-        let depth = 67.0 + 30.0 * (1.0 - ((x - 178.0) * (x - 178.0) + (y - 372.0) * (y - 372.0)) / 12544.0);
-        objects.push(ball([x, y], [11.0, 11.0], depth + 2.0, 0.0, paint(INK, Pattern::Plain, 2.0, 72)));
-    }
+    objects.extend(pin([648.0, 424.0], [494.0, 472.0], 1.0, 66.0, 70));
+    objects.extend(bowling_ball([178.0, 372.0], 112.0, 67.0, 30.0));
     World { backdrop, objects }
+}
+
+/// A marbled ball with three finger holes.
+fn bowling_ball(centre: [f64; 2], radius: f64, level: f64, bulge: f64) -> [Surface; 4] {
+    let marble = paint([[32, 38, 92], [42, 50, 110], [54, 66, 130]], Pattern::Contours { wavelength: 110.0 }, 2.5, 71);
+    let hole = |dx: f64, dy: f64| {
+        let level = level + 2.0 + bulge * (1.0 - (dx * dx + dy * dy) / (radius * radius));
+        ball([centre[0] + dx, centre[1] + dy], [11.0, 11.0], level, 0.0, paint(INK, Pattern::Plain, 2.0, 72))
+    };
+    let whole = ball(centre, [radius, radius], level, bulge, marble);
+    [whole, hole(-18.0, -42.0), hole(18.0, -46.0), hole(4.0, -6.0)]
 }
 
 /// A pin with a red band about its neck.
@@ -241,7 +243,7 @@ fn pin(top: [f64; 2], bottom: [f64; 2], scale: f64, level: f64, seed: u32) -> [S
     let strip = Strip::new(top, bottom, half_width, SHAPE).sagging(5.0 * scale);
     let at = |t: f64| [0, 1].map(|i| top[i] + t * (bottom[i] - top[i]));
     let band = Strip::new(at(0.31), at(0.37), 0.4 * half_width, Profile::Bar).sagging(5.0 * scale);
-    let ivory = paint(IVORY, Pattern::Mottle { across: 60.0, along: 60.0 }, 1.5, seed);
+    let ivory = paint(IVORY, Pattern::Mottle { across: 60.0, along: 60.0 }, 2.5, seed);
     let red = paint([[150, 30, 36], [168, 40, 44], [186, 54, 56]], Pattern::Plain, 3.0, seed);
     [
         Surface::new(strip, Relief { level, bulge, ..Relief::default() }, ivory),
@@ -295,8 +297,8 @@ fn book(
     let relief = Relief { level, slant, ..Relief::default() };
     let cover = Surface::new(strip, relief, paint(ramp, Pattern::Cover, 2.5, seed));
     let thick = 14.0;
-    let edge = strip.beside(half_width + thick - 3.0, thick);
-    let level = level + slant[0] * (half_width + thick) - 4.0;
-    let relief = Relief { level, slant: [-0.3, slant[1]], ..Relief::default() };
+    let edge = strip.beside(half_width + thick - 5.0, thick);
+    let level = cover.disparity(edge.from[0], edge.from[1]) - 4.0;
+    let relief = Relief { level, slant: [slant[0] - 0.12, slant[1]], ..Relief::default() };
     [cover, Surface::new(edge, relief, paint(PAGES, Pattern::Mottle { across: 4.0, along: 90.0 }, 3.0, seed))]
 }

@@ -38,7 +38,7 @@ struct Bounds {
 #[derive(Clone, Copy)]
 pub(super) struct Strip {
     /// Start of the spine and the way to its end, [x, y].
-    from: [f64; 2],
+    pub(super) from: [f64; 2],
     way: [f64; 2],
     length: f64,
     /// Greatest half width in pixels.

@@ -30,6 +30,7 @@ pub(super) struct PrintedImage {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) disparity_true: u32,
+    #[cfg_attr(not(test), expect(dead_code, reason = "a test holds it against the scenes that are run"))]
     pub(super) scene: String,
 }
 

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use bp_core::{Algorithm, Backend, Energy, Matcher, Model, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels};
+use bp_core::{
+    Algorithm, Backend, Energy, Matcher, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels,
+};
 
 use crate::{
     failure::Failure,
     files::{PixelLimit, read_grey16},
-    interrupt::{self, ProgressBar},
     record::Labelling,
     scenes::Manifest,
 };
@@ -21,13 +22,12 @@ const METHODS: [&str; 6] = ["ICM", "BP-S", "BP-M", "Swap", "Expansion", "TRW-S"]
 const LOOPS: u32 = 75;
 
 /// All labellings of all three scenes; none where the data folder does not hold them.
-pub(crate) fn compare(folder: &Path, bar: &ProgressBar) -> Result<Vec<Labelling>, Failure> {
+pub(super) fn compare(folder: &Path, observer: &mut Observer<'_>) -> Result<Vec<Labelling>, Failure> {
     let mut labellings = Vec::new();
     if !folder.join("mrf-benchmark").is_dir() {
         return Ok(labellings);
     }
     for scene in SCENES {
-        interrupt::check()?;
         let pair = load_pair(folder, scene)?;
         let model = Model::new(Profile::Mrf, LABELS)?;
         let mut add = |method: &str, ours: bool, labels: &[u16]| -> Result<(), Failure> {
@@ -43,7 +43,7 @@ pub(crate) fn compare(folder: &Path, bar: &ProgressBar) -> Result<Vec<Labelling>
         let settings = Algorithm::Bp.settings(pair.size(), LOOPS, 1, Schedule::Checkerboard);
         let device = bp_cpu_scalar::Scalar.open(0)?;
         let mut matcher = Matcher::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
-        matcher.solve_observed(&pair, &mut |progress| bar.update(progress.done))?;
+        matcher.solve_observed(&pair, observer)?;
         add(&format!("BP, {LOOPS} checkerboard loops"), true, matcher.labels())?;
     }
     Ok(labellings)

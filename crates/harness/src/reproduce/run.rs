@@ -36,9 +36,11 @@ pub(crate) fn run(source: &Source, storage: &mut Storage) -> Result<(), Failure>
         bar.resume_at(done(storage.record()));
         run_scene(&scene, storage, &bar)?;
     }
-    if let Some(folder) = source.folder().filter(|_| storage.record().labellings.is_empty()) {
+    let quick = storage.record().run.quick;
+    if let Some(folder) = source.folder().filter(|_| !quick && storage.record().labellings.is_empty()) {
         bar.message("outside energies".to_owned());
-        storage.record_mut().labellings = energies::compare(folder, &bar)?;
+        let record = storage.record().clone();
+        storage.record_mut().labellings = energies::compare(folder, &mut |_| bar.update(done(&record)))?;
     }
     bar.finish();
     storage.record_mut().complete = true;

@@ -1,0 +1,268 @@
+//! The program as its users meet it: options, files, messages, exit codes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+const WIDTH: u32 = 40;
+const HEIGHT: u32 = 24;
+const SHIFT: u32 = 5;
+
+/// A folder with a pair whose right view is shifted by 5 px, and its ground truth, twice the disparity.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
+        let view = |shift: u32| image::GrayImage::from_fn(WIDTH, HEIGHT, |x, y| image::Luma([noise(x + shift, y)]));
+        view(0).save(folder.path("left.png")).unwrap();
+        view(SHIFT).save(folder.path("right.png")).unwrap();
+        view(SHIFT).save(folder.path("right.pgm")).unwrap();
+        image::GrayImage::from_pixel(WIDTH, HEIGHT, image::Luma([10])).save(folder.path("truth.png")).unwrap();
+        image::GrayImage::from_pixel(WIDTH + 1, HEIGHT, image::Luma([10])).save(folder.path("wide.png")).unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        let words = arguments.split_whitespace();
+        Command::new(env!("CARGO_BIN_EXE_bp"))
+            .args(words)
+            .current_dir(self.0.path())
+            .env_remove("BP_DATA")
+            .output()
+            .unwrap()
+    }
+
+    fn json(&self, arguments: &str) -> Value {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Asserts an exit code and that the message has all of `words`; that no panic and no file is left.
+    fn fails(&self, arguments: &str, code: i32, words: &[&str]) {
+        let before = listing(self.0.path());
+        let output = self.run(arguments);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {message}");
+        assert!(words.iter().all(|word| message.contains(word)), "{arguments}: {message}");
+        assert!(!message.contains("panicked"), "{message}");
+        assert_eq!(listing(self.0.path()), before, "{arguments} left a file");
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn listing(folder: &Path) -> Vec<PathBuf> {
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths
+}
+
+const MATCH: &str = "match left.png right.png --labels 12 --output";
+
+#[test]
+fn a_shifted_pair_is_matched_and_evaluated_in_every_format() {
+    let folder = Folder::new();
+    let truth = "--ground-truth truth.png --ground-truth-right truth.png --scale 2";
+    for (algorithm, output) in
+        [("bp", "a.pfm"), ("cfbp", "b.png"), ("cfcsbp", "c.PFM"), ("ctbp", "d.png"), ("ctcsbp", "e.pfm")]
+    {
+        let report = folder.json(&format!("{MATCH} {output} --algorithm {algorithm} {truth} --json"));
+        let bad = report["errors"]["visible"]["bad"][1].as_f64().unwrap();
+        assert!(bad < 2.0, "{algorithm}: {bad} % of visible pixels");
+        assert_eq!(report["algorithm"], algorithm);
+        let again =
+            folder.json(&format!("evaluate {output} truth.png --ground-truth-right truth.png --scale 2 --json"));
+        assert_eq!(again["visible"]["bad"], report["errors"]["visible"]["bad"], "{output}");
+    }
+    assert_eq!(folder.run("match left.png right.pgm -o f.png --picture p.png --labels 12").status.code(), Some(0));
+    assert_eq!(image::open(folder.path("p.png")).unwrap().color(), image::ColorType::Rgb8);
+    let stored = image::open(folder.path("b.png")).unwrap().into_luma16();
+    assert_eq!(stored.get_pixel(30, 12).0, [256 * SHIFT as u16]);
+}
+
+#[test]
+fn text_output_tells_size_labels_stages_memory_energy_and_errors() {
+    let folder = Folder::new();
+    let output = folder.run(&format!("{MATCH} a.png --ground-truth truth.png --scale 2 --messages-hash"));
+    let text = text(&output.stdout);
+    let words = ["40x24", "12 labels", "match_cost", "update_messages", "MiB", "smoothness", "sha256", "RMSE", "a.png"];
+    assert!(words.iter().all(|word| text.contains(word)), "{text}");
+}
+
+#[test]
+fn settings_change_what_they_say() {
+    let folder = Folder::new();
+    let run = |options: &str| folder.json(&format!("{MATCH} a.pfm --json --messages-hash {options}"));
+    let steps = |options: &str| {
+        let report = run(options);
+        (report["grids"].as_u64().unwrap(), report["steps_per_grid"].as_u64().unwrap())
+    };
+    assert_eq!(steps("--algorithm bp"), (1, 12));
+    assert_eq!(steps("--algorithm bp --loops 7 --schedule checkerboard"), (1, 14));
+    assert_eq!(steps("--algorithm cfbp --loops 30"), (5, 5));
+    assert_eq!(steps("--algorithm cfcsbp --loops 30 --z 5"), (5, 1));
+    assert_eq!(steps("--algorithm ctcsbp --loops 30 --z 4"), (1, 7));
+    assert_eq!(steps("--algorithm cfbp --grids 3 --loops 4"), (3, 4));
+    assert_eq!(steps("--algorithm cfcsbp --grids 3 --half-steps 5"), (3, 5));
+    assert_eq!(run("--half-steps 5")["schedule"], "checkerboard");
+    let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
+    assert_eq!(hash(""), hash(""));
+    let default = hash("--algorithm cfbp --grids 3 --loops 1");
+    for other in ["--message-start sender", "--slope 1", "--truncation 5", "--profile mrf", "--min-disparity -2"] {
+        assert_ne!(hash(&format!("--algorithm cfbp --grids 3 --loops 1 {other}")), default, "{other}");
+    }
+    let seeded = "--algorithm ctbp --loops 1 --profile mrf --seed-start";
+    assert_ne!(hash(&format!("{seeded} on")), hash(&format!("{seeded} off")));
+}
+
+#[test]
+fn a_negative_least_disparity_swaps_the_views() {
+    let folder = Folder::new();
+    let swapped = "match right.png left.png --labels 12 --min-disparity -8 --output a.pfm";
+    assert_eq!(folder.run(swapped).status.code(), Some(0));
+    let report = folder.json("evaluate a.pfm a.pfm --json");
+    assert_eq!(report["all"]["rmse"], 0.0);
+    let bytes = fs::read(folder.path("a.pfm")).unwrap();
+    let values = bytes[bytes.len() - 4 * (WIDTH * HEIGHT) as usize..].chunks_exact(4);
+    let right = values.filter(|value| f32::from_le_bytes([value[0], value[1], value[2], value[3]]) == -5.0).count();
+    assert!(right as u32 > WIDTH * HEIGHT * 3 / 4, "{right}");
+    folder.fails("match right.png left.png --labels 12 --min-disparity -8 --output b.png", 2, &["b.png", ".pfm"]);
+}
+
+#[test]
+fn contradictory_options_are_usage_errors_that_name_them() {
+    let folder = Folder::new();
+    for (options, words) in [
+        ("--grids 3", ["--grids", "--loops"]),
+        ("--algorithm bp --grids 3 --loops 2", ["--grids", "cfbp"]),
+        ("--algorithm bp --z 3", ["--z", "cfcsbp"]),
+        ("--z 3 --half-steps 5", ["--z", "--half-steps"]),
+        ("--algorithm cfbp --seed-start off", ["--seed-start", "ctbp"]),
+        ("--algorithm bp --message-start sender", ["--message-start", "cfbp"]),
+        ("--half-steps 3 --schedule sync", ["--half-steps", "checkerboard"]),
+        ("--half-steps 3 --loops 2", ["--half-steps", "--loops"]),
+        ("--truncation 64", ["--truncation", "63"]),
+        ("--labels 0", ["--labels", "1024"]),
+        ("--labels 100000", ["--labels", "1024"]),
+        ("--loops 0", ["--loops", "0"]),
+        ("--min-disparity 99999999", ["least disparity", "99999999"]),
+        ("--mask truth.png", ["--mask", "--ground-truth"]),
+        ("--algorithm magic", ["--algorithm", "magic"]),
+        ("--scale 0 --ground-truth truth.png", ["--scale", "above 0"]),
+    ] {
+        folder.fails(&format!("match left.png right.png --output a.png {options}"), 2, &words);
+    }
+    folder.fails("match left.png right.png --output a.jpg", 2, &["a.jpg", ".pfm"]);
+    folder.fails("match left.png right.png --output a.png --backend magic", 5, &["--backend", "magic", "scalar"]);
+}
+
+#[test]
+fn bad_input_names_the_file() {
+    let folder = Folder::new();
+    let whole = fs::read(folder.path("left.png")).unwrap();
+    fs::write(folder.path("cut.png"), &whole[..whole.len() / 2]).unwrap();
+    fs::write(folder.path("text.png"), "not an image").unwrap();
+    fs::write(folder.path("empty.png"), "").unwrap();
+    fs::write(folder.path("huge.pgm"), "P5\n60000 60000\n255\n").unwrap();
+    fs::write(folder.path("none.pgm"), "P5\n0 5\n255\n").unwrap();
+    fs::create_dir(folder.path("folder.png")).unwrap();
+    for (file, word) in [
+        ("missing.png", "No such file"),
+        ("cut.png", ""),
+        ("text.png", "not an image"),
+        ("empty.png", "not an image"),
+        ("huge.pgm", "--max-megapixels"),
+        ("none.pgm", ""),
+        ("folder.png", "folder"),
+    ] {
+        folder.fails(&format!("match left.png {file} --output a.png"), 3, &[file, word]);
+        folder.fails(&format!("evaluate {file} truth.png"), 3, &[file, word]);
+    }
+    folder.fails("match left.png wide.png --output a.png", 3, &["left.png", "wide.png", "40x24", "41x24"]);
+    folder.fails("match left.png right.png -o a.png --ground-truth wide.png", 3, &["wide.png", "41x24"]);
+    folder.fails("evaluate left.png wide.png", 3, &["left.png", "wide.png", "41x24"]);
+    folder.fails("match left.png right.png -o a.png --max-megapixels 0", 3, &["left.png", "--max-megapixels"]);
+    folder.fails("reproduce --data nowhere", 3, &["nowhere", "middlebury2006"]);
+}
+
+#[test]
+fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
+    let folder = Folder::new();
+    folder.fails(&format!("{MATCH} no/such/a.png"), 1, &["no/such/a.png"]);
+    fs::create_dir(folder.path("taken.png")).unwrap();
+    folder.fails(&format!("{MATCH} taken.png"), 1, &["taken.png", "folder"]);
+    if Path::new("/dev/full").exists() {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let status = Command::new(env!("CARGO_BIN_EXE_bp"))
+            .args("evaluate truth.png truth.png".split(' '))
+            .current_dir(folder.0.path())
+            .stdout(full)
+            .output()
+            .unwrap();
+        assert_eq!(status.status.code(), Some(1), "{}", text(&status.stderr));
+        assert!(text(&status.stderr).contains("standard output"));
+    }
+}
+
+#[test]
+fn more_memory_than_there_is_is_refused_before_it_is_taken() {
+    let folder = Folder::new();
+    fs::write(folder.path("big.pgm"), [b"P5\n20000 4000\n255\n".as_slice(), &vec![0; 80_000_000]].concat()).unwrap();
+    folder.fails("match big.pgm big.pgm -o a.png --labels 1024", 6, &["bytes are needed", "--labels"]);
+}
+
+#[test]
+fn more_labels_than_columns_are_matched_with_a_warning() {
+    let folder = Folder::new();
+    let output = folder.run("match left.png right.png -o a.png --labels 60");
+    assert!(output.status.success() && text(&output.stderr).contains("warning: 60 labels"));
+}
+
+#[test]
+fn unanswered_pixels_are_counted_apart() {
+    let folder = Folder::new();
+    let half = |x: u32| image::Luma([if x < WIDTH / 2 { 0 } else { 10 }]);
+    image::GrayImage::from_fn(WIDTH, HEIGHT, |x, _| half(x)).save(folder.path("half.png")).unwrap();
+    let report = folder.json("evaluate half.png truth.png --scale 2 --map-scale 2 --json");
+    assert_eq!((&report["all"]["known"], &report["all"]["answered"]), (&Value::from(960), &Value::from(480)));
+    assert_eq!(
+        (&report["all"]["bad"][1], &report["all"]["bad_or_unanswered"][1]),
+        (&Value::from(0.0), &Value::from(50.0))
+    );
+    let masked = folder.json("evaluate truth.png truth.png --scale 2 --map-scale 1 --mask half.png --json");
+    assert_eq!(masked["visible"]["known"], 0);
+    assert!(text(&folder.run("evaluate half.png truth.png").stdout).contains("unanswered counted wrong"));
+}
+
+#[test]
+fn sixteen_bits_and_colours_are_read() {
+    let folder = Folder::new();
+    let grey = image::open(folder.path("left.png")).unwrap();
+    let wide = image::ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| {
+        image::Luma([u16::from(grey.as_luma8().unwrap().get_pixel(x, y).0[0]) * 257])
+    });
+    wide.save(folder.path("left16.png")).unwrap();
+    grey.to_rgba8().save(folder.path("left_rgba.png")).unwrap();
+    grey.to_rgb8().save(folder.path("left.ppm")).unwrap();
+    let hash = |left: &str| {
+        folder.json(&format!("match {left} right.png -o a.png --labels 12 --json --messages-hash"))["messages_sha256"]
+            .clone()
+    };
+    for other in ["left16.png", "left_rgba.png", "left.ppm"] {
+        assert_eq!(hash(other), hash("left.png"), "{other}");
+    }
+}

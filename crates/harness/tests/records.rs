@@ -1,0 +1,90 @@
+//! Recorded runs and what is shown of them.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use harness::record::{Outcome, Record};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The folders under `results` that hold a record.
+fn runs() -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.join(harness::report::record_file()).exists()).collect()
+}
+
+fn read(run: &Path) -> String {
+    fs::read_to_string(run.join(harness::report::record_file())).unwrap()
+}
+
+#[test]
+fn the_schema_in_the_repository_is_that_of_the_program() {
+    let current = serde_json::to_value(schemars::schema_for!(Record)).unwrap();
+    let committed = fs::read_to_string(root().join("results/schema.json")).unwrap();
+    let committed: serde_json::Value = serde_json::from_str(&committed).unwrap();
+    assert!(current == committed, "run: cargo run -p harness --example schema > results/schema.json");
+}
+
+#[test]
+fn committed_records_fit_the_schema_and_are_whole() {
+    let schema = fs::read_to_string(root().join("results/schema.json")).unwrap();
+    let validator = jsonschema::validator_for(&serde_json::from_str(&schema).unwrap()).unwrap();
+    let runs = runs();
+    assert!(runs.len() >= 2, "the real and the synthetic scenes are recorded");
+    for run in runs {
+        let text = read(&run);
+        let errors: Vec<_> =
+            validator.iter_errors(&serde_json::from_str(&text).unwrap()).map(|e| e.to_string()).collect();
+        assert!(errors.is_empty(), "{}: {errors:?}", run.display());
+        let record: Record = serde_json::from_str(&text).unwrap();
+        assert!(record.complete && record.program.clean_tree, "{}", run.display());
+        for cell in &record.cells {
+            let Outcome::Measured(measured) = &cell.outcome else { panic!("{} {}", cell.scene, cell.plan) };
+            assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
+            assert!(measured.allocated_bytes.abs_diff(cell.planned_bytes) * 1000 < cell.planned_bytes);
+        }
+    }
+}
+
+/// The README shows what the record says.
+#[test]
+fn the_readme_is_made_from_a_record() {
+    let text = fs::read_to_string(root().join("README.md")).unwrap();
+    let (_, rest) = text.split_once("--readme README.md` from `").expect("the note below the README's table");
+    let (record, _) = rest.split_once('`').unwrap();
+    let run = Path::new(record).parent().unwrap();
+    let renewed = harness::report::renewed_readme(&text, &root().join(run), run);
+    assert!(renewed.as_deref() == Some(&text), "run: cargo run -- report {} --readme README.md", run.display());
+}
+
+/// Prototypes of the same models in single precision, measured on the same six images at half size: visible pixels and
+/// all pixels wrong by more than 1 px in percent, and the root mean squared error.
+#[test]
+fn recorded_accuracy_is_that_of_the_prototypes() {
+    let expected = [
+        ("bp", [24.0, 32.1, 16.4]),
+        ("cfbp", [23.4, 31.7, 16.4]),
+        ("cfcsbp", [23.4, 31.7, 16.2]),
+        ("ctbp", [24.2, 32.3, 16.4]),
+        ("ctcsbp", [25.1, 33.2, 16.5]),
+        ("census", [5.6, 13.3, 9.5]),
+    ];
+    let records = runs().into_iter().map(|run| serde_json::from_str::<Record>(&read(&run)).unwrap());
+    let real: Vec<Record> = records.filter(|record| record.run.data == "middlebury2006").collect();
+    assert!(!real.is_empty());
+    for (record, (plan, expected)) in real.iter().flat_map(|record| expected.map(|plan| (record, plan))) {
+        let cells = record.cells.iter().filter(|cell| cell.plan == plan);
+        let measured: Vec<_> = cells.filter_map(|cell| cell.measured()).collect();
+        let mean = |value: fn(&harness::record::Measurement) -> f64| {
+            measured.iter().map(|measured| value(measured)).sum::<f64>() / measured.len() as f64
+        };
+        let found = [mean(|m| m.visible.bad[1]), mean(|m| m.all.bad[1]), mean(|m| m.all.rmse)];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found / expected - 1.0).abs() < 0.1, "{plan}: {found} where prototypes had {expected}");
+        }
+    }
+}

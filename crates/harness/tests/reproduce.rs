@@ -1,0 +1,102 @@
+//! A whole quick run on the synthetic scenes: interrupted, killed, gone on with, and complete in the end.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread::sleep,
+    time::Duration,
+};
+
+use harness::record::Record;
+
+fn start(results: &Path) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_bp"))
+        .args(["reproduce", "--quick", "--synthetic", "--machine", "test", "--results"])
+        .arg(results)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+fn run_folders(results: &Path) -> Vec<PathBuf> {
+    fs::read_dir(results).unwrap().map(|entry| entry.unwrap().path()).collect()
+}
+
+fn record(folder: &Path) -> Record {
+    serde_json::from_str(&fs::read_to_string(folder.join("record.json")).unwrap()).unwrap()
+}
+
+fn measured(record: &Record) -> usize {
+    record.cells.iter().filter(|cell| cell.measured().is_some()).count()
+}
+
+/// Waits until the run has measured more than `count` cells.
+fn wait_for_more(results: &Path, count: usize) {
+    for _ in 0..600 {
+        sleep(Duration::from_millis(100));
+        let record = run_folders(results).first().map(|folder| folder.join("record.json")).filter(|path| path.exists());
+        if record.is_some_and(|path| measured(&self::record(path.parent().unwrap())) > count) {
+            return;
+        }
+    }
+    panic!("nothing was measured within a minute");
+}
+
+#[test]
+fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
+    let results = tempfile::tempdir().unwrap();
+    let results = results.path();
+    let mut child = start(results);
+    wait_for_more(results, 1);
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let interrupted = record(&run_folders(results)[0]);
+
+    let mut child = start(results);
+    wait_for_more(results, measured(&interrupted) + 1);
+    child.kill().unwrap();
+    child.wait().unwrap();
+
+    assert!(start(results).wait().unwrap().success());
+    let folders = run_folders(results);
+    assert_eq!(folders.len(), 1, "an interrupted run is gone on with, not begun anew");
+    let complete = record(&folders[0]);
+    assert!(complete.complete && measured(&complete) == complete.cells.len());
+    for cell in interrupted.cells.iter().filter(|cell| cell.measured().is_some()) {
+        assert!(complete.cells.contains(cell), "{} {} was run again", cell.scene, cell.plan);
+    }
+    check_report(&folders[0]);
+
+    assert_eq!(begin_and_stop(start(results)), Some(130));
+    assert_eq!(run_folders(results).len(), 2, "a complete run is never written over");
+    assert_eq!(record(&folders[0]), complete);
+}
+
+/// Lets a run begin, then stops it.
+fn begin_and_stop(mut child: Child) -> Option<i32> {
+    sleep(Duration::from_millis(700));
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    child.wait().unwrap().code()
+}
+
+fn check_report(folder: &Path) {
+    let markdown = fs::read_to_string(folder.join("REPORT.md")).unwrap();
+    let html = fs::read_to_string(folder.join("report.html")).unwrap();
+    let ours = ["3.25a", "3.30", "3.31", "A.1"].map(str::to_owned);
+    for number in (1..=29).map(|i| format!("3.{i}")).chain(ours) {
+        assert!(markdown.contains(&format!("### Table {number}: ")), "Table {number}");
+        assert!(html.contains(&format!("Table {number}: ")), "Table {number}");
+    }
+    let diagrams = (1..=14).map(|i| format!("diagram-4.{i}"));
+    for name in diagrams.chain((2..=6).map(|i| format!("figure-3.{i}"))) {
+        let svg = fs::read_to_string(folder.join(format!("{name}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("<title"), "{name}");
+        assert!(markdown.contains(&format!("({name}.svg)")) && html.contains(&format!("id=\"{name}\"")), "{name}");
+    }
+    assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
+    assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
+    assert!(!html.contains("src=\"http") && !html.contains("<script"), "one self-contained page");
+}
