@@ -60,13 +60,23 @@ impl Source {
         self.folder.as_deref()
     }
 
-    /// What the scenes are, in words.
+    /// What the scenes of a set are, in words.
     pub(crate) fn describe(name: &str) -> &'static str {
         match name {
             "middlebury2006" => "the thesis's six Middlebury scenes at half size, the thesis's own sizes",
             "middlebury2006-thirdsize" => "the thesis's six Middlebury scenes at third size, smaller than the thesis's",
             "synthetic" => "six synthetic scenes of the thesis's sizes; not the thesis's images",
             _ => "six synthetic scenes at half of the thesis's sizes; not the thesis's images",
+        }
+    }
+
+    /// The same in few words, for every table and chart.
+    pub(crate) fn short(name: &str) -> &'static str {
+        match name {
+            "middlebury2006" => "Middlebury 2005/2006, half size",
+            "middlebury2006-thirdsize" => "Middlebury 2005/2006, third size",
+            "synthetic" => "synthetic scenes",
+            _ => "synthetic scenes, small",
         }
     }
 

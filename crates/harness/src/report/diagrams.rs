@@ -129,7 +129,7 @@ fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series
         reference,
         categories: results.scenes().map(|(_, scene)| scene.name.clone()).collect(),
         series,
-        title,
+        title: format!("{title} ({})", results.setting()),
     }
 }
 

@@ -15,9 +15,10 @@ use crate::{
     files::{PixelLimit, colour, encode_picture, read_map},
 };
 
-/// Space around and between maps, and for a map's name, in pixels of the drawing.
+/// Space around and between maps, and for words and the bar, in pixels of the drawing.
 const GAP: usize = 14;
 const NAME_HEIGHT: usize = 24;
+const TITLE_HEIGHT: usize = 30;
 const BAR_HEIGHT: usize = 64;
 /// Maps a row.
 const ACROSS: usize = 3;
@@ -44,8 +45,9 @@ fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> R
     let title = format!("Figure {number}: disparity maps of {}", plan.title);
     Ok(Drawing {
         name: format!("figure-{number}"),
-        caption: format!("Colours from 0 to {last} px; every second pixel. On {}.", results.data()),
-        svg: draw(&title, &maps, last as f32).map_err(|error| Failure::other(format!("figure {number}: {error}")))?,
+        caption: format!("Colours from 0 to {last} px; every second pixel. Data: {}.", results.setting()),
+        svg: draw(&format!("{title} ({})", results.setting()), &maps, last as f32)
+            .map_err(|error| Failure::other(format!("figure {number}: {error}")))?,
         title,
         table: None,
     })
@@ -67,14 +69,14 @@ fn draw(title: &str, maps: &[(&str, Option<DisparityMap>)], last: f32) -> Result
     };
     let down = maps.len().div_ceil(ACROSS);
     let (width, row_height) = (ACROSS * (cell.width + GAP) + GAP, cell.height + GAP + NAME_HEIGHT);
-    let height = down * row_height + GAP + BAR_HEIGHT;
+    let height = TITLE_HEIGHT + down * row_height + GAP + BAR_HEIGHT;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          role=\"img\" font-family=\"sans-serif\" font-size=\"15\"><title>{title}</title>\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>"
+         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/><text x=\"{GAP}\" y=\"26\">{title}</text>"
     );
     for (i, (name, map)) in maps.iter().enumerate() {
-        let (x, y) = (GAP + i % ACROSS * (cell.width + GAP), GAP + i / ACROSS * row_height);
+        let (x, y) = (GAP + i % ACROSS * (cell.width + GAP), TITLE_HEIGHT + GAP + i / ACROSS * row_height);
         let _ = write!(svg, "<text x=\"{x}\" y=\"{}\">{name}</text>", y + NAME_HEIGHT - 8);
         let y = y + NAME_HEIGHT;
         match map {

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
     Drawing, Report,
-    markdown::{facts, heading, title},
+    markdown::{facts, heading, notes, title},
     tables::Table,
 };
 
@@ -19,6 +19,7 @@ nav ul { columns: 24rem; padding-left: 1.2rem; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
 th { vertical-align: bottom; white-space: normal; min-width: 4rem; }
+th:first-child { min-width: 1rem; }
 td.text, th.text { text-align: left; }
 tbody tr:nth-child(even) { background: var(--soft); }
 .beside { display: flex; flex-wrap: wrap; gap: 1.5rem; align-items: flex-start; }
@@ -42,7 +43,7 @@ pub(super) fn page(report: &Report<'_>) -> String {
                 ul { @for fact in facts(report) { li { (fact) } } }
                 nav { (contents(report)) }
                 h2 { "Tables" }
-                @for table in &report.tables { (section(table)) }
+                @for table in &report.tables { (section(report, table)) }
                 h2 { "Figures" }
                 @for figure in &report.figures { (drawing(figure)) }
                 h2 { "Diagrams" }
@@ -69,11 +70,11 @@ fn contents(report: &Report<'_>) -> Markup {
     }
 }
 
-fn section(table: &Table) -> Markup {
+fn section(report: &Report<'_>, table: &Table) -> Markup {
     html! {
         section id={ "table-" (table.number) } {
             h3 { (heading(table)) }
-            @if !table.note.is_empty() { p { (table.note) } }
+            p { (notes(report, table)) }
             (grid(table))
         }
     }

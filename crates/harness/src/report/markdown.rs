@@ -12,7 +12,7 @@ pub(super) fn page(report: &Report<'_>) -> String {
     }
     text += "\n## Tables\n\n";
     for table in &report.tables {
-        text += &section(table);
+        text += &section(report, table);
     }
     text += "## Figures\n\n";
     report.figures.iter().for_each(|figure| text += &drawing(figure));
@@ -63,14 +63,19 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
     facts
 }
 
+/// What stands under a table's heading: its data, and what a reader must know.
+pub(super) fn notes(report: &Report<'_>, table: &Table) -> String {
+    let data = table.data.clone().unwrap_or_else(|| report.results.setting());
+    format!("Data: {data}. {}", table.note).trim_end().to_owned()
+}
+
 /// A table's heading.
 pub(super) fn heading(table: &Table) -> String {
     format!("Table {}: {}", table.number, table.title)
 }
 
-fn section(table: &Table) -> String {
-    let note = if table.note.is_empty() { String::new() } else { format!("{}\n\n", table.note) };
-    format!("### {}\n\n{note}{}\n", heading(table), grid(table))
+fn section(report: &Report<'_>, table: &Table) -> String {
+    format!("### {}\n\n{}\n\n{}\n", heading(table), notes(report, table), grid(table))
 }
 
 /// The lines of a table.

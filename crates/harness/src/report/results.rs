@@ -58,6 +58,13 @@ impl<'a> Results<'a> {
     pub(super) fn data(&self) -> &'static str {
         Source::describe(&self.record.run.data)
     }
+
+    /// Images, labels and loops, for every table and chart.
+    pub(super) fn setting(&self) -> String {
+        let run = &self.record.run;
+        let quick = if run.quick { "quick run, " } else { "" };
+        format!("{quick}{}, L = {}, k = {}", Source::short(&run.data), run.labels, run.k)
+    }
 }
 
 /// A scene on a backend.

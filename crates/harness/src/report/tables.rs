@@ -14,6 +14,8 @@ pub(super) struct Table {
     pub(super) number: String,
     /// Its heading.
     pub(super) title: String,
+    /// What it was measured on, where that is not the run's six scenes.
+    pub(super) data: Option<String>,
     /// What a reader must know to read it.
     pub(super) note: String,
     pub(super) columns: Vec<String>,

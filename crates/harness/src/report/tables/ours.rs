@@ -62,5 +62,6 @@ pub(super) fn energies(results: &Results<'_>) -> Option<Table> {
                 cheapest label of each pixel (WTA); their energies are computed here from the maps. Ours runs plain BP \
                 with the checkerboard schedule.";
     let columns = ["scene", "method", "labels by", "energy", "data", "smoothness"];
-    Some(Table::new("A.2", "Energies beside those of other optimisers (ours)", &columns).note(note).rows(rows))
+    let table = Table::new("A.2", "Energies beside those of other optimisers (ours)", &columns).note(note).rows(rows);
+    Some(Table { data: Some("Middlebury 2001 and 2003 (tsukuba, venus, teddy), L = 16".to_owned()), ..table })
 }
