@@ -135,7 +135,7 @@ pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
     let view = |right: bool| {
         let pixel = |i: usize| {
             let shift = if right { (i % width / 4 + i / width / 4) % 3 } else { 0 };
-            let unmatched = right && i % 5 == 0;
+            let unmatched = right && i.is_multiple_of(5);
             let [r, g, b, ..] = hash(if unmatched { !(i as u64) } else { (i + shift) as u64 }).to_le_bytes();
             [r, g, b]
         };

@@ -1,4 +1,5 @@
 //! The program as its users meet it: options, files, messages, exit codes.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
     fs,

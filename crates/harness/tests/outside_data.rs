@@ -1,5 +1,6 @@
 //! Against public data and labellings that others computed. Needs `BP_DATA`: without it these tests do nothing and say
 //! so; with it, missing data is a failure.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{collections::BTreeMap, path::PathBuf, process::Command};
 

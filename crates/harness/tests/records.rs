@@ -1,4 +1,5 @@
 //! Recorded runs and what is shown of them.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
     fs,

@@ -1,4 +1,5 @@
 //! A whole quick run on the synthetic scenes: interrupted, killed, gone on with, and complete in the end.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
     fs,

@@ -31,6 +31,8 @@ pub(crate) struct Series {
     pub(crate) name: String,
     /// Whether the thesis printed the values: drawn hollow, ours are filled.
     pub(crate) printed: bool,
+    /// Number of its colour and shape; a printed series may share that of ours.
+    pub(crate) style: usize,
     /// One a category, `None` where there is no value.
     pub(crate) points: Vec<Option<Point>>,
 }
@@ -66,7 +68,7 @@ impl Chart {
     /// The series with their styles; after each 8, the same colours take the shapes that follow.
     fn styled(&self) -> impl Iterator<Item = Styled<'_>> {
         let style = |i: usize| (STYLES[i % STYLES.len()].0, STYLES[(i + i / STYLES.len()) % STYLES.len()].1);
-        self.series.iter().enumerate().map(move |(i, series)| (series, style(i)))
+        self.series.iter().map(move |series| (series, style(series.style)))
     }
 
     fn reference(&self) -> Option<f64> {
@@ -342,7 +344,8 @@ mod tests {
     fn chart(logarithmic: bool, values: &[f64]) -> Chart {
         let points =
             values.iter().map(|&value| Some(Point { value, low: 0.9 * value, high: 1.1 * value })).chain([None]);
-        let series = |name: &str, printed| Series { name: name.into(), printed, points: points.clone().collect() };
+        let series =
+            |name: &str, printed| Series { name: name.into(), printed, style: 0, points: points.clone().collect() };
         Chart {
             title: "Speed & <memory>".into(),
             description: "\"All\" > none".into(),

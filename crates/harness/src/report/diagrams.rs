@@ -5,48 +5,49 @@ use super::{
     chart::{Chart, Point, Series},
     format::{Spread, mebibytes, number},
     results::{Part, Results, Row},
-    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table},
+    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family},
 };
 use crate::{failure::Failure, record::Measurement};
 
+/// Number of a diagram, and of the table that it belongs to.
+type Numbers = (&'static str, &'static str);
+
 /// All diagrams, in order.
 pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
-    let families: [(&[Named], &str, [(&str, &str); 3]); 4] = [
-        (&[CFBP], "CFBP", [("4.1", "3.18"), ("4.2", "3.19"), ("4.3", "3.20")]),
-        (&[CFCSBP], "CFCSBP", [("4.4", "3.21"), ("4.5", "3.22"), ("4.6", "3.23")]),
-        // The thesis has two diagrams here, not three: CTBP's memory equals BP's.
-        (&[CTBP], "CTBP", [("4.7", "3.24"), ("", ""), ("4.8", "3.25")]),
-        (&CTCSBP, "CTCSBP", [("4.9", "3.26"), ("4.10", "3.27"), ("4.11", "3.28")]),
-    ];
-    let mut drawings = Vec::new();
-    for (plans, family, [speed, memory, reliability]) in families {
-        let with_bp: Vec<Named> = std::iter::once(BP).chain(plans.iter().copied()).collect();
-        drawings.push(speed_ups(
-            results,
-            speed,
-            &format!("{family} against BP"),
-            plans,
-            &[Part::MessagePassing, Part::Total],
-        )?);
-        if !memory.0.is_empty() {
-            drawings.push(memories(results, memory, &format!("{family} against BP"), &with_bp)?);
-        }
-        drawings.push(errors(results, reliability, &format!("{family} against BP"), &with_bp)?);
-    }
-    let four: Vec<Named> = vec![CFBP, CFCSBP, CTBP, CTCSBP[0]];
-    let five: Vec<Named> = std::iter::once(BP).chain(four.iter().copied()).collect();
+    let mut drawings = against_bp(results, &[CFBP], ("4.1", "3.18"), Some(("4.2", "3.19")), ("4.3", "3.20"))?;
+    drawings.extend(against_bp(results, &[CFCSBP], ("4.4", "3.21"), Some(("4.5", "3.22")), ("4.6", "3.23"))?);
+    // The thesis has two diagrams here, not three: CTBP's memory equals BP's.
+    drawings.extend(against_bp(results, &[CTBP], ("4.7", "3.24"), None, ("4.8", "3.25"))?);
+    drawings.extend(against_bp(results, &CTCSBP, ("4.9", "3.26"), Some(("4.10", "3.27")), ("4.11", "3.28"))?);
+    let four = [CFBP, CFCSBP, CTBP, CTCSBP[0]];
+    let five = [BP, CFBP, CFCSBP, CTBP, CTCSBP[0]];
     drawings.push(speed_ups(results, ("4.12", "3.29"), "All algorithms against BP", &four, &[Part::Total])?);
     drawings.push(memories(results, ("4.13", "3.30"), "All algorithms", &five)?);
     drawings.push(errors(results, ("4.14", "3.31"), "All algorithms", &five)?);
     Ok(drawings)
 }
 
-/// Number of a diagram, and of the table that it belongs to.
-type Numbers<'a> = (&'a str, &'a str);
+/// Speed, memory and reliability of one algorithm.
+fn against_bp(
+    results: &Results<'_>,
+    plans: &[Named],
+    speed: Numbers,
+    memory: Option<Numbers>,
+    reliability: Numbers,
+) -> Result<Vec<Drawing>, Failure> {
+    let what = format!("{} against BP", family(plans));
+    let with_bp: Vec<Named> = std::iter::once(BP).chain(plans.iter().copied()).collect();
+    let mut drawings = vec![speed_ups(results, speed, &what, plans, &[Part::MessagePassing, Part::Total])?];
+    if let Some(memory) = memory {
+        drawings.push(memories(results, memory, &what, &with_bp)?);
+    }
+    drawings.push(errors(results, reliability, &what, &with_bp)?);
+    Ok(drawings)
+}
 
 fn speed_ups(
     results: &Results<'_>,
-    numbers: Numbers<'_>,
+    numbers: Numbers,
     what: &str,
     plans: &[Named],
     parts: &[Part],
@@ -58,20 +59,27 @@ fn speed_ups(
                 Part::MessagePassing => format!("{}: message passing", plan.title),
                 Part::Total => format!("{}: total", plan.title),
             };
-            series.extend(ours(results, &name, |row| row.speed_up(plan.plan, part)));
+            series.extend(ours(results, &name, series.len(), |row| row.speed_up(plan.plan, part)));
         }
     }
     // The same numbers are printed for every digit that Z'''' may have had.
     let mut printed: Vec<&Named> = plans.iter().collect();
     printed.dedup_by_key(|plan| plan.printed);
-    for plan in printed {
-        let title = plan.title.split(',').next().unwrap_or(plan.title);
+    // Where each plan has one series, its printed one looks alike; else those are told apart among themselves.
+    let shared = parts.len() == 1;
+    for (i, plan) in printed.into_iter().enumerate() {
+        let title = family(&[*plan]);
         let value = |index| {
             let algorithm = plan.printed?;
             Some(point(results.thesis.time_ms("bp", index)? / results.thesis.time_ms(algorithm, index)?))
         };
         let points = results.scenes().map(|(index, _)| value(index)).collect();
-        series.push(Series { name: format!("{title}: printed in the thesis"), printed: true, points });
+        series.push(Series {
+            name: format!("{title}: printed in the thesis"),
+            printed: true,
+            style: if shared { i } else { series.len() },
+            points,
+        });
     }
     let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", series, Some(1.0));
     let caption = "Above 1 is faster than BP. Printed times are of the thesis's GPU program in all; ours are apart for \
@@ -79,13 +87,13 @@ fn speed_ups(
     drawing(numbers, chart, caption)
 }
 
-fn memories(results: &Results<'_>, numbers: Numbers<'_>, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
+fn memories(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
     let series = measured(results, plans, |measured| mebibytes(measured.allocated_bytes));
     let chart = chart(results, format!("{what}: required memory"), "MiB allocated", series, None);
     drawing(numbers, chart, "Bytes allocated, counted. The thesis prints no memory figure.")
 }
 
-fn errors(results: &Results<'_>, numbers: Numbers<'_>, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
+fn errors(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
     let series = measured(results, plans, |measured| measured.all.rmse);
     let chart = chart(results, format!("{what}: reliability"), "R over all known pixels, px", series, None);
     let caption = "Root mean squared error (equation 2.82); less is better. The thesis prints no reliability figure.";
@@ -94,26 +102,27 @@ fn errors(results: &Results<'_>, numbers: Numbers<'_>, what: &str, plans: &[Name
 
 /// A series a backend of one value of each plan's measurement.
 fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<Series> {
-    let of = |plan: &Named| {
-        ours(results, plan.title, |row| {
+    let of = |(i, plan): (usize, &Named)| {
+        ours(results, plan.title, i * results.backends().count(), |row| {
             let value = value(row.measured(plan.plan)?);
             Some(Spread { median: value, low: value, high: value, count: 1 })
         })
     };
-    plans.iter().flat_map(of).collect()
+    plans.iter().enumerate().flat_map(of).collect()
 }
 
-/// A series a backend, named after it where there are several.
-fn ours(results: &Results<'_>, name: &str, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<Series> {
+/// A series a backend, named after it where there are several; their styles are numbered from `style` on.
+fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<Series> {
     let several = results.backends().count() > 1;
-    let series = |backend: &str| Series {
+    let series = |(i, backend): (usize, &str)| Series {
         name: if several { format!("{name}, {backend}") } else { name.to_owned() },
         printed: false,
+        style: style + i,
         points: (results.rows().filter(|row| row.backend == backend))
             .map(|row| value(&row).map(|Spread { median, low, high, .. }| Point { value: median, low, high }))
             .collect(),
     };
-    results.backends().map(series).collect()
+    results.backends().enumerate().map(series).collect()
 }
 
 fn point(value: f64) -> Point {
@@ -124,16 +133,16 @@ fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series
     let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
     Chart {
         description: format!("{title}, on {}. Series: {}.", results.data(), names.join("; ")),
-        y_label: y_label.to_owned(),
+        y_label: format!("{y_label}; {}", results.setting()),
         logarithmic: reference.is_some(),
         reference,
         categories: results.scenes().map(|(_, scene)| scene.name.clone()).collect(),
         series,
-        title: format!("{title} ({})", results.setting()),
+        title,
     }
 }
 
-fn drawing((number, table): Numbers<'_>, chart: Chart, caption: &str) -> Result<Drawing, Failure> {
+fn drawing((number, table): Numbers, chart: Chart, caption: &str) -> Result<Drawing, Failure> {
     let svg = chart.svg().map_err(|error| Failure::other(format!("diagram {number}: {error}")))?;
     Ok(Drawing {
         name: format!("diagram-{number}"),

@@ -101,6 +101,6 @@ pub(super) fn thesis_plans() -> Vec<Named> {
 }
 
 /// The algorithm that plans belong to.
-fn family(plans: &[Named]) -> &'static str {
+pub(super) fn family(plans: &[Named]) -> &'static str {
     plans.first().map_or("", |plan| plan.title.split(',').next().unwrap_or(plan.title))
 }
