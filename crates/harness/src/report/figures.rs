@@ -18,7 +18,7 @@ use crate::{
 /// Space around and between maps, and for words and the bar, in pixels of the drawing.
 const GAP: usize = 14;
 const NAME_HEIGHT: usize = 24;
-const TITLE_HEIGHT: usize = 30;
+const TITLE_HEIGHT: usize = 48;
 const BAR_HEIGHT: usize = 64;
 /// Maps a row.
 const ACROSS: usize = 3;
@@ -46,7 +46,7 @@ fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> R
     Ok(Drawing {
         name: format!("figure-{number}"),
         caption: format!("Colours from 0 to {last} px; every second pixel. Data: {}.", results.setting()),
-        svg: draw(&format!("{title} ({})", results.setting()), &maps, last as f32)
+        svg: draw(&title, &results.setting(), &maps, last as f32)
             .map_err(|error| Failure::other(format!("figure {number}: {error}")))?,
         title,
         table: None,
@@ -61,7 +61,12 @@ fn halved(map: DisparityMap) -> DisparityMap {
     DisparityMap::new(half, (0..half.pixels()).map(at).collect()).unwrap_or(map)
 }
 
-fn draw(title: &str, maps: &[(&str, Option<DisparityMap>)], last: f32) -> Result<String, image::ImageError> {
+fn draw(
+    title: &str,
+    setting: &str,
+    maps: &[(&str, Option<DisparityMap>)],
+    last: f32,
+) -> Result<String, image::ImageError> {
     let sizes = || maps.iter().filter_map(|(_, map)| map.as_ref()).map(DisparityMap::size);
     let cell = Size {
         width: sizes().map(|size| size.width).max().unwrap_or(100),
@@ -73,7 +78,8 @@ fn draw(title: &str, maps: &[(&str, Option<DisparityMap>)], last: f32) -> Result
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          role=\"img\" font-family=\"sans-serif\" font-size=\"15\"><title>{title}</title>\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/><text x=\"{GAP}\" y=\"26\">{title}</text>"
+         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/><text x=\"{GAP}\" y=\"24\" font-weight=\"bold\">{title}</text>\
+         <text x=\"{GAP}\" y=\"44\">{setting}</text>"
     );
     for (i, (name, map)) in maps.iter().enumerate() {
         let (x, y) = (GAP + i % ACROSS * (cell.width + GAP), TITLE_HEIGHT + GAP + i / ACROSS * row_height);
@@ -84,7 +90,7 @@ fn draw(title: &str, maps: &[(&str, Option<DisparityMap>)], last: f32) -> Result
             None => _ = write!(svg, "<text x=\"{x}\" y=\"{}\">no map</text>", y + NAME_HEIGHT),
         }
     }
-    svg += &colour_bar(width - 2 * GAP, height - BAR_HEIGHT, last);
+    svg += &colour_bar(title, width - 2 * GAP, height - BAR_HEIGHT, last);
     Ok(svg + "</svg>\n")
 }
 
@@ -99,8 +105,9 @@ fn embedded(map: &DisparityMap, x: usize, y: usize, last: f32) -> Result<String,
     ))
 }
 
-/// A bar of the colours with its range.
-fn colour_bar(width: usize, top: usize, last: f32) -> String {
+/// A bar of the colours with its range; its gradient's name is made from `title`, to be one of its kind on the page.
+fn colour_bar(title: &str, width: usize, top: usize, last: f32) -> String {
+    let id: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     const STOPS: usize = 16;
     let stop = |i: usize| {
         let [r, g, b] = colour(i as f32 / STOPS as f32);
@@ -114,7 +121,7 @@ fn colour_bar(width: usize, top: usize, last: f32) -> String {
     };
     let ticks: String = (0..5).map(tick).collect();
     format!(
-        "<defs><linearGradient id=\"bar\">{stops}</linearGradient></defs>\
-         <rect x=\"{GAP}\" y=\"{top}\" width=\"{width}\" height=\"18\" fill=\"url(#bar)\"/>{ticks}"
+        "<defs><linearGradient id=\"{id}\">{stops}</linearGradient></defs>\
+         <rect x=\"{GAP}\" y=\"{top}\" width=\"{width}\" height=\"18\" fill=\"url(#{id})\"/>{ticks}"
     )
 }

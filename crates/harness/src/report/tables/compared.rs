@@ -97,7 +97,7 @@ pub(super) fn memory(results: &Results<'_>, number_of: &str, plans: &[Named]) ->
     });
     let ours = if number_of == "3.25a" { " (ours: the thesis has no such table)" } else { "" };
     Table::new(number_of, format!("{} against BP: required memory{ours}", family(plans)), &columns)
-        .note("Bytes allocated, counted. Parts are held all at once, as if they ran side by side.")
+        .note("Bytes allocated, counted. Four parts would be held all at once, as if they ran side by side.")
         .rows(rows)
 }
 
