@@ -4,9 +4,9 @@
 //! Whatever can be checked without a device is checked before a backend is called: a [`Solver`] may rely on a valid
 //! plan and on pairs of its size.
 
-use std::ops::Range;
+use std::{ops::Range, time::Duration};
 
-use crate::{Error, Plan, Seed, StereoPair};
+use crate::{Error, Plan, Seed, Stage, StereoPair};
 
 /// A way to run plans: a processor, or an API that reaches several devices.
 pub trait Backend: Sync {
@@ -28,8 +28,14 @@ pub trait Backend: Sync {
 pub struct DeviceInfo {
     /// Name of the device.
     pub name: String,
+    /// The interface that reaches it and its version, where there is one.
+    pub api: Option<String>,
+    /// Its driver and the driver's version, where there is one.
+    pub driver: Option<String>,
     /// Whether a CPU pretends to be a GPU there; its times are never a GPU's.
     pub software_rasteriser: bool,
+    /// How many threads work at once; 1 for a device that is asked as one.
+    pub workers: usize,
 }
 
 /// An open device.
@@ -39,9 +45,17 @@ pub trait Device {
     /// # Errors
     /// [`Error::OutOfMemory`].
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
+
+    /// Bytes that [`Device::prepare`] will allocate: the plan's own, and what this device pads them with.
+    fn planned_bytes(&self, plan: &Plan) -> u64 {
+        plan.bytes()
+    }
 }
 
 /// The five kernels over the buffers of one plan. Nothing is allocated after [`Device::prepare`].
+///
+/// A kernel may merely enqueue its work, in the order of the calls; [`Solver::select_labels`] waits for all of it. A
+/// device that does so tells by [`Solver::device_times`] how long each stage really took.
 pub trait Solver: Send {
     /// Computes the data costs of grid 0 from a pair; `seed` fixes those around the cut.
     ///
@@ -86,6 +100,12 @@ pub trait Solver: Send {
         1
     }
 
+    /// Time of each stage since the last [`Solver::match_cost`] by the device's own clock, in the order of
+    /// [`Stage::ALL`]; `None` where the device has none.
+    fn device_times(&mut self) -> Option<[Duration; Stage::ALL.len()]> {
+        None
+    }
+
     /// Bytes that this solver allocated, counted.
     fn allocated_bytes(&self) -> u64;
 }
@@ -115,24 +135,6 @@ impl Side {
             Self::Right => Self::Left,
             Self::Up => Self::Down,
             Self::Down => Self::Up,
-        }
-    }
-}
-
-impl Plan {
-    /// The node of `grid` that (x, y) exchanges messages with on `side`; `None` at the border and across a cut.
-    ///
-    /// # Panics
-    /// Where there is no such grid.
-    #[must_use]
-    pub fn neighbour(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<(usize, usize)> {
-        let size = self.size(grid);
-        let (cut_x, cut_y) = self.settings().cut.map_or((0, 0), |cut| (cut.x, cut.y));
-        match side {
-            Side::Left => (x > 0 && x != cut_x).then(|| (x - 1, y)),
-            Side::Right => (x + 1 < size.width && x + 1 != cut_x).then_some((x + 1, y)),
-            Side::Up => (y > 0 && y != cut_y).then(|| (x, y - 1)),
-            Side::Down => (y + 1 < size.height && y + 1 != cut_y).then_some((x, y + 1)),
         }
     }
 }

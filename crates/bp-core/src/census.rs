@@ -37,15 +37,15 @@ pub fn find_match(pair: &StereoPair, model: &Model, (x, y): (usize, usize)) -> O
     let size = pair.size();
     let half_width = HALF_LENGTH.min(x).min(size.width - 1 - x);
     let half_height = 1.min(y).min(size.height - 1 - y);
-    let strip = |image: &Image, x: usize| -> Vec<u8> {
-        let rows = y - half_height..=y + half_height;
-        rows.flat_map(|row| (x - half_width..=x + half_width).map(move |column| code(image, column, row))).collect()
-    };
-    let left = strip(pair.left(), x);
     let score = |label: u16| -> Option<u32> {
         let column = model.matching_column(x, label, size.width)?;
         let inside = column >= half_width && column + half_width < size.width;
-        inside.then(|| left.iter().zip(strip(pair.right(), column)).map(|(&l, r)| (l ^ r).count_ones()).sum())
+        let differing = |dx: usize, row: usize| {
+            let left = code(pair.left(), x - half_width + dx, row);
+            (left ^ code(pair.right(), column - half_width + dx, row)).count_ones()
+        };
+        let rows = y - half_height..=y + half_height;
+        inside.then(|| rows.map(|row| (0..=2 * half_width).map(|dx| differing(dx, row)).sum::<u32>()).sum())
     };
     let scores = (0..model.labels() as u16).filter_map(|label| Some((score(label)?, label)));
     scores.min().map(|(_, label)| Seed { x, y, label })

@@ -39,26 +39,15 @@ impl Stage {
     }
 }
 
-/// Wall-clock times of one solve.
+/// Times of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Times {
-    stages: [Duration; Stage::ALL.len()],
-    /// From the images in memory to the labels in memory; the census search of a cut plan is in here and in no stage.
+    /// Each stage over all grids by the wall clock, in the order of [`Stage::ALL`].
+    pub wall: [Duration; Stage::ALL.len()],
+    /// The same by the device's clock, where it has one; see [`Solver::device_times`].
+    pub device: Option<[Duration; Stage::ALL.len()]>,
+    /// From the images in memory to the labels in memory; the census search of a cut plan is in here and in no stage. Wall clock.
     pub total: Duration,
-}
-
-impl Times {
-    /// Time of one stage over all grids.
-    #[must_use]
-    pub fn stage(&self, stage: Stage) -> Duration {
-        self.stages[stage as usize]
-    }
-
-    /// Message passing: [`Stage::Refine`] and [`Stage::UpdateMessages`].
-    #[must_use]
-    pub fn message_passing(&self) -> Duration {
-        self.stage(Stage::Refine) + self.stage(Stage::UpdateMessages)
-    }
 }
 
 /// How far a solve has come, in message entries.
@@ -132,6 +121,7 @@ impl Matcher {
         pass_messages(plan, solver.as_mut(), &mut times, observer)?;
         timed(&mut times, Stage::SelectLabels, || solver.select_labels(labels))?;
         times.total = start.elapsed();
+        times.device = solver.device_times();
         Ok(times)
     }
 
@@ -184,6 +174,6 @@ fn pass_messages(
 fn timed(times: &mut Times, stage: Stage, run: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
     let start = Instant::now();
     run()?;
-    times.stages[stage as usize] += start.elapsed();
+    times.wall[stage as usize] += start.elapsed();
     Ok(())
 }

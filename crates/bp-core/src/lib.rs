@@ -41,6 +41,7 @@ pub mod memory;
 mod metrics;
 mod model;
 mod plan;
+mod settings;
 pub mod synthetic;
 pub mod worked_example;
 
@@ -53,4 +54,5 @@ pub use image::{Image, Size, StereoPair};
 pub use map::DisparityMap;
 pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
-pub use plan::{Algorithm, Buffer, Cut, MAX_GRIDS, MessageStart, Plan, Schedule, Settings};
+pub use plan::{Buffer, MAX_GRIDS, Plan};
+pub use settings::{Algorithm, Cut, MessageStart, Schedule, Settings};

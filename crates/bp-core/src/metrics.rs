@@ -11,10 +11,8 @@ const VISIBLE_WITHIN: f32 = 1.0;
 /// Ground truth of the left image, and which of its pixels the right camera sees too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundTruth {
-    /// True disparities.
-    pub disparities: DisparityMap,
-    /// Visible pixels [height][width], where that is known.
-    pub visible: Option<Vec<bool>>,
+    disparities: DisparityMap,
+    visible: Option<Vec<bool>>,
 }
 
 impl GroundTruth {
@@ -53,6 +51,18 @@ impl GroundTruth {
         };
         let visible = (0..size.pixels()).map(|i| sees(i % size.width, i / size.width).is_some()).collect();
         Ok(Self { disparities, visible: Some(visible) })
+    }
+
+    /// True disparities.
+    #[must_use]
+    pub fn disparities(&self) -> &DisparityMap {
+        &self.disparities
+    }
+
+    /// Visible pixels [height][width], where that is known.
+    #[must_use]
+    pub fn visible(&self) -> Option<&[bool]> {
+        self.visible.as_deref()
     }
 
     /// Errors of `map` over all pixels of known truth, and over the visible ones among them.
@@ -156,7 +166,7 @@ mod tests {
         let right = map(&[0.0, 3.0, NONE, 1.0, 1.0, 1.0]);
         let truth = GroundTruth::with_right(left, &right).unwrap();
         // Pixel 1 lands on 0 and differs by 1.5, 2 differs by 2 there, 3 hits an unknown, 5 leaves the image.
-        assert_eq!(truth.visible.as_deref(), Some([true, false, false, false, false, false].as_slice()));
+        assert_eq!(truth.visible(), Some([true, false, false, false, false, false].as_slice()));
         let errors = truth.errors(&map(&[0.0; 6])).unwrap();
         assert_eq!(errors.visible.map(|visible| visible.known), Some(1));
         assert!(GroundTruth::with_right(map(&[1.0]), &right).is_err());

@@ -54,3 +54,23 @@ impl Costs {
         memory::bytes(&self.stored) + self.sums.as_ref().map_or(0, Sums::bytes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bp_core::{Algorithm, Model, Profile, Schedule, Size};
+
+    use super::*;
+
+    /// What is stored decides all labels and messages, so they do not change either.
+    #[test]
+    fn a_constant_added_to_a_nodes_costs_changes_nothing() {
+        let size = Size { width: 2, height: 1 };
+        let settings = Algorithm::Bp.settings(size, 1, 1, Schedule::Sync);
+        let plan = Plan::new(size, Model::new(Profile::Mrf, 4).unwrap(), settings).unwrap();
+        let mut costs = Costs::new(&plan, 0).unwrap();
+        costs.store(0, &[7, 500, 9, 168]);
+        costs.store(1, &[7, 500, 9, 168].map(|cost| cost + 1_000_000));
+        assert_eq!(costs.of(0), [0, 161, 2, 161]);
+        assert_eq!(costs.of(1), costs.of(0));
+    }
+}

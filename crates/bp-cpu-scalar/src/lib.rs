@@ -25,7 +25,8 @@ impl Backend for Scalar {
     }
 
     fn devices(&self) -> Vec<DeviceInfo> {
-        vec![DeviceInfo { name: "CPU, 1 thread".to_owned(), software_rasteriser: false }]
+        let name = "CPU, 1 thread".to_owned();
+        vec![DeviceInfo { name, api: None, driver: None, software_rasteriser: false, workers: 1 }]
     }
 
     fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {

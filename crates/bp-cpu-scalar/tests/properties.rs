@@ -1,9 +1,11 @@
 //! What belief propagation must satisfy, whatever computes it.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+use std::ops::ControlFlow;
+
 use bp_core::{
-    Algorithm, Backend, Cut, DataCost, Energy, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings,
-    Side, Size, StereoPair,
+    Algorithm, Backend, Cut, DataCost, Energy, Error, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule,
+    Settings, Size, StereoPair,
     conformance::{Answer, Case, Oracle, assert_same, noise_pair, solve},
 };
 use bp_cpu_scalar::Scalar;
@@ -199,58 +201,25 @@ fn sums_hold_the_extreme_costs() {
 }
 
 #[test]
-fn a_matcher_used_again_forgets_the_pair_before() {
-    for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
-        let pairs = [1, 2, 1].map(|seed| noise_pair(21, 17, seed));
-        let model = Model::new(Profile::Census, 9).unwrap();
-        // One loop: what an old message leaves behind is not yet washed out.
-        let plan = Plan::new(pairs[0].size(), model, algorithm.settings(pairs[0].size(), 1, 1, schedule)).unwrap();
-        let mut matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan.clone()).unwrap();
-        for pair in pairs {
-            matcher.solve(&pair).unwrap();
-            let messages = Side::ALL.map(|side| matcher.messages(side).unwrap());
-            let labels = matcher.labels().to_vec();
-            assert_eq!(Answer { labels, messages }, solve(&Scalar, &Case { pair, plan: plan.clone() }).unwrap());
-        }
-    }
-}
-
-#[test]
-fn memory_is_what_the_plan_predicts_and_one_nodes_scratch() {
-    for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
-        for profile in Profile::ALL {
-            let (size, labels) = (Size { width: 61, height: 47 }, 23);
-            let settings = algorithm.settings(size, 9, 2, schedule);
-            let plan = Plan::new(size, Model::new(profile, labels).unwrap(), settings).unwrap();
-            let planned = plan.bytes();
-            let matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan).unwrap();
-            assert_eq!(matcher.allocated_bytes(), planned + 9 * labels as u64);
-        }
-    }
-}
-
-#[test]
-fn a_stopped_solve_says_so_and_the_next_is_whole() {
+fn a_solve_tells_its_progress_and_can_be_stopped() {
     let pair = noise_pair(9, 9, 3);
     let model = Model::new(Profile::Census, 5).unwrap();
     let plan = Plan::new(pair.size(), model, plan_settings(2, 3, Schedule::Checkerboard)).unwrap();
-    let mut matcher = Matcher::new(Scalar.open(0).unwrap().as_ref(), plan.clone()).unwrap();
-    let mut calls = 0;
-    let stopped = matcher.solve_observed(&pair, &mut |progress| {
-        calls += 1;
-        assert!(progress.done <= progress.total);
-        if calls == 4 { std::ops::ControlFlow::Break(()) } else { std::ops::ControlFlow::Continue(()) }
-    });
-    assert_eq!((stopped, calls), (Err(bp_core::Error::Stopped), 4));
-    let mut last = 0;
-    matcher
-        .solve_observed(&pair, &mut |progress| {
-            last = progress.done;
-            std::ops::ControlFlow::Continue(())
-        })
-        .unwrap();
-    assert_eq!(last, plan.message_updates());
-    assert_eq!(matcher.labels(), solve(&Scalar, &Case { pair, plan }).unwrap().labels);
+    let mut matcher = Matcher::new(&Scalar, plan.clone()).unwrap();
+    let mut calls = Vec::new();
+    let mut stop_at = |stop| {
+        calls.clear();
+        let outcome = matcher.solve_observed(&pair, &mut |progress| {
+            calls.push(progress.done);
+            if calls.len() == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        (outcome.map(drop), calls.clone())
+    };
+    let (outcome, calls) = stop_at(4);
+    assert_eq!((outcome, calls.len()), (Err(Error::Stopped), 4));
+    let (outcome, calls) = stop_at(0);
+    assert_eq!((outcome, calls.last()), (Ok(()), Some(&plan.message_updates())));
+    assert!(calls.is_sorted());
     assert!(matcher.solve(&noise_pair(8, 9, 3)).is_err());
     assert!(Scalar.open(1).is_err());
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule};
 use clap::{
     Args, Parser, Subcommand,
-    builder::{PossibleValuesParser, TypedValueParser},
+    builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
 use crate::files::PixelLimit;
@@ -86,7 +86,7 @@ pub(crate) struct PlanArgs {
     /// Data cost, with the smoothness that goes with it.
     #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
     pub(crate) profile: Profile,
-    /// Backend.
+    /// Backend; NAME:INDEX for another than its first device.
     #[arg(long, default_value = "scalar", value_name = "NAME")]
     pub(crate) backend: String,
     /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
@@ -165,7 +165,8 @@ pub(crate) struct EvaluateArgs {
 #[derive(Debug, Args)]
 pub(crate) struct DataArgs {
     /// Folder of the public data sets (see scripts/fetch-middlebury); without it the synthetic scenes run.
-    #[arg(long, env = "BP_DATA", value_name = "DIR")]
+    // An empty variable means none, so it must not be refused as clap's own parser of paths would.
+    #[arg(long, env = "BP_DATA", value_name = "DIR", value_parser = OsStringValueParser::new().map(PathBuf::from))]
     pub(crate) data: Option<PathBuf>,
     /// Run the synthetic scenes although there is a data folder.
     #[arg(long)]
@@ -174,6 +175,7 @@ pub(crate) struct DataArgs {
 
 /// `bp reproduce`.
 #[derive(Debug, Args)]
+#[command(args_override_self = true)]
 pub(crate) struct ReproduceArgs {
     /// Which scenes.
     #[command(flatten)]
@@ -181,7 +183,7 @@ pub(crate) struct ReproduceArgs {
     /// Small images and few loops: within a minute on two cores. Says so in the output.
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Backends, separated by commas.
+    /// Backends, separated by commas; NAME:INDEX for another than a backend's first device.
     #[arg(long, value_delimiter = ',', default_value = "scalar", value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
     /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]

@@ -88,7 +88,12 @@ impl From<bp_core::Error> for Failure {
             | bp_core::Error::Labels { .. }
             | bp_core::Error::Truncation { .. }
             | bp_core::Error::MinDisparity { .. } => Kind::Usage,
-            _ => Kind::Input,
+            bp_core::Error::Empty { .. }
+            | bp_core::Error::TooLarge { .. }
+            | bp_core::Error::PixelCount { .. }
+            | bp_core::Error::SizesDiffer { .. }
+            | bp_core::Error::WrongSize { .. } => Kind::Input,
+            _ => Kind::Other,
         };
         Self::new(kind, error.to_string())
     }

@@ -10,8 +10,8 @@ use std::{
     path::Path,
 };
 
-pub(crate) use images::{PixelLimit, hex, pixels_sha256, read_grey16, read_image};
-pub(crate) use maps::{MapFormat, read_map, read_mask, write_map};
+pub(crate) use images::{PixelLimit, hex, pixels_sha256, read_image, read_stored_grey};
+pub(crate) use maps::{check_png, check_range, read_map, read_mask, write_map};
 pub(crate) use picture::{colour, encode_picture, write_picture};
 
 use crate::failure::Failure;
@@ -28,7 +28,6 @@ pub(crate) fn write_whole<E: std::fmt::Display>(
     buffered.flush().map_err(|e| failed(&e))?;
     drop(buffered);
     file.as_file().sync_all().map_err(|e| failed(&e))?;
-    set_usual_permissions(file.path()).map_err(|e| failed(&e))?;
     file.persist(path).map_err(|e| failed(&e.error))?;
     Ok(())
 }
@@ -44,7 +43,20 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
 /// An empty file in the folder of `path`, which vanishes unless it is kept.
 fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    tempfile::Builder::new().prefix(".bp-").tempfile_in(folder).map_err(|error| Failure::writing(path, &error))
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are made for their owner alone; a result is for whom the user's mask says.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.prefix(".bp-").tempfile_in(folder).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Fails where writing `output` would overwrite `other`.
+pub(crate) fn check_distinct(other: &Path, output: &Path) -> Result<(), Failure> {
+    let meant = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
+    if meant(other) != meant(output) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{}: the same file is named twice and would be overwritten", output.display())))
 }
 
 /// Writes text as [`write_whole`] does.
@@ -55,16 +67,4 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 /// Creates a folder and those above it.
 pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(path).map_err(|error| Failure::writing(path, &error))
-}
-
-/// Temporary files are made for their owner alone; a result is for all to read.
-#[cfg(unix)]
-fn set_usual_permissions(path: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(path, fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
-    Ok(())
 }

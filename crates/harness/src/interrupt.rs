@@ -8,14 +8,19 @@ use std::{
 
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 
-use crate::failure::Failure;
+use crate::{failure::Failure, tell};
 
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C and SIGTERM stop the program at the next step.
+/// Makes Ctrl-C and SIGTERM stop the program at the next step, and a second one at once. For commands that take steps;
+/// others are stopped by the system.
 pub(crate) fn listen() -> Result<(), Failure> {
-    ctrlc::set_handler(|| STOPPED.store(true, Ordering::Relaxed))
-        .map_err(|error| Failure::other(format!("cannot handle Ctrl-C: {error}")))
+    let stop = || {
+        if STOPPED.swap(true, Ordering::Relaxed) {
+            std::process::exit(Failure::interrupted().code().into());
+        }
+    };
+    ctrlc::set_handler(stop).map_err(|error| Failure::other(format!("cannot handle Ctrl-C: {error}")))
 }
 
 /// Fails where the user has asked to stop.
@@ -60,7 +65,7 @@ impl ProgressBar {
 
     /// Prints a line above the bar.
     pub(crate) fn line(&self, line: &str) {
-        self.0.suspend(|| eprintln!("{line}"));
+        self.0.suspend(|| tell(line));
     }
 
     /// Removes the bar.

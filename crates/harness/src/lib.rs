@@ -29,8 +29,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure.code() != 0 {
-                // Standard error may be closed too; there is nobody left to tell then.
-                let _ = writeln!(std::io::stderr(), "bp: {failure}");
+                tell(&format!("bp: {failure}"));
             }
             ExitCode::from(failure.code())
         }
@@ -38,7 +37,6 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
-    interrupt::listen()?;
     match command {
         Command::Match(args) => command::match_pair(args),
         Command::Evaluate(args) => command::evaluate(args),
@@ -46,4 +44,9 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Report(args) => report::command(args),
         Command::Scenes(args) => command::scenes(args),
     }
+}
+
+/// Prints a line on standard error. Where that is full or closed there is nobody left to tell.
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -1,6 +1,8 @@
 //! What a recorded run holds. These types are the JSON of `results/*/record.json`; `results/schema.json` is their
 //! schema.
 
+use std::time::Duration;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -123,30 +125,56 @@ pub struct Cell {
     pub scene: String,
     /// Name of the plan in the tables: an algorithm, or one with other settings.
     pub plan: String,
-    /// Name of the backend.
+    /// Name of the backend, with the device's index unless that is 0.
     pub backend: String,
-    /// Name of the device.
-    pub device: String,
-    /// Whether the device is a CPU that pretends to be a GPU.
+    /// The device.
+    pub device: Device,
+    /// What was run.
+    pub settings: Settings,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// A device.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Device {
+    /// Its name.
+    pub name: String,
+    /// The interface that reaches it and its version, where there is one.
+    pub api: Option<String>,
+    /// Its driver and the driver's version, where there is one.
+    pub driver: Option<String>,
+    /// Whether it is a CPU that pretends to be a GPU.
     pub software_rasteriser: bool,
+    /// How many threads work at once.
+    pub workers: usize,
+}
+
+/// What a plan runs, and what it predicts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
     /// Data cost profile.
     pub profile: String,
     /// Labels (L).
     pub labels: usize,
+    /// Disparity of the first label in pixels.
+    pub min_disparity: i32,
     /// Slope of the smoothness cost.
     pub slope: u8,
     /// Truncation of the smoothness cost (K).
     pub truncation: u8,
     /// Algorithm.
     pub algorithm: String,
-    /// Loops asked for (k), where the algorithm derives its own from them.
+    /// Loops asked for (k), where the algorithm derived its own from them.
     pub k: Option<u32>,
-    /// What the loops are divided by (Z'' or Z'''').
+    /// What the thesis's coefficient Z divided those by, where it did.
     pub z: Option<u32>,
     /// Number of grids.
     pub grids: usize,
     /// Loops (schedule sync) or half-steps (checkerboard) on each grid.
-    pub steps: u32,
+    pub steps_per_grid: u32,
     /// Schedule.
     pub schedule: String,
     /// Side by which finer grids take over messages.
@@ -155,10 +183,8 @@ pub struct Cell {
     pub cut: Option<Cut>,
     /// Message entries that the plan predicts to compute.
     pub message_updates: u64,
-    /// Bytes that the plan predicts.
+    /// Bytes that the plan predicts on this device.
     pub planned_bytes: u64,
-    /// What came of it.
-    pub outcome: Outcome,
 }
 
 /// A cut into four parts.
@@ -206,19 +232,17 @@ pub struct Measurement {
 }
 
 /// One timed solve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Which round of taking turns it belongs to, from 0.
     pub round: u32,
-    /// Which clock measured it.
-    pub clock: Clock,
-    /// Milliseconds to allocate, apart from the total.
+    /// Milliseconds to allocate by the wall clock, apart from the total.
     pub prepare_ms: f64,
-    /// Milliseconds of each stage.
-    pub stages: Stages,
-    /// Milliseconds from images to labels.
+    /// Milliseconds from images to labels by the wall clock.
     pub total_ms: f64,
+    /// Milliseconds of each stage, by the wall clock first.
+    pub clocks: Vec<Clocked>,
 }
 
 /// A clock.
@@ -227,6 +251,18 @@ pub struct Sample {
 pub enum Clock {
     /// The host's monotonic clock.
     Wall,
+    /// The device's own clock.
+    Device,
+}
+
+/// Stage times by one clock.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Clocked {
+    /// The clock.
+    pub clock: Clock,
+    /// The times.
+    pub stages: Stages,
 }
 
 /// Milliseconds of each stage, over all grids.
@@ -296,25 +332,67 @@ impl From<bp_core::MapErrors> for Errors {
     }
 }
 
-impl From<&bp_core::Times> for Stages {
-    fn from(times: &bp_core::Times) -> Self {
-        use bp_core::Stage::{Coarsen, MatchCost, Refine, SelectLabels, UpdateMessages};
-        let ms = |stage| 1000.0 * times.stage(stage).as_secs_f64();
+impl From<&bp_core::DeviceInfo> for Device {
+    fn from(device: &bp_core::DeviceInfo) -> Self {
+        let bp_core::DeviceInfo { name, api, driver, software_rasteriser, workers } = device.clone();
+        Self { name, api, driver, software_rasteriser, workers }
+    }
+}
+
+impl Settings {
+    /// What is known of a plan on a device before it runs.
+    pub(crate) fn new(
+        plan: &bp_core::Plan,
+        device: &dyn bp_core::Device,
+        algorithm: bp_core::Algorithm,
+        (k, z): (Option<u32>, Option<u32>),
+    ) -> Self {
+        let (model, settings) = (plan.model(), plan.settings());
         Self {
-            match_cost_ms: ms(MatchCost),
-            coarsen_ms: ms(Coarsen),
-            refine_ms: ms(Refine),
-            update_messages_ms: ms(UpdateMessages),
-            select_labels_ms: ms(SelectLabels),
+            profile: model.profile().name().to_owned(),
+            labels: model.labels(),
+            min_disparity: model.min_disparity(),
+            slope: model.slope(),
+            truncation: model.truncation(),
+            algorithm: algorithm.name().to_owned(),
+            k,
+            z,
+            grids: settings.grids,
+            steps_per_grid: settings.steps,
+            schedule: settings.schedule.name().to_owned(),
+            message_start: settings.message_start.name().to_owned(),
+            cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            message_updates: plan.message_updates(),
+            planned_bytes: device.planned_bytes(plan),
         }
     }
 }
 
+/// All clocks of a solve.
+pub(crate) fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
+    let clocked = |clock, stages: [Duration; 5]| {
+        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] =
+            stages.map(|time| 1000.0 * time.as_secs_f64());
+        let stages = Stages { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms };
+        Clocked { clock, stages }
+    };
+    let device = times.device.map(|stages| clocked(Clock::Device, stages));
+    std::iter::once(clocked(Clock::Wall, times.wall)).chain(device).collect()
+}
+
 impl Stages {
-    /// Message passing: `refine` and `update_messages`.
+    /// The stages in their order.
+    pub(crate) fn in_order(&self) -> [f64; 5] {
+        let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
+        [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
+    }
+}
+
+impl Sample {
+    /// Milliseconds of message passing, `refine` and `update_messages`, by the device's clock where it has one.
     #[must_use]
     pub fn message_passing_ms(&self) -> f64 {
-        self.refine_ms + self.update_messages_ms
+        self.clocks.last().map_or(0.0, |clocked| clocked.stages.refine_ms + clocked.stages.update_messages_ms)
     }
 }
 

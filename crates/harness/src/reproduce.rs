@@ -12,12 +12,12 @@ use std::{ops::ControlFlow, path::Path};
 
 use crate::{
     args::ReproduceArgs,
-    backends,
     failure::Failure,
     interrupt, machine,
-    record::{Labelling, Run},
+    record::{Cell, Labelling, Outcome, Record, Run},
     report,
     scenes::Source,
+    tell,
 };
 
 /// Loops of plain BP in a quick run: the fewest of which CFBP and CFCSBP make different numbers of loops. A whole k = L
@@ -38,28 +38,34 @@ pub fn outside_energies(data: &Path) -> Result<Vec<Labelling>, String> {
 
 /// Runs the command.
 pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
+    interrupt::listen()?;
     let source = Source::new(&args.data, args.quick)?;
-    for name in &args.backend {
-        backends::by_name(name)?;
-    }
-    let run = Run {
+    let devices = run::open_devices(&args.backend)?;
+    let settings = Run {
         data: source.name.to_owned(),
         quick: args.quick,
         labels: source.labels,
         k: if args.quick { QUICK_LOOPS } else { source.labels as u32 },
         samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
-        backends: args.backend.clone(),
+        backends: devices.iter().map(|device| device.name.clone()).collect(),
     };
-    eprintln!("scenes: {}", Source::describe(source.name));
+    tell(&format!("scenes: {}", Source::describe(source.name)));
     let machine = machine::machine(args.machine.as_deref());
-    let mut storage = storage::open(&args.results, machine, run)?;
-    let outcome = run::run(&source, &mut storage);
+    let mut storage = storage::open(&args.results, machine, settings)?;
+    let outcome = run::run(&source, &devices, &mut storage);
     if outcome.as_ref().is_err_and(Failure::is_interrupted) {
-        eprintln!("what was run is kept in {}; the same command goes on from there", storage.folder().display());
+        tell(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
     }
     outcome?;
-    interrupt::check()?;
     report::write(storage.folder(), storage.record())?;
-    eprintln!("report: {}", storage.folder().join("report.html").display());
-    Ok(())
+    tell(&format!("report: {}", storage.folder().join("report.html").display()));
+    failed_cells(storage.record())
+}
+
+/// Fails where a cell has no numbers.
+fn failed_cells(record: &Record) -> Result<(), Failure> {
+    let failed: Vec<_> = record.cells.iter().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).collect();
+    let Some(Cell { scene, plan, backend, outcome: Outcome::Error(error), .. }) = failed.first() else { return Ok(()) };
+    let count = failed.len();
+    Err(Failure::other(format!("{count} cells could not be run, such as {scene}, {plan} on {backend}: {error}")))
 }

@@ -44,7 +44,8 @@ impl Source {
     /// What the options ask for: the data folder's scenes where one is given, at half size or, when `quick`, at third
     /// size; else the synthetic scenes.
     pub(crate) fn new(args: &DataArgs, quick: bool) -> Result<Self, Failure> {
-        let folder = args.data.clone().filter(|_| !args.synthetic);
+        let named = |folder: &PathBuf| !folder.as_os_str().is_empty();
+        let folder = args.data.clone().filter(|folder| named(folder) && !args.synthetic);
         let (name, labels) = LABELS[if folder.is_some() { 0 } else { 2 } + usize::from(quick)];
         if let Some(folder) = &folder
             && !folder.join(name).is_dir()
@@ -84,7 +85,7 @@ impl Source {
     pub(crate) fn load(&self, index: usize) -> Result<Scene, Failure> {
         match &self.folder {
             Some(folder) => middlebury(folder, &format!("{}/{}", self.name, THESIS_SCENES[index])),
-            None => Ok(made_up(index, if self.name == "synthetic" { 1 } else { SMALL_DIVISOR })),
+            None => made_up(index, if self.name == "synthetic" { 1 } else { SMALL_DIVISOR }),
         }
     }
 }
@@ -92,25 +93,25 @@ impl Source {
 /// A scene's record, computed from what was loaded.
 fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<ImageSum>) -> record::Scene {
     let known = |&(_, value): &(usize, &f32)| value.is_finite();
-    let seen = |i: usize| truth.visible.as_ref().is_some_and(|visible| visible[i]);
-    let pixels = || truth.disparities.values().iter().enumerate().filter(known);
+    let seen = |i: usize| truth.visible().is_some_and(|visible| visible[i]);
+    let pixels = || truth.disparities().values().iter().enumerate().filter(known);
     record::Scene {
         name: name.to_owned(),
         width: pair.size().width,
         height: pair.size().height,
-        largest_disparity: truth.disparities.range().map_or(0.0, |(_, high)| high),
+        largest_disparity: truth.disparities().range().map_or(0.0, |(_, high)| high),
         known: pixels().count() as u64,
         visible: pixels().filter(|&(i, _)| seen(i)).count() as u64,
         images,
     }
 }
 
-fn made_up(index: usize, divisor: usize) -> Scene {
+fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
     let synthetic::Scene { name, pair, truth_left, visible, .. } = synthetic::scene(index, divisor);
-    let truth = GroundTruth { disparities: truth_left, visible: Some(visible) };
+    let truth = GroundTruth::with_mask(truth_left, visible)?;
     let sum = |path: &str, image: &Image| ImageSum { path: path.to_owned(), sha256: pixels_sha256(image) };
     let images = vec![sum("left", pair.left()), sum("right", pair.right())];
-    Scene { record: described(name, &pair, &truth, images), pair, truth }
+    Ok(Scene { record: described(name, &pair, &truth, images), pair, truth })
 }
 
 /// Loads and checks the four images of a scene of the 2005 and 2006 sets.

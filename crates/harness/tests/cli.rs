@@ -84,7 +84,7 @@ fn a_shifted_pair_is_matched_and_evaluated_in_every_format() {
         let report = folder.json(&format!("{MATCH} {output} --algorithm {algorithm} {truth} --json"));
         let bad = report["errors"]["visible"]["bad"][1].as_f64().unwrap();
         assert!(bad < 2.0, "{algorithm}: {bad} % of visible pixels");
-        assert_eq!(report["algorithm"], algorithm);
+        assert_eq!(report["settings"]["algorithm"], algorithm);
         let again =
             folder.json(&format!("evaluate {output} truth.png --ground-truth-right truth.png --scale 2 --json"));
         assert_eq!(again["visible"]["bad"], report["errors"]["visible"]["bad"], "{output}");
@@ -110,7 +110,7 @@ fn settings_change_what_they_say() {
     let run = |options: &str| folder.json(&format!("{MATCH} a.pfm --json --messages-hash {options}"));
     let steps = |options: &str| {
         let report = run(options);
-        (report["grids"].as_u64().unwrap(), report["steps_per_grid"].as_u64().unwrap())
+        (report["settings"]["grids"].as_u64().unwrap(), report["settings"]["steps_per_grid"].as_u64().unwrap())
     };
     assert_eq!(steps("--algorithm bp"), (1, 12));
     assert_eq!(steps("--algorithm bp --loops 7 --schedule checkerboard"), (1, 14));
@@ -119,7 +119,7 @@ fn settings_change_what_they_say() {
     assert_eq!(steps("--algorithm ctcsbp --loops 30 --z 4"), (1, 7));
     assert_eq!(steps("--algorithm cfbp --grids 3 --loops 4"), (3, 4));
     assert_eq!(steps("--algorithm cfcsbp --grids 3 --half-steps 5"), (3, 5));
-    assert_eq!(run("--half-steps 5")["schedule"], "checkerboard");
+    assert_eq!(run("--half-steps 5")["settings"]["schedule"], "checkerboard");
     let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
     assert_eq!(hash(""), hash(""));
     let default = hash("--algorithm cfbp --grids 3 --loops 1");
@@ -168,6 +168,11 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         folder.fails(&format!("match left.png right.png --output a.png {options}"), 2, &words);
     }
     folder.fails("match left.png right.png --output a.jpg", 2, &["a.jpg", ".pfm"]);
+    folder.fails("match left.png right.png --output a.png --picture b.jpg", 2, &["b.jpg", ".png"]);
+    folder.fails("match left.png right.png --output a.png --picture ./a.png", 2, &["a.png", "twice"]);
+    folder.fails("match left.png right.png --output ./left.png", 2, &["left.png", "twice"]);
+    folder.fails("reproduce --quick --synthetic --backend scalar,scalar:0", 2, &["--backend", "twice"]);
+    folder.fails("match left.png right.png --output a.png --backend scalar:1", 5, &["scalar", "device 1"]);
     folder.fails("match left.png right.png --output a.png --backend magic", 5, &["--backend", "magic", "scalar"]);
 }
 
@@ -223,7 +228,7 @@ fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
 fn more_memory_than_there_is_is_refused_before_it_is_taken() {
     let folder = Folder::new();
     fs::write(folder.path("big.pgm"), [b"P5\n20000 4000\n255\n".as_slice(), &vec![0; 80_000_000]].concat()).unwrap();
-    folder.fails("match big.pgm big.pgm -o a.png --labels 1024", 6, &["bytes are needed", "--labels"]);
+    folder.fails("match big.pgm big.pgm -o a.pfm --labels 1024", 6, &["bytes are needed", "--labels"]);
 }
 
 #[test]
@@ -246,7 +251,24 @@ fn unanswered_pixels_are_counted_apart() {
     );
     let masked = folder.json("evaluate truth.png truth.png --scale 2 --map-scale 1 --mask half.png --json");
     assert_eq!(masked["visible"]["known"], 0);
-    assert!(text(&folder.run("evaluate half.png truth.png").stdout).contains("unanswered counted wrong"));
+    assert!(text(&folder.run("evaluate half.png truth.png").stdout).contains("unanswered wrong"));
+}
+
+/// Decoders stretch what fills fewer bits: a map's values must be those that are stored.
+#[test]
+fn maps_are_read_as_stored_or_refused() {
+    let folder = Folder::new();
+    image::ImageBuffer::from_pixel(4, 3, image::LumaA([5 * 256 + 128_u16, 65535]))
+        .save(folder.path("la16.png"))
+        .unwrap();
+    image::ImageBuffer::from_pixel(4, 3, image::Luma([5 * 256 + 128_u16])).save(folder.path("l16.png")).unwrap();
+    assert_eq!(folder.json("evaluate la16.png l16.png --json")["all"]["rmse"], 0.0);
+    let half = folder.json("evaluate l16.png l16.png --map-scale 128 --json");
+    assert_eq!(half["all"]["rmse"], 5.5);
+    fs::write(folder.path("stretched.pgm"), [b"P5\n4 3\n100\n".as_slice(), &[5; 12]].concat()).unwrap();
+    folder.fails("evaluate stretched.pgm l16.png", 3, &["stretched.pgm", "255"]);
+    image::RgbImage::from_pixel(4, 3, image::Rgb([1, 2, 3])).save(folder.path("coloured.png")).unwrap();
+    folder.fails("evaluate coloured.png l16.png", 3, &["coloured.png", "colours"]);
 }
 
 #[test]

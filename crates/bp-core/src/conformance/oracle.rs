@@ -2,27 +2,11 @@
 
 use std::ops::Range;
 
-use crate::{
-    Backend, DataCost, Device, DeviceInfo, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair,
-};
+use crate::{DataCost, Device, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair};
 
-/// A backend in `i64` that takes O(L^2) time for a message and neither normalises nor clips data costs.
+/// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Oracle;
-
-impl Backend for Oracle {
-    fn name(&self) -> &'static str {
-        "oracle"
-    }
-
-    fn devices(&self) -> Vec<DeviceInfo> {
-        vec![DeviceInfo { name: "oracle".to_owned(), software_rasteriser: false }]
-    }
-
-    fn open(&self, _: usize) -> Result<Box<dyn Device>, Error> {
-        Ok(Box::new(Self))
-    }
-}
 
 impl Device for Oracle {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, io::Write as _, path::Path};
 
-use bp_core::{DisparityMap, Errors, GroundTruth, MapErrors, THRESHOLDS};
+use bp_core::{Errors, GroundTruth, THRESHOLDS};
 use serde::Serialize;
 
 use crate::{
@@ -40,11 +40,16 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     let limit = PixelLimit::megapixels(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
-    let errors = measure(&map, &truth, &args.map, &args.truth)?;
+    let errors = truth.errors(&map).map_err(|_| {
+        let (map_size, truth_size) = (map.size(), truth.disparities().size());
+        let (map, truth) = (args.map.display(), args.truth.display());
+        Failure::input(format!("{map} has {map_size} pixels and its ground truth {truth} {truth_size}"))
+    })?;
+    let errors = ErrorReport::from(errors);
     let mut out = std::io::stdout().lock();
     if args.json {
         let size = map.size();
-        let report = Report { width: size.width, height: size.height, errors: errors.into() };
+        let report = Report { width: size.width, height: size.height, errors };
         serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
         writeln!(out)?;
     } else {
@@ -70,37 +75,25 @@ pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: PixelLimit) ->
     Ok(GroundTruth::new(truth))
 }
 
-/// Errors of a map; sizes that differ are told with both files' names.
-pub(crate) fn measure(
-    map: &DisparityMap,
-    truth: &GroundTruth,
-    map_path: &Path,
-    truth_path: &Path,
-) -> Result<Errors, Failure> {
-    truth.errors(map).map_err(|_| {
-        let (map_size, truth_size) = (map.size(), truth.disparities.size());
-        let (map_path, truth_path) = (map_path.display(), truth_path.display());
-        Failure::input(format!("{map_path} has {map_size} pixels and its ground truth {truth_path} {truth_size}"))
-    })
-}
-
-/// Errors as text.
-pub(crate) fn error_table(errors: &Errors) -> String {
+/// Errors as text: for each set of pixels a column over answered ones, and one that counts unanswered ones as wrong.
+pub(crate) fn error_table(report: &ErrorReport) -> String {
+    let sets = [("all known pixels", Some(&report.all)), ("visible in both views", report.visible.as_ref())];
+    let sets: Vec<_> = sets.into_iter().filter_map(|(name, errors)| Some((name, errors?))).collect();
     let mut text = String::new();
-    let header = THRESHOLDS.map(|threshold| format!("> {threshold} px %")).map(|head| format!("{head:>10}")).concat();
-    let _ = writeln!(text, "{:<28}{:>9}{:>9}{:>9}{header}", "errors over", "pixels", "density%", "RMSE px");
-    let mut row = |name: &str, errors: &MapErrors| {
-        let density = 100.0 * errors.answered as f64 / errors.known.max(1) as f64;
-        let bad = errors.bad.map(|bad| format!("{bad:>10.2}")).concat();
-        let _ = writeln!(text, "{name:<28}{:>9}{density:>9.2}{:>9.3}{bad}", errors.known, errors.rmse);
-        if errors.answered < errors.known {
-            let bad = errors.bad_or_unanswered.map(|bad| format!("{bad:>10.2}")).concat();
-            let _ = writeln!(text, "{:<28}{:>27}{bad}", "  unanswered counted wrong", "");
-        }
+    let mut line = |name: &str, cells: &dyn Fn(&record::Errors) -> [String; 2]| {
+        let cells: String =
+            sets.iter().map(|(_, errors)| cells(errors).map(|cell| format!("{cell:>19}")).concat()).collect();
+        let _ = writeln!(text, "{name:<12}{cells}");
     };
-    row("all known pixels", &errors.all);
-    if let Some(visible) = &errors.visible {
-        row("visible in both views", visible);
+    let pair = |first: String| [first, String::new()];
+    line("pixels", &|errors| pair(errors.known.to_string()));
+    line("density", &|errors| pair(format!("{:.2} %", 100.0 * errors.answered as f64 / errors.known.max(1) as f64)));
+    line("RMSE", &|errors| pair(format!("{:.3} px", errors.rmse)));
+    for (i, threshold) in THRESHOLDS.iter().enumerate() {
+        let percents = |errors: &record::Errors| [errors.bad[i], errors.bad_or_unanswered[i]];
+        line(&format!("> {threshold} px"), &|errors| percents(errors).map(|percent| format!("{percent:.2} %")));
     }
-    text
+    let heads: String = sets.iter().map(|(name, _)| format!("{name:>38}")).collect();
+    let columns = format!("{:>19}{:>19}", "answered", "unanswered wrong").repeat(sets.len());
+    format!("{:<12}{heads}\n{:<12}{columns}\n{text}", "errors", "")
 }

@@ -3,10 +3,13 @@
 use std::{fs::File, io::BufReader, path::Path};
 
 use bp_core::{Image, Size, image::narrow};
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::{
+    DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader, Limits,
+    codecs::{png::PngDecoder, pnm::PnmDecoder},
+};
 use sha2::{Digest, Sha256};
 
-use crate::failure::Failure;
+use crate::{failure::Failure, machine};
 
 /// The most pixels that a file may hold.
 #[derive(Clone, Copy, Debug)]
@@ -41,8 +44,7 @@ impl PixelLimit {
 pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
     let decoded = decode(path, limit)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let sixteen = matches!(decoded.color().bytes_per_pixel() / decoded.color().channel_count(), 2);
-    let pixels = if sixteen {
+    let pixels = if has_16_bits(&decoded) {
         decoded.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
     } else {
         decoded.into_rgb8().pixels().map(|pixel| pixel.0).collect()
@@ -50,17 +52,48 @@ pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failur
     Image::from_rgb(width, height, pixels).map_err(|error| Failure::reading(path, &error))
 }
 
-/// Reads the grey values of an image with all their bits, and whether those are 16. Colours must be grey.
-pub(crate) fn read_grey16(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
+fn has_16_bits(image: &DynamicImage) -> bool {
+    image.color().bytes_per_pixel() == 2 * image.color().channel_count()
+}
+
+/// Reads the grey values of an image as they are stored, and whether they have 16 bits. Colours must be grey.
+pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
+    check_unscaled(path)?;
     let decoded = decode(path, limit)?;
     let size = Size { width: decoded.width() as usize, height: decoded.height() as usize };
-    if let DynamicImage::ImageLuma16(grey) = decoded {
-        return Ok((size, grey.into_raw(), true));
-    }
-    let grey = |pixel: &image::Rgb<u8>| (pixel.0 == [pixel.0[0]; 3]).then_some(u16::from(pixel.0[0]));
-    let values: Option<Vec<u16>> = decoded.into_rgb8().pixels().map(grey).collect();
+    let sixteen = has_16_bits(&decoded);
+    let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
+    let values: Option<Vec<u16>> = if sixteen {
+        decoded.into_rgb16().pixels().map(|pixel| grey(pixel.0)).collect()
+    } else {
+        decoded.into_rgb8().pixels().map(|pixel| grey(pixel.0.map(u16::from))).collect()
+    };
     let coloured = || Failure::reading(path, &"a map holds grey values, this image has colours");
-    Ok((size, values.ok_or_else(coloured)?, false))
+    Ok((size, values.ok_or_else(coloured)?, sixteen))
+}
+
+/// Refuses files whose values a decoder stretches to fill 8 or 16 bits: what was stored would be lost.
+fn check_unscaled(path: &Path) -> Result<(), Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
+    let file = BufReader::new(File::open(path).map_err(|e| failed(&e))?);
+    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| failed(&e))?;
+    let stretched = match reader.format() {
+        Some(ImageFormat::Pnm) => {
+            let decoder = PnmDecoder::new(reader.into_inner()).map_err(|e| failed(&e))?;
+            !matches!(decoder.header().maximal_sample(), 255 | 65535)
+        }
+        Some(ImageFormat::Png) => {
+            let decoder = PngDecoder::new(reader.into_inner()).map_err(|e| failed(&e))?;
+            let narrow = [ExtendedColorType::L1, ExtendedColorType::L2, ExtendedColorType::L4];
+            narrow.contains(&decoder.original_color_type())
+        }
+        _ => false,
+    };
+    if stretched {
+        Err(failed(&"a map needs 8 or 16 bits a value, used in full (maximum 255 or 65535)"))
+    } else {
+        Ok(())
+    }
 }
 
 /// SHA-256 of decoded pixels, row by row, a byte for each of red, green and blue.
@@ -90,5 +123,8 @@ fn decode(path: &Path, limit: PixelLimit) -> Result<DynamicImage, Failure> {
     let decoder = reader.into_decoder().map_err(|e| failed(&e))?;
     let (width, height) = decoder.dimensions();
     limit.check(path, width.into(), height.into())?;
+    // The decoded image, and two copies as colours of 8 bits while it is converted.
+    let needed = decoder.total_bytes().saturating_add(6 * u64::from(width) * u64::from(height));
+    machine::check_memory(needed, &format!("{} is too large", path.display()))?;
     DynamicImage::from_decoder(decoder).map_err(|e| failed(&e))
 }

@@ -8,12 +8,12 @@ use std::{fs, io::Write, path::Path};
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::{PixelLimit, read_grey16, write_whole};
+use super::{PixelLimit, read_stored_grey, write_whole};
 use crate::failure::Failure;
 
 /// How a map is stored, by the file's ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MapFormat {
+enum MapFormat {
     /// Portable float map.
     Pfm,
     /// PNG of 16 bits, disparity x256.
@@ -22,7 +22,7 @@ pub(crate) enum MapFormat {
 
 impl MapFormat {
     /// The format of an output path.
-    pub(crate) fn of(path: &Path) -> Result<Self, Failure> {
+    fn of(path: &Path) -> Result<Self, Failure> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         match ending.as_deref() {
             Some("pfm") => Ok(Self::Pfm),
@@ -32,15 +32,34 @@ impl MapFormat {
     }
 }
 
+/// Fails where a path's ending names no format, or one that cannot hold disparities from `low` to `high`; for telling so
+/// before the work is done.
+pub(crate) fn check_range(path: &Path, low: i32, high: i32) -> Result<(), Failure> {
+    match MapFormat::of(path)? {
+        MapFormat::Png16 if low < 0 || high > 255 => Err(out_of_png_range(path)),
+        _ => Ok(()),
+    }
+}
+
+/// Fails where a path does not end in .png.
+pub(crate) fn check_png(path: &Path) -> Result<(), Failure> {
+    match MapFormat::of(path) {
+        Ok(MapFormat::Png16) => Ok(()),
+        _ => Err(Failure::usage(format!("{}: a picture ends in .png", path.display()))),
+    }
+}
+
+fn out_of_png_range(path: &Path) -> Failure {
+    let what = "a 16-bit PNG holds disparities from 0 to 255.99 px; use an output that ends in .pfm";
+    Failure::usage(format!("{}: {what}", path.display()))
+}
+
 /// Writes a map in the format of the path's ending.
 pub(crate) fn write_map(path: &Path, map: &DisparityMap) -> Result<(), Failure> {
     match MapFormat::of(path)? {
         MapFormat::Pfm => write_whole(path, |file| write_pfm(file, map)),
         MapFormat::Png16 => {
-            let values = png_values(map).ok_or_else(|| {
-                let what = "a 16-bit PNG holds disparities from 0 to 255.99 px; use an output that ends in .pfm";
-                Failure::usage(format!("{}: {what}", path.display()))
-            })?;
+            let values = png_values(map).ok_or_else(|| out_of_png_range(path))?;
             let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
             let Size { width, height } = map.size();
             write_whole(path, |file| {
@@ -80,7 +99,7 @@ pub(crate) fn read_map(path: &Path, scale: Option<f32>, limit: PixelLimit) -> Re
         let (size, values) = read_pfm(path, limit)?;
         (size, values.into_iter().map(|value| value / scale).collect())
     } else {
-        let (size, values, sixteen) = read_grey16(path, limit)?;
+        let (size, values, sixteen) = read_stored_grey(path, limit)?;
         let scale = scale.unwrap_or(if sixteen { 256.0 } else { 1.0 });
         let disparity = |value: u16| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / scale };
         (size, values.into_iter().map(disparity).collect())
@@ -90,7 +109,7 @@ pub(crate) fn read_map(path: &Path, scale: Option<f32>, limit: PixelLimit) -> Re
 
 /// Reads a mask [height][width]: true where the stored value is 255.
 pub(crate) fn read_mask(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<bool>), Failure> {
-    let (size, values, sixteen) = read_grey16(path, limit)?;
+    let (size, values, sixteen) = read_stored_grey(path, limit)?;
     if sixteen {
         return Err(Failure::reading(path, &"a mask has 8 bits, 255 where a pixel counts"));
     }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Drawing, Report, tables::Table};
+use crate::record::Device;
 
 /// The whole page.
 pub(super) fn page(report: &Report<'_>) -> String {
@@ -47,6 +48,7 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
          the wall clock. Machines are noisy: compare ratios, and mind the ranges."
             .to_owned(),
     ];
+    facts.extend(report.results.devices().into_iter().map(|(backend, device)| device_fact(backend, device)));
     if run.quick {
         let k = run.k;
         facts.push(format!(
@@ -56,11 +58,16 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
     if !record.complete {
         facts.push("The run is not complete: \"not run\" marks what is missing.".to_owned());
     }
-    let software = record.cells.iter().filter(|cell| cell.software_rasteriser).map(|cell| cell.device.as_str());
-    if let Some(device) = software.into_iter().next() {
-        facts.push(format!("{device} is a CPU that pretends to be a GPU: its times are not a GPU's."));
-    }
     facts
+}
+
+fn device_fact(backend: &str, device: &Device) -> String {
+    let through =
+        [&device.api, &device.driver].into_iter().flatten().map(|name| format!(", {name}")).collect::<String>();
+    let software = "; a CPU that pretends to be a GPU: its times are not a GPU's";
+    let software = if device.software_rasteriser { software } else { "" };
+    let workers = if device.workers == 1 { "1 worker".to_owned() } else { format!("{} workers", device.workers) };
+    format!("Backend {backend}: {}{through}, {workers}{software}.", device.name)
 }
 
 /// What stands under a table's heading: its data, and what a reader must know.

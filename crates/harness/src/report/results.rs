@@ -3,7 +3,7 @@
 use super::{format::Spread, thesis::Thesis};
 use crate::{
     failure::Failure,
-    record::{Cell, Measurement, Outcome, Record, Sample, Scene},
+    record::{Cell, Device, Measurement, Outcome, Record, Sample, Scene},
     scenes::Source,
 };
 
@@ -20,7 +20,7 @@ impl Part {
     /// Its time in a sample, in milliseconds.
     pub(super) fn ms(self, sample: &Sample) -> f64 {
         match self {
-            Self::MessagePassing => sample.stages.message_passing_ms(),
+            Self::MessagePassing => sample.message_passing_ms(),
             Self::Total => sample.total_ms,
         }
     }
@@ -57,6 +57,12 @@ impl<'a> Results<'a> {
     /// Where the images come from, in words.
     pub(super) fn data(&self) -> &'static str {
         Source::describe(&self.record.run.data)
+    }
+
+    /// The devices that were used, each with its backend's name.
+    pub(super) fn devices(&self) -> Vec<(&'a str, &'a Device)> {
+        let first = |backend| self.record.cells.iter().find(|cell: &&Cell| cell.backend == backend);
+        self.backends().filter_map(|backend| Some((backend, &first(backend)?.device))).collect()
     }
 
     /// Images, labels and loops, for every table and chart.

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use bp_core::{
-    Algorithm, Backend, Energy, Matcher, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels,
+    Algorithm, Energy, Matcher, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels,
 };
 
 use crate::{
+    backends,
     failure::Failure,
-    files::{PixelLimit, read_grey16},
+    files::{PixelLimit, read_stored_grey},
     record::Labelling,
     scenes::Manifest,
 };
@@ -41,8 +42,8 @@ pub(super) fn compare(folder: &Path, observer: &mut Observer<'_>) -> Result<Vec<
             add(method, false, &load_labels(folder, scene, method, pair.size())?)?;
         }
         let settings = Algorithm::Bp.settings(pair.size(), LOOPS, 1, Schedule::Checkerboard);
-        let device = bp_cpu_scalar::Scalar.open(0)?;
-        let mut matcher = Matcher::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
+        let reference = backends::reference()?;
+        let mut matcher = Matcher::new(reference.device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
         matcher.solve_observed(&pair, observer)?;
         add(&format!("BP, {LOOPS} checkerboard loops"), true, matcher.labels())?;
     }
@@ -59,7 +60,7 @@ fn load_pair(folder: &Path, scene: &str) -> Result<StereoPair, Failure> {
 fn load_labels(folder: &Path, scene: &str, method: &str, size: Size) -> Result<Vec<u16>, Failure> {
     let path = folder.join(format!("mrf-benchmark/{scene}/{scene}-{method}.png"));
     Manifest::read()?.checked(folder, &path)?;
-    let (found, values, _) = read_grey16(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+    let (found, values, _) = read_stored_grey(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
     if found != size || values.iter().any(|value| value % 17 != 0) {
         return Err(Failure::reading(&path, &"not a label map of this scene"));
     }

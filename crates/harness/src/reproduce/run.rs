@@ -1,6 +1,8 @@
 //! Takes the samples: plan after plan in turns, saving each.
 
-use bp_core::{Backend, DeviceInfo, Energy, Matcher, Plan, Times};
+use std::{ops::ControlFlow, time::Instant};
+
+use bp_core::{Energy, Matcher, Plan, Times};
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -9,12 +11,12 @@ use super::{
     storage::{MAPS_FOLDER, Storage},
 };
 use crate::{
-    backends,
+    backends::{self, Opened},
     failure::Failure,
     files::{hex, write_map},
     interrupt::ProgressBar,
     machine,
-    record::{self, Cell, Clock, Measurement, Outcome, Run, Sample},
+    record::{self, Cell, Measurement, Outcome, Record, Sample, Settings},
     scenes::{Scene, Source},
 };
 
@@ -25,22 +27,28 @@ pub const ONE_SAMPLE_ABOVE_MS: f64 = 5000.0;
 /// Nanoseconds a message entry, to guess before the first sample which cells will get others.
 const GUESSED_NS: f64 = 2.5;
 
-/// Runs all cells that the record does not hold yet.
-pub(crate) fn run(source: &Source, storage: &mut Storage) -> Result<(), Failure> {
+/// Runs all cells that the record does not hold yet, on these devices.
+pub(crate) fn run(source: &Source, devices: &[Opened], storage: &mut Storage) -> Result<(), Failure> {
     let bar = ProgressBar::new(1);
     for index in 0..crate::scenes::THESIS_SCENES.len() {
         bar.message(format!("scene {} of 6", index + 1));
         let scene = source.load(index)?;
-        add_scene(storage, &scene)?;
+        add_scene(storage, &scene, devices)?;
         bar.set_total(work(storage.record(), index));
         bar.resume_at(done(storage.record()));
-        run_scene(&scene, storage, &bar)?;
+        for round in 0..storage.record().run.samples {
+            for planned in plans::all() {
+                for device in devices {
+                    sample_cell(&scene, &planned, device, round, storage, &bar)?;
+                }
+            }
+        }
     }
     let quick = storage.record().run.quick;
     if let Some(folder) = source.folder().filter(|_| !quick && storage.record().labellings.is_empty()) {
         bar.message("outside energies".to_owned());
-        let record = storage.record().clone();
-        storage.record_mut().labellings = energies::compare(folder, &mut |_| bar.update(done(&record)))?;
+        let done = done(storage.record());
+        storage.record_mut().labellings = energies::compare(folder, &mut |_| bar.update(done))?;
     }
     bar.finish();
     storage.record_mut().complete = true;
@@ -48,7 +56,7 @@ pub(crate) fn run(source: &Source, storage: &mut Storage) -> Result<(), Failure>
 }
 
 /// Adds a scene and its cells to the record, or checks that the record's scene is this one.
-fn add_scene(storage: &mut Storage, scene: &Scene) -> Result<(), Failure> {
+fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Opened]) -> Result<(), Failure> {
     let run = storage.record().run.clone();
     if let Some(known) = storage.record().scenes.iter().find(|known| known.name == scene.record.name) {
         if *known == scene.record {
@@ -60,9 +68,14 @@ fn add_scene(storage: &mut Storage, scene: &Scene) -> Result<(), Failure> {
     let mut cells = Vec::new();
     for planned in plans::all() {
         let plan = planned.plan(scene.pair.size(), &run)?;
-        for name in &run.backends {
-            cells.push(cell(&scene.record.name, &planned, &plan, backends::by_name(name)?, &run));
-        }
+        cells.extend(devices.iter().map(|device| Cell {
+            scene: scene.record.name.clone(),
+            plan: planned.name.to_owned(),
+            backend: device.name.clone(),
+            device: (&device.info).into(),
+            settings: settings(&planned, &plan, device, &run),
+            outcome: Outcome::Pending,
+        }));
     }
     let record = storage.record_mut();
     record.scenes.push(scene.record.clone());
@@ -70,72 +83,33 @@ fn add_scene(storage: &mut Storage, scene: &Scene) -> Result<(), Failure> {
     storage.save()
 }
 
-/// A cell that is still to be run.
-fn cell(scene: &str, planned: &Planned, plan: &Plan, backend: &dyn Backend, run: &Run) -> Cell {
-    let (model, settings) = (plan.model(), plan.settings());
-    let none = || DeviceInfo { name: "none".to_owned(), software_rasteriser: false };
-    let device = backend.devices().into_iter().next().unwrap_or_else(none);
-    Cell {
-        scene: scene.to_owned(),
-        plan: planned.name.to_owned(),
-        backend: backend.name().to_owned(),
-        device: device.name,
-        software_rasteriser: device.software_rasteriser,
-        profile: model.profile().name().to_owned(),
-        labels: model.labels(),
-        slope: model.slope(),
-        truncation: model.truncation(),
-        algorithm: planned.algorithm.name().to_owned(),
-        k: planned.k(run),
-        z: planned.z,
-        grids: settings.grids,
-        steps: settings.steps,
-        schedule: settings.schedule.name().to_owned(),
-        message_start: settings.message_start.name().to_owned(),
-        cut: settings.cut.map(|cut| record::Cut { x: cut.x, y: cut.y, seed_start: cut.seed_start }),
-        message_updates: plan.message_updates(),
-        planned_bytes: plan.bytes(),
-        outcome: Outcome::Pending,
-    }
-}
-
-/// Rounds of one sample a cell, so that samples of different plans are taken in turns.
-fn run_scene(scene: &Scene, storage: &mut Storage, bar: &ProgressBar) -> Result<(), Failure> {
-    let run = storage.record().run.clone();
-    for round in 0..run.samples {
-        for planned in plans::all() {
-            for backend in &run.backends {
-                sample_cell(scene, &planned, backend, round, storage, bar)?;
-            }
-        }
-    }
-    Ok(())
+fn settings(planned: &Planned, plan: &Plan, device: &Opened, run: &record::Run) -> Settings {
+    Settings::new(plan, device.device.as_ref(), planned.algorithm, (planned.k(run), planned.z))
 }
 
 /// Takes the sample of one round, where the cell still wants it.
 fn sample_cell(
     scene: &Scene,
     planned: &Planned,
-    backend: &str,
+    device: &Opened,
     round: u32,
     storage: &mut Storage,
     bar: &ProgressBar,
 ) -> Result<(), Failure> {
-    let before = done(storage.record());
-    let run = storage.record().run.clone();
-    let is_it = |cell: &Cell| cell.scene == scene.record.name && cell.plan == planned.name && cell.backend == backend;
-    let Some(index) = storage.record().cells.iter().position(is_it) else { return Ok(()) };
-    if !wants_sample(&storage.record().cells[index], round) {
+    let (name, plan) = (&scene.record.name, planned.name);
+    let is_it = |cell: &Cell| cell.scene == *name && cell.plan == plan && cell.backend == device.name;
+    let record = storage.record();
+    let Some(index) = record.cells.iter().position(is_it) else { return Ok(()) };
+    if !wants_sample(&record.cells[index], round) {
         return Ok(());
     }
-    let map = format!("{MAPS_FOLDER}/{}-{}.png", scene.record.name, planned.name);
-    bar.message(format!("{} {} {backend}", scene.record.name, planned.name));
-    let outcome = match solve(scene, planned, backend, &run, &mut |done| bar.update(before + done)) {
+    bar.message(format!("{name} {plan} {}", device.name));
+    let before = done(record);
+    let outcome = match solve(scene, planned, device, &record.run, &mut |done| bar.update(before + done)) {
         Ok(solved) => {
-            let sample = sample(round, &solved);
-            let line = format!("{:<11}{:<10}{backend:<8}{:>10.1} ms", scene.record.name, planned.name, sample.total_ms);
-            bar.line(&line);
-            measured(&storage.record().cells[index], scene, solved, sample, map, storage)?
+            let total_ms = 1000.0 * solved.times.total.as_secs_f64();
+            bar.line(&format!("{name:<11}{plan:<10}{:<8}{total_ms:>10.1} ms", device.name));
+            measured(&record.cells[index], round, scene, solved, storage)?
         }
         Err(failure) if failure.is_interrupted() => return Err(failure),
         Err(failure) => Outcome::Error(failure.to_string()),
@@ -165,79 +139,96 @@ struct Solved {
 fn solve(
     scene: &Scene,
     planned: &Planned,
-    backend: &str,
-    run: &Run,
-    update: &mut dyn FnMut(u64) -> std::ops::ControlFlow<()>,
+    device: &Opened,
+    run: &record::Run,
+    update: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Solved, Failure> {
     let plan = planned.plan(scene.pair.size(), run)?;
-    machine::check_memory(plan.bytes(), "--quick needs less")?;
-    let device = backends::by_name(backend)?.open(0)?;
-    let start = std::time::Instant::now();
-    let mut matcher = Matcher::new(device.as_ref(), plan)?;
+    machine::check_memory(device.device.planned_bytes(&plan), "--quick needs less")?;
+    let start = Instant::now();
+    let mut matcher = Matcher::new(device.device.as_ref(), plan)?;
     let prepare_ms = 1000.0 * start.elapsed().as_secs_f64();
     let times = matcher.solve_observed(&scene.pair, &mut |progress| update(progress.done))?;
     Ok(Solved { matcher, prepare_ms, times })
 }
 
-fn sample(round: u32, solved: &Solved) -> Sample {
-    Sample {
-        round,
-        clock: Clock::Wall,
-        prepare_ms: solved.prepare_ms,
-        stages: (&solved.times).into(),
-        total_ms: 1000.0 * solved.times.total.as_secs_f64(),
-    }
-}
-
-/// Adds a sample to a cell's measurement; the first one brings the answer's quality and map, later ones must answer the
-/// same.
-fn measured(
-    cell: &Cell,
-    scene: &Scene,
-    solved: Solved,
-    sample: Sample,
-    map: String,
-    storage: &Storage,
-) -> Result<Outcome, Failure> {
+/// Adds a sample to a cell's measurement. The first one brings the answer's quality and map; all samples on all devices
+/// must answer the same.
+fn measured(cell: &Cell, round: u32, scene: &Scene, solved: Solved, storage: &Storage) -> Result<Outcome, Failure> {
     let labels: Vec<u8> = solved.matcher.labels().iter().flat_map(|label| label.to_le_bytes()).collect();
     let labels_sha256 = hex(&Sha256::digest(labels));
-    if let Some(measurement) = cell.measured() {
-        if measurement.labels_sha256 != labels_sha256 {
-            return Ok(Outcome::Error("two runs gave different labels".to_owned()));
+    let same = |other: &&Cell| other.scene == cell.scene && other.plan == cell.plan;
+    for other in storage.record().cells.iter().filter(same) {
+        if other.measured().is_some_and(|measured| measured.labels_sha256 != labels_sha256) {
+            return Ok(Outcome::Error(format!("other labels than an earlier run on {}", other.backend)));
         }
-        let mut measurement = measurement.clone();
-        measurement.samples.push(sample);
-        return Ok(Outcome::Measured(Box::new(measurement)));
     }
-    let disparities = solved.matcher.disparities();
+    let sample = Sample {
+        round,
+        prepare_ms: solved.prepare_ms,
+        total_ms: 1000.0 * solved.times.total.as_secs_f64(),
+        clocks: record::clocks(&solved.times),
+    };
+    let mut measurement = match cell.measured() {
+        Some(measurement) => measurement.clone(),
+        None => first_measurement(cell, scene, &solved.matcher, labels_sha256, storage)?,
+    };
+    measurement.samples.push(sample);
+    Ok(Outcome::Measured(Box::new(measurement)))
+}
+
+/// What does not vary from sample to sample; writes the disparity map.
+fn first_measurement(
+    cell: &Cell,
+    scene: &Scene,
+    matcher: &Matcher,
+    labels_sha256: String,
+    storage: &Storage,
+) -> Result<Measurement, Failure> {
+    let disparities = matcher.disparities();
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
+    let map = format!("{MAPS_FOLDER}/{}-{}.png", cell.scene, cell.plan);
     write_map(&storage.folder().join(&map), &disparities)?;
-    Ok(Outcome::Measured(Box::new(Measurement {
-        samples: vec![sample],
-        allocated_bytes: solved.matcher.allocated_bytes(),
-        energy: Energy::of(&scene.pair, solved.matcher.plan().model(), solved.matcher.labels())?.into(),
+    Ok(Measurement {
+        samples: Vec::new(),
+        allocated_bytes: matcher.allocated_bytes(),
+        energy: Energy::of(&scene.pair, matcher.plan().model(), matcher.labels())?.into(),
         all: errors.all.into(),
         visible: visible.into(),
         labels_sha256,
         map,
-    })))
+    })
 }
 
 /// Message entries of all samples taken so far.
-fn done(record: &record::Record) -> u64 {
+fn done(record: &Record) -> u64 {
     let samples = |cell: &Cell| cell.measured().map_or(0, |measurement| measurement.samples.len() as u64);
-    record.cells.iter().map(|cell| samples(cell) * cell.message_updates).sum()
+    record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum()
 }
 
 /// Message entries of the whole run, as far as can be told once the scenes up to `index` are known: those to come are
 /// taken to be like these.
-fn work(record: &record::Record, index: usize) -> u64 {
+fn work(record: &Record, index: usize) -> u64 {
     let samples = |cell: &Cell| {
         let first = cell.measured().and_then(|measurement| measurement.samples.first());
-        let total_ms = first.map_or(cell.message_updates as f64 * GUESSED_NS / 1e6, |sample| sample.total_ms);
+        let guess = cell.settings.message_updates as f64 * GUESSED_NS / 1e6;
+        let total_ms = first.map_or(guess, |sample| sample.total_ms);
         if total_ms > ONE_SAMPLE_ABOVE_MS { 1 } else { u64::from(record.run.samples) }
     };
-    let known: u64 = record.cells.iter().map(|cell| samples(cell) * cell.message_updates).sum();
+    let known: u64 = record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum();
     known * 6 / (index as u64 + 1)
+}
+
+/// The devices that a run asks for, each once.
+pub(crate) fn open_devices(names: &[String]) -> Result<Vec<Opened>, Failure> {
+    let mut devices: Vec<Opened> = Vec::new();
+    for name in names {
+        let device = backends::open(name)?;
+        if devices.iter().any(|other| other.name == device.name) {
+            return Err(Failure::usage(format!("--backend names {} twice", device.name)));
+        }
+        devices.push(device);
+    }
+    Ok(devices)
 }

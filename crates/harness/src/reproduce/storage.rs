@@ -1,7 +1,7 @@
 //! The folder of a run: begun once, gone on with after an interruption, never overwritten.
 
 use std::{
-    fs,
+    fs::{self, File, TryLockError},
     path::{Path, PathBuf},
 };
 
@@ -11,7 +11,8 @@ use crate::{
     failure::Failure,
     files::{create_folder, write_text},
     machine,
-    record::{Machine, Record, Run, SCHEMA_VERSION},
+    record::{Machine, Outcome, Program, Record, Run, SCHEMA_VERSION},
+    tell,
 };
 
 /// Name of the record in a run's folder.
@@ -20,27 +21,42 @@ pub(crate) const RECORD_FILE: &str = "record.json";
 /// Name of the folder of disparity maps in a run's folder.
 pub(crate) const MAPS_FOLDER: &str = "maps";
 
+/// Name of the file whose lock says that a run is at work.
+const LOCK_FILE: &str = ".lock";
+
 /// A run being recorded.
 pub(crate) struct Storage {
     folder: PathBuf,
     record: Record,
+    /// Held as long as the run is at work; the system lets go of it however the program ends.
+    _lock: File,
 }
 
-/// Goes on with an interrupted run of the same program, machine and settings, or begins a new one.
+/// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
+/// process is at work on is left to it.
 pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let same = |record: &Record| {
         !record.complete && record.program == program && record.machine == machine && record.run == run
     };
     for folder in runs(results) {
-        if let Ok(record) = load_record(&folder)
-            && same(&record)
-        {
-            eprintln!("going on with the interrupted run in {}", folder.display());
-            return Ok(Storage { folder, record });
-        }
+        let Some(lock) = load_record(&folder).ok().filter(same).and_then(|_| lock(&folder).ok().flatten()) else {
+            continue;
+        };
+        tell(&format!("going on with the interrupted run in {}", folder.display()));
+        // Read again: another process may have been at work until the lock was had.
+        let mut record = load_record(&folder)?;
+        record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
+            cell.outcome = Outcome::Pending;
+        });
+        return Ok(Storage { folder, record, _lock: lock });
     }
+    begin(results, program, machine, run)
+}
+
+fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let folder = new_folder(results, &machine, &run)?;
+    let lock = lock(&folder)?.ok_or_else(|| Failure::writing(&folder, &"another process took it"))?;
     let now = Timestamp::now().to_string();
     let record = Record {
         schema_version: SCHEMA_VERSION,
@@ -54,9 +70,20 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
         cells: Vec::new(),
         labellings: Vec::new(),
     };
-    let mut storage = Storage { folder, record };
+    let mut storage = Storage { folder, record, _lock: lock };
     storage.save()?;
     Ok(storage)
+}
+
+/// The lock of a run's folder; `None` where another process holds it.
+fn lock(folder: &Path) -> Result<Option<File>, Failure> {
+    let path = folder.join(LOCK_FILE);
+    let file = File::create(&path).map_err(|error| Failure::writing(&path, &error))?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(error)) => Err(Failure::writing(&path, &error)),
+    }
 }
 
 /// Reads the record of a run's folder.

@@ -73,14 +73,14 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
         cells.extend([bad(&row, "bp"), bad(&row, plan.plan)]);
         cells
     });
-    let note = "Speed-up is (T_BP / T - 1) * 100. Both run on one worker of the same backend; the range, where there is \
+    let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device; the range, where there is \
                 one, is over rounds in which the two took turns.";
     Table::new(number, format!("{} against BP: processing speed", family(plans)), &columns).note(note).rows(rows)
 }
 
 /// Message entries of BP over those of a plan, as predicted.
 fn fewer_updates(row: &Row<'_>, plan: &Named) -> Option<f64> {
-    Some(row.cell("bp")?.message_updates as f64 / row.cell(plan.plan)?.message_updates as f64)
+    Some(row.cell("bp")?.settings.message_updates as f64 / row.cell(plan.plan)?.settings.message_updates as f64)
 }
 
 /// Tables 3.19, 3.22, 3.25a, 3.27.

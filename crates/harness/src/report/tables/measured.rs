@@ -49,14 +49,15 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
             or(row.measured(plan.plan).map(|measured| measured.samples.len().to_string()), "0"),
         ]
     });
-    let side_by_side = " Parts run one after another; running them side by side needs a backend with threads, and this \
-                        run has none.";
+    let one_worker = results.devices().iter().all(|(_, device)| device.workers == 1);
+    let side_by_side = " Parts run one after another; running them side by side needs a backend with several workers, \
+                        and this run has none.";
     let cut = plans.iter().any(|plan| plan.plan.starts_with("ct"));
-    table.note(format!("{note}{}", if cut { side_by_side } else { "" }))
+    table.note(format!("{note}{}", if cut && one_worker { side_by_side } else { "" }))
 }
 
 fn grids_and_loops(cell: &Cell) -> String {
-    format!("{} x {}", cell.grids, cell.steps)
+    format!("{} x {}", cell.settings.grids, cell.settings.steps_per_grid)
 }
 
 /// Tables 3.4, 3.7, 3.10, 3.13, 3.16.
@@ -69,7 +70,7 @@ pub(super) fn memory(results: &Results<'_>, number: &str, plans: &[Named]) -> Ta
         let allocated = row.measured(plan.plan).map(|measured| measured.allocated_bytes);
         vec![
             NOT_PRINTED.to_owned(),
-            or(row.cell(plan.plan).map(|cell| mib(cell.planned_bytes)), ""),
+            or(row.cell(plan.plan).map(|cell| mib(cell.settings.planned_bytes)), ""),
             or(allocated.map(mib), row.missing(plan.plan)),
         ]
     })

@@ -9,10 +9,13 @@ use crate::report::{
 /// Table 3.1.
 pub(super) fn computer(results: &Results<'_>) -> Table {
     let (machine, program) = (&results.record.machine, &results.record.program);
+    let gpus: Vec<_> = results.devices().into_iter().filter(|(_, device)| device.api.is_some()).collect();
+    let gpus = gpus.iter().map(|(_, device)| device.name.as_str()).collect::<Vec<_>>().join(", ");
+    let gpus = if gpus.is_empty() { "none used".to_owned() } else { gpus };
     let ours = |what: &str| match what {
         "Processor" => format!("{}, {} cores usable", machine.cpu, machine.cores),
         "Memory" => format!("{} MiB", number(mebibytes(machine.memory_bytes), 0)),
-        "GPU" => "none used".to_owned(),
+        "GPU" => gpus.clone(),
         "System" => machine.system.clone(),
         _ => format!("bp {}, {}, {}", program.version, program.rustc, program.flags),
     };

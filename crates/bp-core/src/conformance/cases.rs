@@ -1,0 +1,73 @@
+//! What backends are compared on.
+
+use super::Case;
+use crate::{Algorithm, Cut, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+
+/// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels, and
+/// with the smoothness that strains 8 bits most.
+pub fn cases() -> impl Iterator<Item = Case> {
+    let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
+    let small = sizes.into_iter().flat_map(|size| [1, 2, 3, 16].map(|labels| (size, labels)));
+    let many_labels = [64, 112, 256, 300].map(|labels| ((5, 3), labels));
+    let every = small
+        .chain(many_labels)
+        .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
+    // Wide enough for several tiles of the widest vectors; fewer models, since the oracle is slow.
+    let wide = [(131, 7), (200, 3), (67, 40)].into_iter().flat_map(|size| {
+        Profile::ALL.into_iter().filter_map(move |profile| Some((size, Model::new(profile, 5).ok()?)))
+    });
+    every.chain(wide).flat_map(|((width, height), model)| {
+        let pair = noise_pair(width, height, model.labels() as u64);
+        settings(pair.size()).into_iter().filter_map(move |settings| {
+            Some(Case { plan: Plan::new(pair.size(), model, settings).ok()?, pair: pair.clone() })
+        })
+    })
+}
+
+fn models(labels: usize) -> Vec<Model> {
+    let of = |profile| Model::new(profile, labels).into_iter();
+    let strained = [(1, 63), (63, 63), (255, 63), (0, 5), (3, 0)];
+    let plain = Profile::ALL.into_iter().flat_map(of);
+    let strained = strained.into_iter().flat_map(move |(slope, truncation)| {
+        of(Profile::Mrf).filter_map(move |model| model.with_smoothness(slope, truncation).ok())
+    });
+    let negative = of(Profile::Census).filter_map(|model| model.with_min_disparity(-2).ok());
+    plain.chain(strained).chain(negative).collect()
+}
+
+fn settings(size: Size) -> Vec<Settings> {
+    let mut all = Vec::new();
+    for schedule in Schedule::ALL {
+        all.extend(Algorithm::ALL.map(|algorithm| algorithm.settings(size, 7, 2, schedule)));
+        let cut = Cut { x: size.width / 3, y: 2 * size.height / 3, seed_start: false };
+        all.push(Settings { cut: Some(cut), ..Algorithm::Ctbp.settings(size, 4, 1, schedule) });
+        let hierarchy = Algorithm::Cfbp.settings(size, 7, 1, schedule);
+        all.extend(MessageStart::ALL.map(|message_start| Settings { grids: 3, steps: 3, message_start, ..hierarchy }));
+    }
+    all
+}
+
+/// A pair of coloured noise, the same for the same arguments. Blocks of 4x4 pixels are shifted by 0, 1 or 2, so that
+/// children of a coarse node disagree strongly; every fifth pixel matches nothing.
+///
+/// # Panics
+/// Where the size is no image's.
+#[must_use]
+pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
+    let hash = |i: u64| {
+        let mut z = (seed << 32 ^ i).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z ^ (z >> 27)
+    };
+    let view = |right: bool| {
+        let pixel = |i: usize| {
+            let shift = if right { (i % width / 4 + i / width / 4) % 3 } else { 0 };
+            let unmatched = right && i.is_multiple_of(5);
+            let [r, g, b, ..] = hash(if unmatched { !(i as u64) } else { (i + shift) as u64 }).to_le_bytes();
+            [r, g, b]
+        };
+        Image::from_rgb(width, height, (0..width * height).map(pixel).collect())
+    };
+    let pair = view(false).and_then(|left| StereoPair::new(left, view(true)?));
+    pair.unwrap_or_else(|error| panic!("{error}"))
+}
