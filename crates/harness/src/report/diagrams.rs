@@ -62,29 +62,32 @@ fn speed_ups(
             series.extend(ours(results, &name, series.len(), |row| row.speed_up(plan.plan, part)));
         }
     }
-    // The same numbers are printed for every digit that Z'''' may have had.
-    let mut printed: Vec<&Named> = plans.iter().collect();
-    printed.dedup_by_key(|plan| plan.printed);
     // Where each plan has one series, its printed one looks alike; else those are told apart among themselves.
-    let shared = parts.len() == 1;
-    for (i, plan) in printed.into_iter().enumerate() {
-        let title = family(&[*plan]);
-        let value = |index| {
-            let algorithm = plan.printed?;
-            Some(point(results.thesis.time_ms("bp", index)? / results.thesis.time_ms(algorithm, index)?))
-        };
-        let points = results.scenes().map(|(index, _)| value(index)).collect();
-        series.push(Series {
-            name: format!("{title}: printed in the thesis"),
-            printed: true,
-            style: if shared { i } else { series.len() },
-            points,
-        });
-    }
+    let first_style = if parts.len() == 1 { 0 } else { series.len() };
+    series.extend(printed(results, plans, first_style));
     let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", series, Some(1.0));
     let caption = "Above 1 is faster than BP. Printed times are of the thesis's GPU program in all; ours are apart for \
                    message passing and in all. Whiskers, where there are any, are ranges over rounds.";
     drawing(numbers, chart, caption)
+}
+
+/// The printed speed-ups of some plans; their styles are numbered from `style` on.
+fn printed(results: &Results<'_>, plans: &[Named], style: usize) -> Vec<Series> {
+    // The same numbers are printed for every digit that CTCSBP's coefficient may have had.
+    let mut plans: Vec<Named> = plans.to_vec();
+    plans.dedup_by_key(|plan| plan.printed);
+    let value = |plan: &Named, index| {
+        let algorithm = plan.printed?;
+        let value = results.thesis.time_ms("bp", index)? / results.thesis.time_ms(algorithm, index)?;
+        Some(Point { value, low: value, high: value })
+    };
+    let series = |(i, plan): (usize, &Named)| Series {
+        name: format!("{}: printed in the thesis", family(&[*plan])),
+        printed: true,
+        style: style + i,
+        points: results.scenes().map(|(index, _)| value(plan, index)).collect(),
+    };
+    plans.iter().enumerate().map(series).collect()
 }
 
 fn memories(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
@@ -123,10 +126,6 @@ fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>
             .collect(),
     };
     results.backends().enumerate().map(series).collect()
-}
-
-fn point(value: f64) -> Point {
-    Point { value, low: value, high: value }
 }
 
 fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series>, reference: Option<f64>) -> Chart {

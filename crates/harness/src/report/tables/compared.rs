@@ -1,7 +1,7 @@
 //! Algorithms against BP, and all of them together.
 
 use super::{
-    Named, Table, family,
+    BP, Named, Table, family,
     measured::{mib, which},
     thesis_plans,
 };
@@ -57,16 +57,11 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
         "plan, %",
     ];
     let rows = pairs(results, plans).map(|(row, plan)| {
-        let printed = |name: &str| or(results.thesis.time_ms(name, row.index).map(|ms| format!("{ms}")), "not printed");
-        let name = plan.printed.unwrap_or("");
-        let printed_percent = results.thesis.speed_up_percent(name, row.index);
+        let [printed_ms, printed_percent] = printed(results, &row, plan);
+        let [bp_ms, _] = printed(results, &row, &BP);
+        let fewer = fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2} x"));
         let mut cells = which(&row, plan);
-        cells.extend([
-            printed("bp"),
-            printed(name),
-            or(printed_percent.map(|percent| format!("{percent:.2}")), "not printed"),
-            or(fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2} x")), ""),
-        ]);
+        cells.extend([bp_ms, printed_ms, printed_percent, or(fewer, "")]);
         for part in [Part::MessagePassing, Part::Total] {
             cells.extend([time(&row, "bp", part), time(&row, plan.plan, part), speed_up(&row, plan.plan, part)]);
         }
@@ -76,6 +71,14 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
     let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device; the range, where there is \
                 one, is over rounds in which the two took turns.";
     Table::new(number, format!("{} against BP: processing speed", family(plans)), &columns).note(note).rows(rows)
+}
+
+/// The printed time of a plan and its speed-up over BP.
+fn printed(results: &Results<'_>, row: &Row<'_>, plan: &Named) -> [String; 2] {
+    let name = plan.printed.unwrap_or("");
+    let ms = results.thesis.time_ms(name, row.index).map(|ms| format!("{ms}"));
+    let percent = results.thesis.speed_up_percent(name, row.index).map(|percent| format!("{percent:.2}"));
+    [or(ms, "not printed"), or(percent, if plan.plan == "bp" { "" } else { "not printed" })]
 }
 
 /// Message entries of BP over those of a plan, as predicted.
@@ -153,13 +156,8 @@ pub(super) fn all_speeds(results: &Results<'_>) -> Table {
     ];
     let plans = thesis_plans();
     let rows = pairs(results, &plans).map(|(row, plan)| {
-        let name = plan.printed.unwrap_or("");
-        let printed_percent = results.thesis.speed_up_percent(name, row.index);
         let mut cells = which(&row, plan);
-        cells.extend([
-            or(results.thesis.time_ms(name, row.index).map(|ms| format!("{ms}")), "not printed"),
-            or(printed_percent.map(|percent| format!("{percent:.2}")), ""),
-        ]);
+        cells.extend(printed(results, &row, plan));
         for part in [Part::MessagePassing, Part::Total] {
             let ours = if plan.plan == "bp" { String::new() } else { speed_up(&row, plan.plan, part) };
             cells.extend([time(&row, plan.plan, part), ours]);
