@@ -94,8 +94,8 @@ pub struct Errors {
     pub visible: Option<MapErrors>,
 }
 
-/// Errors over a set of pixels of known truth. Without any such pixel, or any answered one, the figures over them are 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Errors over a set of pixels of known truth. Figures over no pixel at all are NaN: nothing was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapErrors {
     /// Pixels of known truth (N).
     pub known: u64,
@@ -123,11 +123,11 @@ impl MapErrors {
                 }
             }
         }
-        let percent = |part: u64, of: u64| 100.0 * part as f64 / of.max(1) as f64;
+        let percent = |part: u64, of: u64| 100.0 * part as f64 / of as f64;
         Self {
             known,
             answered,
-            rmse: (squares / answered.max(1) as f64).sqrt(),
+            rmse: (squares / answered as f64).sqrt(),
             bad: wrong.map(|wrong| percent(wrong, answered)),
             bad_or_unanswered: wrong.map(|wrong| percent(wrong + known - answered, known)),
         }
@@ -174,8 +174,11 @@ mod tests {
     }
 
     #[test]
-    fn nothing_known_gives_zeros_not_nan() {
-        let errors = GroundTruth::new(map(&[NONE])).errors(&map(&[1.0])).unwrap();
-        assert_eq!(errors.all, MapErrors::default());
+    fn nothing_measured_is_not_a_perfect_score() {
+        let nothing_known = GroundTruth::new(map(&[NONE])).errors(&map(&[1.0])).unwrap().all;
+        assert!(nothing_known.rmse.is_nan() && nothing_known.bad_or_unanswered[1].is_nan());
+        let nothing_answered = GroundTruth::new(map(&[1.0])).errors(&map(&[NONE])).unwrap().all;
+        assert!(nothing_answered.rmse.is_nan() && nothing_answered.bad[1].is_nan());
+        assert_eq!(nothing_answered.bad_or_unanswered, [100.0; 4]);
     }
 }

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule};
+use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
 use clap::{
     Args, Parser, Subcommand,
-    builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
+    builder::{NonEmptyStringValueParser, OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
 use crate::files::PixelLimit;
@@ -50,21 +50,13 @@ pub(crate) struct MatchArgs {
     pub(crate) left: PathBuf,
     /// The right image, of the same size; rows must correspond (a rectified pair).
     pub(crate) right: PathBuf,
-    /// The disparity map to write: .pfm holds disparities in pixels, .png 256 times them in 16 bits.
+    /// The disparity map to write: .pfm holds disparities in pixels, .png 256 times them in 16 bits (a disparity of
+    /// 0 as 1, since 0 is unknown).
     #[arg(long, short, value_name = "MAP")]
     pub(crate) output: PathBuf,
     /// Also write the map as a coloured picture.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
-    /// What to run.
-    #[command(flatten)]
-    pub(crate) plan: PlanArgs,
-    /// Ground truth of the left image: errors are measured where it is given.
-    #[arg(long, value_name = "MAP")]
-    pub(crate) ground_truth: Option<PathBuf>,
-    /// How ground truth is read.
-    #[command(flatten)]
-    pub(crate) truth: TruthArgs,
     /// Print everything as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -74,6 +66,15 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
+    /// Ground truth of the left image: errors are measured where it is given.
+    #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
+    pub(crate) ground_truth: Option<PathBuf>,
+    /// What to run.
+    #[command(flatten)]
+    pub(crate) plan: PlanArgs,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) truth: TruthArgs,
 }
 
 /// What to run.
@@ -94,7 +95,8 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
     pub(crate) labels: Option<u16>,
     /// Disparity of the first label in pixels; may be negative.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
     pub(crate) min_disparity: i32,
     /// Loops (k) that the algorithm derives its own from; with --grids, loops on each grid. [default: labels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -150,15 +152,15 @@ pub(crate) struct EvaluateArgs {
     /// What the map's stored values are divided by to give pixels; 0 is unanswered. [default: as for --scale]
     #[arg(long, value_name = "N", value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
-    /// How ground truth is read.
-    #[command(flatten)]
-    pub(crate) options: TruthArgs,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) options: TruthArgs,
 }
 
 /// Which scenes.
@@ -193,7 +195,7 @@ pub(crate) struct ReproduceArgs {
     #[arg(long, default_value = "results", value_name = "DIR")]
     pub(crate) results: PathBuf,
     /// Name of this machine in that folder. [default: from its processor]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
     pub(crate) machine: Option<String>,
 }
 

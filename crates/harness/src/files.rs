@@ -43,6 +43,9 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
 /// An empty file in the folder of `path`, which vanishes unless it is kept.
 fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(Failure::writing(path, &format!("there is no folder {}", folder.display())));
+    }
     let mut builder = tempfile::Builder::new();
     // Temporary files are made for their owner alone; a result is for whom the user's mask says.
     #[cfg(unix)]

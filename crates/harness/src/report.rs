@@ -21,6 +21,7 @@ use crate::{
     files::write_text,
     record::Record,
     reproduce::{RECORD_FILE, load_record},
+    tell,
 };
 use results::Results;
 
@@ -70,12 +71,17 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
 
 /// `bp report`.
 pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
-    let record = load_record(&args.run)?;
+    let run = if args.run.ends_with(RECORD_FILE) { args.run.parent().unwrap_or(&args.run) } else { &args.run };
+    let record = load_record(run)?;
     match &args.readme {
-        None => write(&args.run, &record),
+        None => {
+            write(run, &record)?;
+            tell(&format!("report: {}", run.join("report.html").display()));
+            Ok(())
+        }
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|error| Failure::reading(path, &error))?;
-            let part = readme::part(&args.run, &Results::new(&record)?);
+            let part = readme::part(run, &Results::new(&record)?);
             let missing = || Failure::reading(path, &format!("the markers {BEGIN} and {END} are not in it"));
             write_text(path, &readme::splice(&text, &part).ok_or_else(missing)?)
         }

@@ -47,11 +47,12 @@ impl Source {
         let named = |folder: &PathBuf| !folder.as_os_str().is_empty();
         let folder = args.data.clone().filter(|folder| named(folder) && !args.synthetic);
         let (name, labels) = LABELS[if folder.is_some() { 0 } else { 2 } + usize::from(quick)];
-        if let Some(folder) = &folder
-            && !folder.join(name).is_dir()
-        {
-            let (folder, what) = (folder.display(), "see scripts/fetch-middlebury, or use --synthetic");
-            return Err(Failure::input(format!("--data {folder}: there is no folder {name} in it; {what}")));
+        if let Some(folder) = &folder {
+            let scenes = THESIS_SCENES.map(|scene| format!("{name}/{scene}"));
+            if let Some(scene) = scenes.into_iter().find(|scene| !folder.join(scene).is_dir()) {
+                let (folder, what) = (folder.display(), "see scripts/fetch-middlebury, or use --synthetic");
+                return Err(Failure::input(format!("--data {folder}: there is no folder {scene} in it; {what}")));
+            }
         }
         Ok(Self { folder, name, labels })
     }
@@ -183,7 +184,7 @@ impl Manifest {
             return Err(Failure::reading(path, &format!("{width}x{height} pixels instead of {expected}")));
         }
         if pixels_sha256(&image) != entry.sha256 {
-            let what = "its pixels are not those that bench-data/middlebury.json lists; fetch it again";
+            let what = "its pixels are not those that bench-data/middlebury.json lists; delete it and fetch it again";
             return Err(Failure::reading(path, &what));
         }
         Ok(image)

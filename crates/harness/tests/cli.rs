@@ -160,7 +160,7 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         ("--labels 0", ["--labels", "1024"]),
         ("--labels 100000", ["--labels", "1024"]),
         ("--loops 0", ["--loops", "0"]),
-        ("--min-disparity 99999999", ["least disparity", "99999999"]),
+        ("--min-disparity 99999999", ["--min-disparity", "99999999"]),
         ("--mask truth.png", ["--mask", "--ground-truth"]),
         ("--algorithm magic", ["--algorithm", "magic"]),
         ("--scale 0 --ground-truth truth.png", ["--scale", "above 0"]),
@@ -250,7 +250,11 @@ fn unanswered_pixels_are_counted_apart() {
         (&Value::from(0.0), &Value::from(50.0))
     );
     let masked = folder.json("evaluate truth.png truth.png --scale 2 --map-scale 1 --mask half.png --json");
-    assert_eq!(masked["visible"]["known"], 0);
+    assert_eq!((&masked["visible"]["known"], &masked["visible"]["rmse"]), (&Value::from(0), &Value::Null));
+    image::GrayImage::new(WIDTH, HEIGHT).save(folder.path("unknown.png")).unwrap();
+    let nothing = folder.json("evaluate unknown.png truth.png --json");
+    assert_eq!((&nothing["all"]["answered"], &nothing["all"]["bad"][1]), (&Value::from(0), &Value::Null));
+    folder.fails("evaluate truth.png unknown.png", 3, &["unknown.png", "without a known pixel"]);
     assert!(text(&folder.run("evaluate half.png truth.png").stdout).contains("unanswered wrong"));
 }
 

@@ -99,7 +99,7 @@ fn no_data_file_is_wrong_and_none_that_is_run_on_is_missing() {
     let Some(data) = data() else { return };
     let output = Command::new(env!("CARGO_BIN_EXE_bp")).args(["scenes", "--data"]).arg(data).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success() && text.contains(" 0 wrong"), "{text}");
+    assert!(output.status.success() && text.contains(", 0 wrong"), "{text}");
     let needed = |line: &&str| {
         let scenes = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
         let sizes = ["middlebury2006/", "middlebury2006-thirdsize/"];

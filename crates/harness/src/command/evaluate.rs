@@ -61,6 +61,9 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
 /// Reads ground truth, and what tells which of its pixels are visible.
 pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: PixelLimit) -> Result<GroundTruth, Failure> {
     let truth = read_map(path, options.scale, limit)?;
+    if truth.range().is_none() {
+        return Err(Failure::reading(path, &"ground truth without a known pixel"));
+    }
     if let Some(right) = &options.ground_truth_right {
         let map = read_map(right, options.scale, limit)?;
         return GroundTruth::with_right(truth, &map).map_err(|error| Failure::reading(right, &error));
@@ -87,13 +90,18 @@ pub(crate) fn error_table(report: &ErrorReport) -> String {
     };
     let pair = |first: String| [first, String::new()];
     line("pixels", &|errors| pair(errors.known.to_string()));
-    line("density", &|errors| pair(format!("{:.2} %", 100.0 * errors.answered as f64 / errors.known.max(1) as f64)));
-    line("RMSE", &|errors| pair(format!("{:.3} px", errors.rmse)));
+    line("density", &|errors| pair(figure(100.0 * errors.answered as f64 / errors.known as f64, 2, "%")));
+    line("RMSE", &|errors| pair(figure(errors.rmse, 3, "px")));
     for (i, threshold) in THRESHOLDS.iter().enumerate() {
         let percents = |errors: &record::Errors| [errors.bad[i], errors.bad_or_unanswered[i]];
-        line(&format!("> {threshold} px"), &|errors| percents(errors).map(|percent| format!("{percent:.2} %")));
+        line(&format!("> {threshold} px"), &|errors| percents(errors).map(|percent| figure(percent, 2, "%")));
     }
     let heads: String = sets.iter().map(|(name, _)| format!("{name:>38}")).collect();
     let columns = format!("{:>19}{:>19}", "answered", "unanswered wrong").repeat(sets.len());
     format!("{:<12}{heads}\n{:<12}{columns}\n{text}", "errors", "")
+}
+
+/// A figure with its unit; a dash where nothing was measured.
+fn figure(value: f64, decimals: usize, unit: &str) -> String {
+    if value.is_finite() { format!("{value:.decimals$} {unit}") } else { "-".to_owned() }
 }

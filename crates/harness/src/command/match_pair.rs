@@ -56,6 +56,11 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         let (labels, width) = (model.labels(), pair.size().width);
         tell(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
     }
+    let matches_any =
+        |label| (0..pair.size().width).any(|x| model.matching_column(x, label, pair.size().width).is_some());
+    if !(0..model.labels() as u16).any(matches_any) {
+        tell("warning: with this --min-disparity no label matches anything inside the right image");
+    }
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     let report = solve(args, &pair, plan, truth.as_ref())?;
     let mut out = std::io::stdout().lock();

@@ -22,21 +22,19 @@ pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
         return Ok(());
     };
     let manifest = Manifest::read()?;
-    let (mut wrong, mut missing) = (0, 0);
-    for entry in &manifest.files {
-        let path = folder.join(&entry.path);
-        let state = if !path.exists() {
-            missing += 1;
-            "missing".to_owned()
-        } else if let Err(failure) = manifest.checked(folder, &path) {
-            wrong += 1;
-            failure.to_string()
-        } else {
-            "as listed".to_owned()
-        };
+    let (mut found, mut wrong) = (0, 0);
+    for entry in manifest.files.iter().filter(|entry| folder.join(&entry.path).exists()) {
+        let checked = manifest.checked(folder, &folder.join(&entry.path));
+        found += 1;
+        wrong += u32::from(checked.is_err());
+        let state = checked.err().map_or_else(|| "as listed".to_owned(), |failure| failure.to_string());
         writeln!(out, "{:<60}{state}", entry.path)?;
     }
     let listed = manifest.files.len();
-    writeln!(out, "{listed} files listed, {missing} missing, {wrong} wrong")?;
-    if wrong > 0 { Err(Failure::input(format!("{wrong} files are not as listed"))) } else { Ok(()) }
+    writeln!(out, "{found} of {listed} listed files are there, {wrong} wrong")?;
+    match (found, wrong) {
+        (0, _) => Err(Failure::input(format!("--data {}: none of the listed files is there", folder.display()))),
+        (_, 0) => Ok(()),
+        _ => Err(Failure::input(format!("{wrong} files are not as listed"))),
+    }
 }

@@ -1,10 +1,14 @@
 //! Reading images.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{
+    fs::File,
+    io::{Cursor, Read},
+    path::Path,
+};
 
 use bp_core::{Image, Size, image::narrow};
 use image::{
-    DynamicImage, ExtendedColorType, ImageDecoder, ImageFormat, ImageReader, Limits,
+    DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader,
     codecs::{png::PngDecoder, pnm::PnmDecoder},
 };
 use sha2::{Digest, Sha256};
@@ -42,7 +46,7 @@ impl PixelLimit {
 
 /// Reads an image of 8 or 16 bits, grey or colour; transparency is ignored.
 pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
-    let decoded = decode(path, limit)?;
+    let decoded = decode(path, &read_limited(path, limit)?, limit)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     let pixels = if has_16_bits(&decoded) {
         decoded.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
@@ -58,8 +62,9 @@ fn has_16_bits(image: &DynamicImage) -> bool {
 
 /// Reads the grey values of an image as they are stored, and whether they have 16 bits. Colours must be grey.
 pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
-    check_unscaled(path)?;
-    let decoded = decode(path, limit)?;
+    let bytes = read_limited(path, limit)?;
+    check_unscaled(path, &bytes)?;
+    let decoded = decode(path, &bytes, limit)?;
     let size = Size { width: decoded.width() as usize, height: decoded.height() as usize };
     let sixteen = has_16_bits(&decoded);
     let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
@@ -73,17 +78,15 @@ pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, 
 }
 
 /// Refuses files whose values a decoder stretches to fill 8 or 16 bits: what was stored would be lost.
-fn check_unscaled(path: &Path) -> Result<(), Failure> {
+fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
-    let file = BufReader::new(File::open(path).map_err(|e| failed(&e))?);
-    let reader = ImageReader::new(file).with_guessed_format().map_err(|e| failed(&e))?;
-    let stretched = match reader.format() {
-        Some(ImageFormat::Pnm) => {
-            let decoder = PnmDecoder::new(reader.into_inner()).map_err(|e| failed(&e))?;
+    let stretched = match image::guess_format(bytes) {
+        Ok(ImageFormat::Pnm) => {
+            let decoder = PnmDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
             !matches!(decoder.header().maximal_sample(), 255 | 65535)
         }
-        Some(ImageFormat::Png) => {
-            let decoder = PngDecoder::new(reader.into_inner()).map_err(|e| failed(&e))?;
+        Ok(ImageFormat::Png) => {
+            let decoder = PngDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
             let narrow = [ExtendedColorType::L1, ExtendedColorType::L2, ExtendedColorType::L4];
             narrow.contains(&decoder.original_color_type())
         }
@@ -106,25 +109,40 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn decode(path: &Path, limit: PixelLimit) -> Result<DynamicImage, Failure> {
+/// Reads a file, a pipe too, but no more than what a picture within the limit can take.
+pub(super) fn read_limited(path: &Path, limit: PixelLimit) -> Result<Vec<u8>, Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
     let file = File::open(path).map_err(|e| failed(&e))?;
     if file.metadata().is_ok_and(|data| data.is_dir()) {
         return Err(failed(&"is a folder, not an image"));
     }
-    let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(|e| failed(&e))?;
-    if reader.format().is_none() {
-        return Err(failed(&"not an image in a known format (PNG, PGM, PPM)"));
+    let most = limit.pixels.saturating_mul(16).saturating_add(1 << 20);
+    let mut bytes = Vec::new();
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(|e| failed(&e))?;
+    if bytes.len() as u64 > most {
+        return Err(failed(&"the file is too long for the pixels it may hold; --max-megapixels raises that limit"));
     }
-    // Room for the widest pixels at the limit: what is refused then is refused for its size.
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(limit.pixels.saturating_mul(16).saturating_add(1 << 20));
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|e| failed(&e))?;
+    Ok(bytes)
+}
+
+fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
+    let Ok(format @ (ImageFormat::Png | ImageFormat::Pnm)) = image::guess_format(bytes) else {
+        return Err(failed(&"not an image in a known format (PNG, PGM, PPM)"));
+    };
+    let reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let decoder = reader.into_decoder().map_err(|error| match error {
+        ImageError::Limits(_) => failed(&"too large an image; --max-megapixels raises the limit"),
+        ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
+        error => failed(&error),
+    })?;
     let (width, height) = decoder.dimensions();
     limit.check(path, width.into(), height.into())?;
     // The decoded image, and two copies as colours of 8 bits while it is converted.
     let needed = decoder.total_bytes().saturating_add(6 * u64::from(width) * u64::from(height));
     machine::check_memory(needed, &format!("{} is too large", path.display()))?;
-    DynamicImage::from_decoder(decoder).map_err(|e| failed(&e))
+    DynamicImage::from_decoder(decoder).map_err(|error| match error {
+        ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
+        error => failed(&error),
+    })
 }

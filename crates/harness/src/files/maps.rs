@@ -3,12 +3,12 @@
 //! `.pfm` holds the disparities themselves: 32-bit floats, rows from bottom to top, plus infinity where unknown. `.png`
 //! holds 256 times the disparity in 16 bits, 0 where unknown; a disparity of 0 is stored as 1, the least that is known.
 
-use std::{fs, io::Write, path::Path};
+use std::{io::Write, path::Path};
 
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::{PixelLimit, read_stored_grey, write_whole};
+use super::{PixelLimit, images::read_limited, read_stored_grey, write_whole};
 use crate::failure::Failure;
 
 /// How a map is stored, by the file's ending.
@@ -118,12 +118,7 @@ pub(crate) fn read_mask(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<boo
 
 fn read_pfm(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<f32>), Failure> {
     let failed = |what: &str| Failure::reading(path, &what);
-    let bytes_len = fs::metadata(path).map_err(|error| Failure::reading(path, &error))?.len();
-    // Before reading it all: what cannot be a map within the limit is refused by its length.
-    if bytes_len > limit.pixels.saturating_mul(4).saturating_add(4096) {
-        return Err(failed("the file is larger than --max-megapixels allows"));
-    }
-    let bytes = fs::read(path).map_err(|error| Failure::reading(path, &error))?;
+    let bytes = read_limited(path, limit)?;
     let (header, data) = split_header(&bytes).ok_or_else(|| failed("not a PFM file: its header is broken"))?;
     let [kind, width, height, order] = header;
     if kind != "Pf" {
@@ -132,7 +127,8 @@ fn read_pfm(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<f32>), Failure>
     let side = |text: &str| text.parse::<usize>().map_err(|_| failed("the PFM header holds no size"));
     let size = Size::new(side(width)?, side(height)?).map_err(|error| Failure::reading(path, &error))?;
     limit.check(path, size.width as u64, size.height as u64)?;
-    let order: f32 = order.parse().map_err(|_| failed("the PFM header holds no byte order"))?;
+    let order = order.parse().ok().filter(|order: &f32| *order != 0.0 && order.is_finite());
+    let order = order.ok_or_else(|| failed("the PFM header holds no byte order (a number below or above 0)"))?;
     if data.len() != 4 * size.pixels() {
         return Err(failed(&format!("{} bytes of values where {size} pixels need {}", data.len(), 4 * size.pixels())));
     }
@@ -159,6 +155,8 @@ fn split_header(bytes: &[u8]) -> Option<([&str; 4], &[u8])> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn map(values: &[f32]) -> DisparityMap {
@@ -195,7 +193,7 @@ mod tests {
     fn broken_pfm_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map.pfm");
-        let cases: [&[u8]; 8] = [
+        let cases: [&[u8]; 10] = [
             b"",
             b"Pf",
             b"PF\n1 1\n-1\nabcd",
@@ -203,6 +201,8 @@ mod tests {
             b"Pf\n1 1\n-1\nabc",
             b"Pf\n-1 1\n-1\nabcd",
             b"Pf\n99999999 99999999\n-1\n",
+            b"Pf\n1 1\n0\nabcd",
+            b"Pf\n1 1\nnan\nabcd",
             b"Pf 1 1 x abcd",
         ];
         for bytes in cases {
