@@ -81,13 +81,13 @@ pub trait Solver: Send {
     /// Those of the device.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error>;
 
-    /// Writes the label of least belief of every pixel, the smallest on ties, [height][width].
+    /// Writes the label of least belief of every pixel, the smallest on ties, `[height][width]`.
     ///
     /// # Errors
     /// Those of the device.
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error>;
 
-    /// Copies out what every node of grid 0 last received from the neighbour on `side`, [height][width][labels]; zeros
+    /// Copies out what every node of grid 0 last received from the neighbour on `side`, `[height][width][labels]`; zeros
     /// where no message comes from there. Not a kernel: for comparing backends.
     ///
     /// # Errors

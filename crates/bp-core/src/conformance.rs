@@ -22,8 +22,8 @@ pub struct Case {
     pub plan: Plan,
 }
 
-/// What a backend answered: labels [height][width], and what was received from each of [`Side::ALL`],
-/// [height][width][labels].
+/// What a backend answered: labels `[height][width]`, and what was received from each of [`Side::ALL`],
+/// `[height][width][labels]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// Labels.

@@ -22,7 +22,7 @@ impl Seed {
     }
 }
 
-/// What a profile compares: one value a pixel of each image, [height][width].
+/// What a profile compares: one value a pixel of each image, `[height][width]`.
 #[derive(Clone, Debug)]
 enum Planes {
     Thesis([Vec<u8>; 2]),

@@ -125,7 +125,7 @@ impl Matcher {
         Ok(times)
     }
 
-    /// The last answer: a label for every pixel, [height][width].
+    /// The last answer: a label for every pixel, `[height][width]`.
     #[must_use]
     pub fn labels(&self) -> &[u16] {
         &self.labels

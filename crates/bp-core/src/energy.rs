@@ -12,7 +12,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The energy of `labels` [height][width]: data costs are the images' own, without a seed, and the smoothness is
+    /// The energy of `labels` `[height][width]`: data costs are the images' own, without a seed, and the smoothness is
     /// over all edges of the image, cut ones included, so that the energies of all plans compare.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Energy {
     }
 }
 
-/// The label of least data cost of every pixel, the smallest on ties, [height][width]: what remains of matching
+/// The label of least data cost of every pixel, the smallest on ties, `[height][width]`: what remains of matching
 /// without smoothness.
 ///
 /// # Errors

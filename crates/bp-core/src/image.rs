@@ -49,7 +49,7 @@ impl std::fmt::Display for Size {
     }
 }
 
-/// An image of 8-bit colours, [height][width], rows from top to bottom. A grey image has three equal channels.
+/// An image of 8-bit colours, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     size: Size,
@@ -57,7 +57,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image from its colours, [height][width].
+    /// An image from its colours, `[height][width]`.
     ///
     /// # Errors
     /// As [`Size::new`]; [`Error::PixelCount`] where `pixels` does not hold `width * height` colours.
@@ -69,7 +69,7 @@ impl Image {
         Ok(Self { size, pixels })
     }
 
-    /// An image from grey values, [height][width].
+    /// An image from grey values, `[height][width]`.
     ///
     /// # Errors
     /// As [`Image::from_rgb`].
@@ -83,7 +83,7 @@ impl Image {
         self.size
     }
 
-    /// All colours, [height][width].
+    /// All colours, `[height][width]`.
     #[must_use]
     pub fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels

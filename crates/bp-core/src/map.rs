@@ -2,7 +2,8 @@
 
 use crate::{Error, Model, Size};
 
-/// A disparity map [height][width] in pixels of its own size. Unknown or unanswered pixels hold [`DisparityMap::UNKNOWN`].
+/// A disparity map `[height][width]` in pixels of its own size. Unknown or unanswered pixels hold
+/// [`DisparityMap::UNKNOWN`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisparityMap {
     size: Size,
@@ -13,7 +14,7 @@ impl DisparityMap {
     /// The value of an unknown pixel, as in Middlebury's PFM files: plus infinity.
     pub const UNKNOWN: f32 = f32::INFINITY;
 
-    /// A map from its values, [height][width]; whatever is not finite counts as unknown.
+    /// A map from its values, `[height][width]`; whatever is not finite counts as unknown.
     ///
     /// # Errors
     /// [`Error::PixelCount`] where `values` does not hold one value a pixel.
@@ -29,7 +30,7 @@ impl DisparityMap {
         Ok(Self { size, values })
     }
 
-    /// The disparities of labels [height][width] under a model.
+    /// The disparities of labels `[height][width]` under a model.
     ///
     /// # Panics
     /// Where `labels` does not hold one label a pixel.
@@ -45,7 +46,7 @@ impl DisparityMap {
         self.size
     }
 
-    /// All values, [height][width].
+    /// All values, `[height][width]`.
     #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values

@@ -22,7 +22,7 @@ impl GroundTruth {
         Self { disparities, visible: None }
     }
 
-    /// Truth whose visible pixels are given, [height][width].
+    /// Truth whose visible pixels are given, `[height][width]`.
     ///
     /// # Errors
     /// [`Error::PixelCount`] where `visible` does not hold one value a pixel.
@@ -59,7 +59,7 @@ impl GroundTruth {
         &self.disparities
     }
 
-    /// Visible pixels [height][width], where that is known.
+    /// Visible pixels `[height][width]`, where that is known.
     #[must_use]
     pub fn visible(&self) -> Option<&[bool]> {
         self.visible.as_deref()

@@ -32,11 +32,11 @@ pub struct Scene {
     pub name: &'static str,
     /// The two views: different noise and a slightly different exposure.
     pub pair: StereoPair,
-    /// True disparity of each left pixel [height][width], in pixels of this scene's size; known everywhere.
+    /// True disparity of each left pixel `[height][width]`, in pixels of this scene's size; known everywhere.
     pub truth_left: DisparityMap,
-    /// True disparity of each right pixel [height][width], in pixels of this scene's size; known everywhere.
+    /// True disparity of each right pixel `[height][width]`, in pixels of this scene's size; known everywhere.
     pub truth_right: DisparityMap,
-    /// Whether the right camera also sees what a left pixel shows, [height][width].
+    /// Whether the right camera also sees what a left pixel shows, `[height][width]`.
     pub visible: Vec<bool>,
 }
 
@@ -74,7 +74,7 @@ fn centre(i: usize, divisor: usize) -> f64 {
     (i as f64 + 0.5) * divisor as f64 - 0.5
 }
 
-/// One value a pixel, from its centre in full-size coordinates, [height][width].
+/// One value a pixel, from its centre in full-size coordinates, `[height][width]`.
 fn per_pixel<T>(size: Size, divisor: usize, value: impl Fn(f64, f64) -> T) -> Vec<T> {
     let pixels = 0..size.pixels();
     pixels.map(|i| value(centre(i % size.width, divisor), centre(i / size.width, divisor))).collect()

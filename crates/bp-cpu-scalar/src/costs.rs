@@ -4,7 +4,7 @@ use bp_core::{Error, Plan, memory};
 
 use crate::sums::{self, Sums};
 
-/// Data costs [node][label], each node's least one taken off, clipped at 4K + 1 (see [`bp_core::exactness`]); beside
+/// Data costs `[node][label]`, each node's least one taken off, clipped at 4K + 1 (see [`bp_core::exactness`]); beside
 /// them the unclipped ones, where the next coarser grid is summed from those.
 pub(crate) struct Costs {
     labels: usize,

@@ -37,7 +37,7 @@ impl Messages {
         &self.received[side as usize][node * self.labels..][..self.labels]
     }
 
-    /// What all nodes received from `side`, [node][label].
+    /// What all nodes received from `side`, `[node][label]`.
     pub(crate) fn all_received(&self, side: Side) -> &[u8] {
         &self.received[side as usize]
     }

@@ -2,7 +2,7 @@
 
 use bp_core::{Error, Plan, memory};
 
-/// Costs [node][label] of one grid.
+/// Costs `[node][label]` of one grid.
 pub(crate) enum Sums {
     U8(Vec<u8>),
     U16(Vec<u16>),

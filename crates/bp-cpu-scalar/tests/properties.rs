@@ -49,7 +49,7 @@ fn any_case() -> impl Strategy<Value = Case> {
     })
 }
 
-/// The least energy of any labelling of a chain that gives node p label d, [node][label].
+/// The least energy of any labelling of a chain that gives node p label d, `[node][label]`.
 fn min_marginals(cost: &DataCost, model: &Model, nodes: &[(usize, usize)]) -> Vec<Vec<i64>> {
     let labels = 0..model.labels() as u16;
     let data = |&(x, y): &(usize, usize)| labels.clone().map(|d| i64::from(cost.at(x, y, d))).collect::<Vec<_>>();

@@ -60,7 +60,7 @@ pub(crate) struct MatchArgs {
     /// Print everything as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print a SHA-256 of all final messages: from the left, right, up and down, each [row][column][label].
+    /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
     #[arg(long)]
     pub(crate) messages_hash: bool,
     /// Refuse images of more megapixels.

@@ -23,7 +23,7 @@ impl Device for Oracle {
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
-/// Costs [node][label] and received messages [node][side][label].
+/// Costs `[node][label]` and received messages `[node][side][label]`.
 struct Grid {
     costs: Vec<Vec<i64>>,
     received: Messages,

@@ -26,7 +26,7 @@ pub(super) struct Exposure {
     pub(super) seed: u32,
 }
 
-/// Colours [height][width] of [RGB] in grey levels, not yet rounded.
+/// Colours `[height][width]` of [RGB] in grey levels, not yet rounded.
 struct Radiance {
     width: usize,
     height: usize,
@@ -48,7 +48,7 @@ impl World {
         columns.contains(&right_x) && ptr::eq(self.look(View::Right, right_x, y).surface, seen.surface)
     }
 
-    /// The image of one camera before exposure, [height][width]: `divisor` squared samples a pixel.
+    /// The image of one camera before exposure, `[height][width]`: `divisor` squared samples a pixel.
     pub(super) fn photograph(&self, view: View, size: Size, divisor: usize) -> Vec<[f64; 3]> {
         let sharp = Radiance::from_fn(size.width * divisor, size.height * divisor, |x, y| {
             let (x, y) = (x as f64, y as f64);
@@ -112,7 +112,7 @@ impl Radiance {
 }
 
 impl Exposure {
-    /// The 8-bit image of radiances [height][width].
+    /// The 8-bit image of radiances `[height][width]`.
     pub(super) fn develop(self, radiances: &[[f64; 3]]) -> Vec<[u8; 3]> {
         let pixel = |(i, colour): (usize, &[f64; 3])| {
             std::array::from_fn(|c| {

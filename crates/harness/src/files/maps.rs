@@ -107,7 +107,7 @@ pub(crate) fn read_map(path: &Path, scale: Option<f32>, limit: PixelLimit) -> Re
     DisparityMap::new(size, values).map_err(|error| Failure::reading(path, &error))
 }
 
-/// Reads a mask [height][width]: true where the stored value is 255.
+/// Reads a mask `[height][width]`: true where the stored value is 255.
 pub(crate) fn read_mask(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<bool>), Failure> {
     let (size, values, sixteen) = read_stored_grey(path, limit)?;
     if sixteen {
