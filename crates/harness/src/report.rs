@@ -13,8 +13,6 @@ mod thesis;
 
 use std::path::Path;
 
-pub use readme::{BEGIN, END};
-
 use crate::{
     args::ReportArgs,
     failure::Failure,
@@ -23,6 +21,7 @@ use crate::{
     reproduce::{RECORD_FILE, load_record},
     tell,
 };
+use readme::{BEGIN, END};
 use results::Results;
 
 /// A drawing and the words around it.
@@ -94,10 +93,4 @@ pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
 pub fn renewed_readme(text: &str, run: &Path, shown_as: &Path) -> Option<String> {
     let record = load_record(run).ok()?;
     readme::splice(text, &readme::part(shown_as, &Results::new(&record).ok()?))
-}
-
-/// Name of the record in a run's folder.
-#[must_use]
-pub fn record_file() -> &'static str {
-    RECORD_FILE
 }

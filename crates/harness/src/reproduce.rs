@@ -50,6 +50,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
         backends: devices.iter().map(|device| device.name.clone()).collect(),
     };
     tell(&format!("scenes: {}", Source::describe(source.name)));
+    source.check()?;
     let machine = machine::machine(args.machine.as_deref());
     let mut storage = storage::open(&args.results, machine, settings)?;
     let outcome = run::run(&source, &devices, &mut storage);

@@ -82,6 +82,14 @@ impl Source {
         }
     }
 
+    /// Fails where a file of the six scenes is missing or not the one listed; for telling so before a run begins.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        let folder = self.folder.iter();
+        folder
+            .flat_map(|folder| THESIS_SCENES.map(|scene| (folder, scene)))
+            .try_for_each(|(folder, scene)| middlebury(folder, &format!("{}/{scene}", self.name)).map(drop))
+    }
+
     /// Loads scene `index` of six.
     pub(crate) fn load(&self, index: usize) -> Result<Scene, Failure> {
         match &self.folder {

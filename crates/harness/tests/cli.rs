@@ -206,6 +206,24 @@ fn bad_input_names_the_file() {
 }
 
 #[test]
+fn a_data_file_that_is_not_the_listed_one_is_named() {
+    let folder = Folder::new();
+    for scene in ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"] {
+        fs::create_dir_all(folder.path("data/middlebury2006").join(scene)).unwrap();
+    }
+    folder.fails("scenes --data data", 3, &["--data data", "none of the listed files"]);
+    let file = folder.path("data/middlebury2006/Baby1/view1.png");
+    for (width, height, word) in [(620, 555, "delete it"), (621, 555, "621x555 pixels instead of 620x555")] {
+        image::GrayImage::new(width, height).save(&file).unwrap();
+        let output = folder.run("scenes --data data");
+        let text = text(&output.stdout);
+        assert!(text.contains("Baby1/view1.png") && text.contains(word), "{text}");
+        assert_eq!(output.status.code(), Some(3));
+        folder.fails("reproduce --data data --results r", 3, &["Baby1/view1.png", word]);
+    }
+}
+
+#[test]
 fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
     let folder = Folder::new();
     folder.fails(&format!("{MATCH} no/such/a.png"), 1, &["no/such/a.png"]);

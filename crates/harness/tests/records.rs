@@ -15,11 +15,11 @@ fn root() -> PathBuf {
 /// The folders under `results` that hold a record.
 fn runs() -> Vec<PathBuf> {
     let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
-    entries.filter(|path| path.join(harness::report::record_file()).exists()).collect()
+    entries.filter(|path| path.join("record.json").exists()).collect()
 }
 
 fn read(run: &Path) -> String {
-    fs::read_to_string(run.join(harness::report::record_file())).unwrap()
+    fs::read_to_string(run.join("record.json")).unwrap()
 }
 
 #[test]

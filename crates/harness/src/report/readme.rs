@@ -14,10 +14,10 @@ use super::{
 };
 
 /// Marks where the part begins.
-pub const BEGIN: &str = "<!-- results: begin -->";
+pub(super) const BEGIN: &str = "<!-- results: begin -->";
 
 /// Marks where it ends.
-pub const END: &str = "<!-- results: end -->";
+pub(super) const END: &str = "<!-- results: end -->";
 
 /// Replaces what stands between the markers; `None` where they are not there.
 pub(super) fn splice(text: &str, part: &str) -> Option<String> {
