@@ -42,14 +42,14 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     let source = Source::new(&args.data, args.quick)?;
     let devices = run::open_devices(&args.backend)?;
     let settings = Run {
-        data: source.name.to_owned(),
+        data: source.set.name.to_owned(),
         quick: args.quick,
-        labels: source.labels,
-        k: if args.quick { QUICK_LOOPS } else { source.labels as u32 },
+        labels: source.set.labels,
+        k: if args.quick { QUICK_LOOPS } else { source.set.labels as u32 },
         samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
         backends: devices.iter().map(|device| device.name.clone()).collect(),
     };
-    tell(&format!("scenes: {}", Source::describe(source.name)));
+    tell(&format!("scenes: {}", source.set.described));
     source.check()?;
     let machine = machine::machine(args.machine.as_deref());
     let mut storage = storage::open(&args.results, machine, settings)?;

@@ -15,12 +15,51 @@ use crate::{
 /// The thesis's six scenes as we identify them, in its order.
 pub(crate) const THESIS_SCENES: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
 
-/// Labels at full and at reduced size: above the largest true disparity of all six scenes, a multiple of 8.
-const LABELS: [(&str, usize); 4] =
-    [("middlebury2006", 112), ("middlebury2006-thirdsize", 80), ("synthetic", 112), ("synthetic-small", 56)];
-
 /// What the small synthetic scenes are divided by.
 const SMALL_DIVISOR: usize = 2;
+
+/// Six scenes of one origin and size.
+#[derive(Debug)]
+pub(crate) struct Set {
+    /// Its name in records, and of its folder in a data folder.
+    pub(crate) name: &'static str,
+    /// Labels of every scene: above the largest true disparity of all six, a multiple of 8.
+    pub(crate) labels: usize,
+    /// What it is, in a sentence.
+    pub(crate) described: &'static str,
+    /// The same in few words, for every table and chart.
+    pub(crate) short: &'static str,
+}
+
+const HALF_SIZE: Set = Set {
+    name: "middlebury2006",
+    labels: 112,
+    described: "the thesis's six Middlebury scenes at half size, the thesis's own sizes",
+    short: "Middlebury 2005/2006, half size",
+};
+const THIRD_SIZE: Set = Set {
+    name: "middlebury2006-thirdsize",
+    labels: 80,
+    described: "the thesis's six Middlebury scenes at third size, smaller than the thesis's",
+    short: "Middlebury 2005/2006, third size",
+};
+const SYNTHETIC: Set = Set {
+    name: "synthetic",
+    labels: 112,
+    described: "six synthetic scenes of the thesis's sizes; not the thesis's images",
+    short: "synthetic scenes",
+};
+const SMALL_SYNTHETIC: Set = Set {
+    name: "synthetic-small",
+    labels: 56,
+    described: "six synthetic scenes at half of the thesis's sizes; not the thesis's images",
+    short: "synthetic scenes, small",
+};
+
+/// The set of that name in records.
+pub(crate) fn set(name: &str) -> Option<&'static Set> {
+    [&HALF_SIZE, &THIRD_SIZE, &SYNTHETIC, &SMALL_SYNTHETIC].into_iter().find(|set| set.name == name)
+}
 
 /// A pair with its ground truth.
 pub(crate) struct Scene {
@@ -34,10 +73,7 @@ pub(crate) struct Scene {
 pub(crate) struct Source {
     /// The data folder; `None` for synthetic scenes.
     folder: Option<PathBuf>,
-    /// The set's name, as in [`record::Run::data`].
-    pub(crate) name: &'static str,
-    /// Labels of every scene.
-    pub(crate) labels: usize,
+    pub(crate) set: &'static Set,
 }
 
 impl Source {
@@ -46,15 +82,20 @@ impl Source {
     pub(crate) fn new(args: &DataArgs, quick: bool) -> Result<Self, Failure> {
         let named = |folder: &PathBuf| !folder.as_os_str().is_empty();
         let folder = args.data.clone().filter(|folder| named(folder) && !args.synthetic);
-        let (name, labels) = LABELS[if folder.is_some() { 0 } else { 2 } + usize::from(quick)];
+        let set = match (&folder, quick) {
+            (Some(_), false) => &HALF_SIZE,
+            (Some(_), true) => &THIRD_SIZE,
+            (None, false) => &SYNTHETIC,
+            (None, true) => &SMALL_SYNTHETIC,
+        };
         if let Some(folder) = &folder {
-            let scenes = THESIS_SCENES.map(|scene| format!("{name}/{scene}"));
+            let scenes = THESIS_SCENES.map(|scene| format!("{}/{scene}", set.name));
             if let Some(scene) = scenes.into_iter().find(|scene| !folder.join(scene).is_dir()) {
                 let (folder, what) = (folder.display(), "see scripts/fetch-middlebury, or use --synthetic");
                 return Err(Failure::input(format!("--data {folder}: there is no folder {scene} in it; {what}")));
             }
         }
-        Ok(Self { folder, name, labels })
+        Ok(Self { folder, set })
     }
 
     /// The folder of public data, where that is used.
@@ -62,39 +103,17 @@ impl Source {
         self.folder.as_deref()
     }
 
-    /// What the scenes of a set are, in words.
-    pub(crate) fn describe(name: &str) -> &'static str {
-        match name {
-            "middlebury2006" => "the thesis's six Middlebury scenes at half size, the thesis's own sizes",
-            "middlebury2006-thirdsize" => "the thesis's six Middlebury scenes at third size, smaller than the thesis's",
-            "synthetic" => "six synthetic scenes of the thesis's sizes; not the thesis's images",
-            _ => "six synthetic scenes at half of the thesis's sizes; not the thesis's images",
-        }
-    }
-
-    /// The same in few words, for every table and chart.
-    pub(crate) fn short(name: &str) -> &'static str {
-        match name {
-            "middlebury2006" => "Middlebury 2005/2006, half size",
-            "middlebury2006-thirdsize" => "Middlebury 2005/2006, third size",
-            "synthetic" => "synthetic scenes",
-            _ => "synthetic scenes, small",
-        }
-    }
-
     /// Fails where a file of the six scenes is missing or not the one listed; for telling so before a run begins.
     pub(crate) fn check(&self) -> Result<(), Failure> {
-        let folder = self.folder.iter();
-        folder
-            .flat_map(|folder| THESIS_SCENES.map(|scene| (folder, scene)))
-            .try_for_each(|(folder, scene)| middlebury(folder, &format!("{}/{scene}", self.name)).map(drop))
+        let Some(folder) = &self.folder else { return Ok(()) };
+        THESIS_SCENES.iter().try_for_each(|scene| middlebury(folder, self.set, scene).map(drop))
     }
 
     /// Loads scene `index` of six.
     pub(crate) fn load(&self, index: usize) -> Result<Scene, Failure> {
         match &self.folder {
-            Some(folder) => middlebury(folder, &format!("{}/{}", self.name, THESIS_SCENES[index])),
-            None => made_up(index, if self.name == "synthetic" { 1 } else { SMALL_DIVISOR }),
+            Some(folder) => middlebury(folder, self.set, THESIS_SCENES[index]),
+            None => made_up(index, if self.set.name == SYNTHETIC.name { 1 } else { SMALL_DIVISOR }),
         }
     }
 }
@@ -124,11 +143,11 @@ fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
 }
 
 /// Loads and checks the four images of a scene of the 2005 and 2006 sets.
-fn middlebury(folder: &Path, scene: &str) -> Result<Scene, Failure> {
+fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
     let manifest = Manifest::read()?;
     let mut images = Vec::new();
     let mut load = |file: &str| -> Result<(PathBuf, f32), Failure> {
-        let entry = manifest.entry(&format!("{scene}/{file}"))?;
+        let entry = manifest.entry(&format!("{}/{scene}/{file}", set.name))?;
         images.push(ImageSum { path: entry.path.clone(), sha256: entry.sha256.clone() });
         Ok((folder.join(&entry.path), entry.scale.unwrap_or(1.0)))
     };
@@ -142,8 +161,7 @@ fn middlebury(folder: &Path, scene: &str) -> Result<Scene, Failure> {
     };
     let truth = GroundTruth::with_right(map(truth)?, &map(truth_right)?)?;
     let pair = StereoPair::new(left, right)?;
-    let name = scene.rsplit('/').next().unwrap_or(scene);
-    Ok(Scene { record: described(name, &pair, &truth, images), pair, truth })
+    Ok(Scene { record: described(scene, &pair, &truth, images), pair, truth })
 }
 
 /// What the public data files should be: `bench-data/middlebury.json`.

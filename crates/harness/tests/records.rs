@@ -4,6 +4,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    process::Command,
 };
 
 use harness::record::{Outcome, Record};
@@ -48,6 +49,26 @@ fn committed_records_fit_the_schema_and_are_whole() {
             assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
             let planned = cell.settings.planned_bytes;
             assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
+        }
+    }
+}
+
+/// What is committed beside a record is what the program makes of it now.
+#[test]
+fn reports_are_made_from_their_records() {
+    for run in runs() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("maps")).unwrap();
+        let maps = fs::read_dir(run.join("maps")).unwrap().map(|entry| entry.unwrap().path());
+        for path in maps.chain([run.join("record.json")]) {
+            fs::copy(&path, folder.path().join(path.strip_prefix(&run).unwrap())).unwrap();
+        }
+        let bp = Command::new(env!("CARGO_BIN_EXE_bp")).arg("report").arg(folder.path()).output().unwrap();
+        assert!(bp.status.success());
+        for entry in fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap()).filter(|e| e.path().is_file()) {
+            let committed = run.join(entry.file_name());
+            let same = fs::read(entry.path()).unwrap() == fs::read(&committed).unwrap();
+            assert!(same, "{}; run: cargo run -- report {}", committed.display(), run.display());
         }
     }
 }

@@ -15,9 +15,9 @@ pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let source = Source::new(&args.data, false)?;
     let Some(folder) = source.folder() else {
-        writeln!(out, "{}:", Source::describe(source.name))?;
+        writeln!(out, "{}:", source.set.described)?;
         for (name, [width, height]) in synthetic::NAMES.iter().zip(synthetic::SIZES) {
-            writeln!(out, "  {name:<12}{width}x{height}, {} labels", source.labels)?;
+            writeln!(out, "  {name:<12}{width}x{height}, {} labels", source.set.labels)?;
         }
         return Ok(());
     };

@@ -4,7 +4,7 @@ use super::{format::Spread, thesis::Thesis};
 use crate::{
     failure::Failure,
     record::{Cell, Device, Measurement, Outcome, Record, Sample, Scene},
-    scenes::Source,
+    scenes,
 };
 
 /// Which part of a solve a time is of.
@@ -55,8 +55,9 @@ impl<'a> Results<'a> {
     }
 
     /// Where the images come from, in words.
-    pub(super) fn data(&self) -> &'static str {
-        Source::describe(&self.record.run.data)
+    pub(super) fn data(&self) -> &'a str {
+        let name = &self.record.run.data;
+        scenes::set(name).map_or(name, |set| set.described)
     }
 
     /// The devices that were used, each with its backend's name.
@@ -69,7 +70,12 @@ impl<'a> Results<'a> {
     pub(super) fn setting(&self) -> String {
         let run = &self.record.run;
         let quick = if run.quick { "quick run, " } else { "" };
-        format!("{quick}{}, L = {}, k = {}", Source::short(&run.data), run.labels, run.k)
+        format!(
+            "{quick}{}, L = {}, k = {}",
+            scenes::set(&run.data).map_or(run.data.as_str(), |set| set.short),
+            run.labels,
+            run.k
+        )
     }
 }
 
