@@ -22,6 +22,8 @@ pub(crate) fn write_whole<E: std::fmt::Display>(
     write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
 ) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::writing(path, error);
+    // What a link points to is replaced, not the link.
+    let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let mut file = temporary_beside(path)?;
     let mut buffered = BufWriter::new(file.as_file_mut());
     write(&mut buffered).map_err(|e| failed(&e))?;
@@ -36,6 +38,9 @@ pub(crate) fn write_whole<E: std::fmt::Display>(
 pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(Failure::writing(path, &"it is a folder"));
+    }
+    if path.exists() && !path.is_file() {
+        return Err(Failure::writing(path, &"it is there and is no file"));
     }
     temporary_beside(path).map(drop)
 }

@@ -24,6 +24,9 @@ use crate::{
 use readme::{BEGIN, END};
 use results::Results;
 
+/// Name of the self-contained page, written last.
+pub(crate) const PAGE_FILE: &str = "report.html";
+
 /// A drawing and the words around it.
 struct Drawing {
     /// File name without ending, such as "diagram-4.1".
@@ -65,7 +68,7 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
         write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
     }
     write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
-    write_text(&folder.join("report.html"), &html::page(&report))
+    write_text(&folder.join(PAGE_FILE), &html::page(&report))
 }
 
 /// `bp report`.
@@ -75,7 +78,7 @@ pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
     match &args.readme {
         None => {
             write(run, &record)?;
-            tell(&format!("report: {}", run.join("report.html").display()));
+            tell(&format!("report: {}", run.join(PAGE_FILE).display()));
             Ok(())
         }
         Some(path) => {

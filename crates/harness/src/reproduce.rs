@@ -59,7 +59,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     }
     outcome?;
     report::write(storage.folder(), storage.record())?;
-    tell(&format!("report: {}", storage.folder().join("report.html").display()));
+    tell(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
     failed_cells(storage.record())
 }
 

@@ -76,6 +76,12 @@ fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
     }
     check_report(&folders[0]);
 
+    fs::remove_file(folders[0].join("report.html")).unwrap();
+    assert!(start(results).wait().unwrap().success());
+    assert_eq!((run_folders(results).len(), &record(&folders[0]).cells), (1, &complete.cells));
+    check_report(&folders[0]);
+
+    let complete = record(&folders[0]);
     let mut another = start(results);
     let mut at_the_same_time = start(results);
     wait_for(|| run_folders(results).len() == 3);

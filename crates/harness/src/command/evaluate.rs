@@ -73,6 +73,9 @@ pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: PixelLimit) ->
         if size != truth.size() {
             return Err(Failure::reading(mask, &format!("{size} pixels where the truth has {}", truth.size())));
         }
+        if !visible.contains(&true) {
+            return Err(Failure::reading(mask, &"no pixel is 255, so none would count"));
+        }
         return GroundTruth::with_mask(truth, visible).map_err(|error| Failure::reading(mask, &error));
     }
     Ok(GroundTruth::new(truth))

@@ -39,7 +39,6 @@ struct Report {
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
-    interrupt::listen()?;
     check_options(&args.plan)?;
     let truth_options =
         args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
@@ -62,6 +61,7 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         tell("warning: with this --min-disparity no label matches anything inside the right image");
     }
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
+    interrupt::listen()?;
     let report = solve(args, &pair, plan, truth.as_ref())?;
     let mut out = std::io::stdout().lock();
     if args.json {

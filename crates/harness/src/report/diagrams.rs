@@ -66,9 +66,12 @@ fn speed_ups(
     let first_style = if parts.len() == 1 { 0 } else { series.len() };
     series.extend(printed(results, plans, first_style));
     let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", series, Some(1.0));
-    let caption = "Above 1 is faster than BP. Printed times are of the thesis's GPU program in all; ours are apart for \
-                   message passing and in all. Whiskers, where there are any, are ranges over rounds.";
-    drawing(numbers, chart, caption)
+    let ours = if parts.len() == 1 { "ours are in all too" } else { "ours are apart for message passing and in all" };
+    let caption = format!(
+        "Above 1 is faster than BP. Printed times are of the thesis's GPU program in all; {ours}. Whiskers, where there \
+         are any, are ranges over rounds."
+    );
+    drawing(numbers, chart, &caption)
 }
 
 /// The printed speed-ups of some plans; their styles are numbered from `style` on.

@@ -24,7 +24,7 @@ td.text, th.text { text-align: left; }
 tbody tr:nth-child(even) { background: var(--soft); }
 .beside { display: flex; flex-wrap: wrap; gap: 1.5rem; align-items: flex-start; }
 .beside svg { background: #fff; border-radius: 6px; max-width: 100%; height: auto; flex: 0 1 auto; }
-.beside .wide { flex: 1 1 20rem; }
+.beside div { flex: 1 1 20rem; }
 ";
 
 /// The whole page.
@@ -111,7 +111,7 @@ fn drawing(drawing: &Drawing) -> Markup {
             p { (drawing.caption) }
             div.beside {
                 (PreEscaped(&drawing.svg))
-                @if let Some(table) = &drawing.table { (grid(table)) }
+                @if let Some(table) = &drawing.table { div { p { (table.title) } (grid(table)) } }
             }
         }
     }

@@ -24,8 +24,8 @@ pub(super) fn page(report: &Report<'_>) -> String {
 
 /// The heading of both pages.
 pub(super) fn title(report: &Report<'_>) -> String {
-    let quick = if report.results.record.run.quick { "Quick run: " } else { "" };
-    format!("{quick}belief propagation for stereo matching, on {}", report.results.record.machine.cpu)
+    let quick = if report.results.record.run.quick { ", a quick run" } else { "" };
+    format!("Belief propagation for stereo matching, on {}{quick}", report.results.record.machine.cpu)
 }
 
 /// What a reader must know of a run before its numbers.
@@ -44,8 +44,9 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
             program.flags
         ),
         format!("Begun {}, last written {}.", record.started, record.updated),
-        "Printed numbers are the thesis's (GeForce GTX 750 Ti, CUDA); all others were measured in this run. Times are of \
-         the wall clock. Machines are noisy: compare ratios, and mind the ranges."
+        "Printed numbers are the thesis's (GeForce GTX 750 Ti, CUDA); all others were measured in this run. Totals are \
+         of the wall clock, message passing of the device's own where it has one. Machines are noisy: compare ratios, \
+         and mind the ranges."
             .to_owned(),
     ];
     facts.extend(report.results.devices().into_iter().map(|(backend, device)| device_fact(backend, device)));
@@ -97,6 +98,6 @@ pub(super) fn grid(table: &Table) -> String {
 
 fn drawing(drawing: &Drawing) -> String {
     let Drawing { name, title, caption, table, .. } = drawing;
-    let table = table.as_ref().map_or(String::new(), |table| format!("{}\n", grid(table)));
+    let table = table.as_ref().map_or(String::new(), |table| format!("{}\n\n{}\n", table.title, grid(table)));
     format!("### {title}\n\n{caption}\n\n![{title}]({name}.svg)\n\n{table}")
 }

@@ -50,6 +50,13 @@ pub(super) struct Named {
     pub(super) printed: Option<&'static str>,
 }
 
+impl Named {
+    /// Whether the image is cut into four parts.
+    fn is_cut(&self) -> bool {
+        self.printed.is_some_and(|algorithm| algorithm.starts_with("ct"))
+    }
+}
+
 pub(super) const BP: Named = Named { plan: "bp", title: "BP", printed: Some("bp") };
 pub(super) const CFBP: Named = Named { plan: "cfbp", title: "CFBP", printed: Some("cfbp") };
 pub(super) const CFCSBP: Named = Named { plan: "cfcsbp", title: "CFCSBP, Z''=2", printed: Some("cfcsbp") };

@@ -12,6 +12,7 @@ use crate::{
     files::{create_folder, write_text},
     machine,
     record::{Machine, Outcome, Program, Record, Run, SCHEMA_VERSION},
+    report::PAGE_FILE,
     tell,
 };
 
@@ -36,22 +37,25 @@ pub(crate) struct Storage {
 /// process is at work on is left to it.
 pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let program = machine::program()?;
-    let same = |record: &Record| {
-        !record.complete && record.program == program && record.machine == machine && record.run == run
-    };
     for folder in runs(results) {
-        let Some(lock) = load_record(&folder).ok().filter(same).and_then(|_| lock(&folder).ok().flatten()) else {
-            continue;
-        };
-        tell(&format!("going on with the interrupted run in {}", folder.display()));
-        // Read again: another process may have been at work until the lock was had.
-        let mut record = load_record(&folder)?;
-        record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
-            cell.outcome = Outcome::Pending;
-        });
-        return Ok(Storage { folder, record, _lock: lock });
+        // Judged under the lock: until then another process may be at work on it.
+        let Some(lock) = lock(&folder).ok().flatten() else { continue };
+        let Ok(mut record) = load_record(&folder) else { continue };
+        let same = record.program == program && record.machine == machine && record.run == run;
+        if same && is_unfinished(&folder, &record) {
+            tell(&format!("going on with the interrupted run in {}", folder.display()));
+            record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
+                cell.outcome = Outcome::Pending;
+            });
+            return Ok(Storage { folder, record, _lock: lock });
+        }
     }
     begin(results, program, machine, run)
+}
+
+/// Whether cells or the report, whose page is written last, are still to come.
+fn is_unfinished(folder: &Path, record: &Record) -> bool {
+    !record.complete || !folder.join(PAGE_FILE).exists()
 }
 
 fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {

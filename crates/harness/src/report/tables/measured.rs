@@ -52,7 +52,7 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
     let one_worker = results.devices().iter().all(|(_, device)| device.workers == 1);
     let side_by_side = " Parts run one after another; running them side by side needs a backend with several workers, \
                         and this run has none.";
-    let cut = plans.iter().any(|plan| plan.plan.starts_with("ct"));
+    let cut = plans.iter().any(Named::is_cut);
     table.note(format!("{note}{}", if cut && one_worker { side_by_side } else { "" }))
 }
 
@@ -86,8 +86,9 @@ pub(super) fn mib(bytes: u64) -> String {
 pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
     let title = format!("{}: reliability", family(plans));
     let note = "R is the root mean squared error in pixels (equation 2.82), B the percentage of pixels wrong by more than \
-                so many pixels (2.83), over all pixels of known truth and over those that both cameras see. Energies are \
-                under the plan's own schedule. The thesis prints no reliability figure.";
+                so many pixels (2.83), over all pixels of known truth and over those that both cameras see. The \
+                energy depends on the schedule: under sync, plain BP's stays well above what as many checkerboard loops \
+                reach. The thesis prints no reliability figure.";
     table(results, (number, title), plans, &reliability_columns(), |row, plan| {
         let Some(measured) = row.measured(plan.plan) else {
             return vec![NOT_PRINTED.to_owned(), row.missing(plan.plan).to_owned()];
@@ -96,12 +97,13 @@ pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) 
         cells.extend(errors(&measured.all));
         cells.extend(errors(&measured.visible));
         cells.push(whole(measured.energy.total));
+        cells.push(or(row.cell(plan.plan).map(|cell| cell.settings.schedule.clone()), ""));
         cells
     })
     .note(note)
 }
 
-fn reliability_columns() -> [&'static str; 12] {
+fn reliability_columns() -> [&'static str; 13] {
     [
         "printed",
         "R all",
@@ -115,6 +117,7 @@ fn reliability_columns() -> [&'static str; 12] {
         "B>2 visible",
         "B>4 visible",
         "energy",
+        "schedule",
     ]
 }
 

@@ -1,0 +1,66 @@
+//! What records take over from bp-core.
+
+use std::time::Duration;
+
+use super::{Clock, Clocked, Cut, Device, Energy, Errors, Settings, Stages};
+
+impl From<bp_core::Energy> for Energy {
+    fn from(energy: bp_core::Energy) -> Self {
+        Self { total: energy.total(), data: energy.data, smoothness: energy.smoothness }
+    }
+}
+
+impl From<bp_core::MapErrors> for Errors {
+    fn from(errors: bp_core::MapErrors) -> Self {
+        let bp_core::MapErrors { known, answered, rmse, bad, bad_or_unanswered } = errors;
+        Self { known, answered, rmse, bad, bad_or_unanswered }
+    }
+}
+
+impl From<&bp_core::DeviceInfo> for Device {
+    fn from(device: &bp_core::DeviceInfo) -> Self {
+        let bp_core::DeviceInfo { name, api, driver, software_rasteriser, workers } = device.clone();
+        Self { name, api, driver, software_rasteriser, workers }
+    }
+}
+
+impl Settings {
+    /// What is known of a plan on a device before it runs.
+    pub(crate) fn new(
+        plan: &bp_core::Plan,
+        device: &dyn bp_core::Device,
+        algorithm: bp_core::Algorithm,
+        (k, z): (Option<u32>, Option<u32>),
+    ) -> Self {
+        let (model, settings) = (plan.model(), plan.settings());
+        Self {
+            profile: model.profile().name().to_owned(),
+            labels: model.labels(),
+            min_disparity: model.min_disparity(),
+            slope: model.slope(),
+            truncation: model.truncation(),
+            algorithm: algorithm.name().to_owned(),
+            k,
+            z,
+            grids: settings.grids,
+            steps_per_grid: settings.steps,
+            schedule: settings.schedule.name().to_owned(),
+            message_start: settings.message_start.name().to_owned(),
+            cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            message_updates: plan.message_updates(),
+            planned_bytes: device.planned_bytes(plan),
+        }
+    }
+}
+
+/// All clocks of a solve.
+pub(crate) fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
+    let clocked = |clock, stages: [Duration; 5]| {
+        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] =
+            stages.map(|time| 1000.0 * time.as_secs_f64());
+        let stages = Stages { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms };
+        Clocked { clock, stages }
+    };
+    let device = times.device.map(|stages| clocked(Clock::Device, stages));
+    std::iter::once(clocked(Clock::Wall, times.wall)).chain(device).collect()
+}
