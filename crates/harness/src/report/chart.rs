@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use plotters::{coord::types::RangedCoordf64, element::DashedPathElement, prelude::*, style::text_anchor::*};
 
+use super::format;
+
 /// Why a chart could not be drawn: the backend failed to write.
 pub(crate) type ChartError = DrawingAreaErrorKind<std::io::Error>;
 
@@ -138,14 +140,9 @@ fn decade_ticks(low: f64, high: f64) -> Vec<f64> {
 
 /// A number in full, but for rounding errors, its thousands set apart by commas.
 fn number(value: f64) -> String {
-    let fixed = format!("{:.9}", value.abs());
-    let mut text = fixed.trim_end_matches('0').trim_end_matches('.').to_owned();
-    let mut place = text.find('.').unwrap_or(text.len());
-    while place > 3 {
-        place -= 3;
-        text.insert(place, ',');
-    }
-    if value < 0.0 && text != "0" { format!("\u{2212}{text}") } else { text }
+    let text = format::number(value, 9);
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0" } else { text }.to_owned()
 }
 
 const WIDTH: f64 = 900.0;
