@@ -37,18 +37,19 @@ pub(crate) struct Storage {
 /// process is at work on is left to it.
 pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let program = machine::program()?;
-    for folder in runs(results) {
-        // Judged under the lock: until then another process may be at work on it.
-        let Some(lock) = lock(&folder).ok().flatten() else { continue };
-        let Ok(mut record) = load_record(&folder) else { continue };
-        let same = record.program == program && record.machine == machine && record.run == run;
-        if same && is_unfinished(&folder, &record) {
-            tell(&format!("going on with the interrupted run in {}", folder.display()));
-            record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
-                cell.outcome = Outcome::Pending;
-            });
-            return Ok(Storage { folder, record, _lock: lock });
-        }
+    let interrupted = |folder: &Path| {
+        let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;
+        load_record(folder).ok().filter(|record| same(record) && is_unfinished(folder, record))
+    };
+    for folder in runs(results).into_iter().filter(|folder| interrupted(folder).is_some()) {
+        let Some(lock) = lock(&folder)? else { continue };
+        // Judged again under the lock: until then another process may have been at work on it.
+        let Some(mut record) = interrupted(&folder) else { continue };
+        tell(&format!("going on with the interrupted run in {}", folder.display()));
+        record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
+            cell.outcome = Outcome::Pending;
+        });
+        return Ok(Storage { folder, record, _lock: lock });
     }
     begin(results, program, machine, run)
 }
