@@ -81,14 +81,16 @@ pub trait Solver: Send {
     /// Those of the device.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error>;
 
-    /// Writes the label of least belief of every pixel, the smallest on ties, `[height][width]`.
+    /// Writes the label of least belief of every pixel, the smallest on ties, `[height][width]`; under
+    /// [`crate::Schedule::Sweep`] labels are decided one after another as told there.
     ///
     /// # Errors
     /// Those of the device.
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error>;
 
-    /// Copies out what every node of grid 0 last received from the neighbour on `side`, `[height][width][labels]`; zeros
-    /// where no message comes from there. Not a kernel: for comparing backends.
+    /// Copies out what every node of grid 0 last received from the neighbour on `side`, `[height][width][labels]`;
+    /// zeros where no message comes from there, or where under [`crate::Schedule::Sweep`] the edge holds the one that
+    /// went the other way. Not a kernel: for comparing backends.
     ///
     /// # Errors
     /// Those of the device.

@@ -28,12 +28,16 @@
 //! above 252) is greater, so it never is the least and never ties with it; all entries up to 4K are exact. Clipping at
 //! 4K itself would be wrong: it could make a tie that is not there.
 //!
+//! **Labels one after another.** Under [`crate::Schedule::Sweep`] a label minimises D plus at most four terms, messages
+//! or smoothness costs to labels decided before. Each lies in 0..=K, so all that is said of beliefs holds.
+//!
 //! **Coarser grids.** A coarse node's cost is the sum of its children's. Taking off a child's least cost first shifts
 //! the sum by a constant, which cancels; clipping a child first would not. So sums are taken over unclipped costs, and
-//! normalised and clipped after.
+//! normalised and clipped after. The lower clip of [`crate::Settings::coarse_clip`] is part of what is computed, not of
+//! how: with it, D of a coarse grid means the clipped cost.
 //!
 //! **Plain adds.** A sum never exceeds `4K + 1 + 3K + min(s, K)` in a message update and `4K + 1 + 4K` in a belief.
 //! Where these are at most 255, wrapping adds give the same; otherwise they must saturate.
 //!
 //! The property test `u8_equals_unbounded_integers` of bp-cpu-scalar holds all this against
-//! an oracle in `i64` that neither normalises data costs nor clips anything.
+//! an oracle in `i64` that neither normalises nor clips what the definition leaves alone.

@@ -22,9 +22,10 @@
 //! # }
 //! ```
 //!
-//! A [`Model`] says what is minimised, a [`Plan`] what is run and what it will cost, a [`Backend`] where. All five
-//! algorithms of the thesis are [`Settings`] of one plan, and every backend gives the same labels and messages to the
-//! bit; [`exactness`] says why that is possible in 8 bits, [`worked_example`] follows a pair of 3x2 pixels by hand.
+//! A [`Model`] says what is minimised, a [`Plan`] what is run and what it will cost, a [`Backend`] where. The five
+//! algorithms of the thesis and ours are [`Settings`] of one plan, and every backend gives the same labels and messages
+//! to the bit; [`exactness`] says why that is possible in 8 bits, [`worked_example`] follows a pair of 3x2 pixels by
+//! hand.
 
 mod backend;
 pub mod census;
@@ -55,4 +56,4 @@ pub use map::DisparityMap;
 pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
 pub use plan::{Buffer, MAX_GRIDS, Plan};
-pub use settings::{Algorithm, Cut, MessageStart, Schedule, Settings};
+pub use settings::{Algorithm, BAND_ROWS, Cut, MessageStart, Schedule, Settings};

@@ -158,7 +158,8 @@ impl Model {
         (u32::from(self.slope) * u32::from(a.abs_diff(b))).min(u32::from(self.truncation))
     }
 
-    /// The value `4K + 1` that stored data costs are clipped at: no label as dear as that is ever chosen.
+    /// The value `4K + 1` that stored data costs are clipped at: no label as dear as that is ever chosen. See also
+    /// [`crate::Plan::clip`].
     #[must_use]
     pub fn clip(&self) -> u8 {
         4 * self.truncation + 1

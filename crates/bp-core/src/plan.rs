@@ -1,6 +1,6 @@
 //! One plan for every algorithm: what is run, and what it will cost in work and memory, known before anything runs.
 
-use crate::{Error, Model, Profile, Schedule, Settings, Side, Size};
+use crate::{BAND_ROWS, Error, MessageStart, Model, Profile, Schedule, Settings, Side, Size};
 
 /// Most grids of a plan: the longest side allowed, [`crate::image::MAX_SIDE`], halves to 1 in as many.
 pub const MAX_GRIDS: usize = 25;
@@ -17,8 +17,9 @@ impl Plan {
     /// A plan for pairs of `size`.
     ///
     /// # Errors
-    /// [`Error::Plan`] where a count is 0, there are more than [`MAX_GRIDS`] grids, or a cut lies outside the image or
-    /// comes with more than one grid; those of [`Size::new`] for a size that is no image's.
+    /// [`Error::Plan`] where a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or
+    /// comes with more than one grid, or [`MessageStart::Sender`] with [`Schedule::Sweep`]; those of [`Size::new`] for
+    /// a size that is no image's.
     pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
         let size = Size::new(size.width, size.height)?;
         if settings.grids == 0 || settings.steps == 0 {
@@ -32,6 +33,9 @@ impl Plan {
         }
         if settings.cut.is_some() && settings.grids > 1 {
             return Err(Error::Plan("an image that is cut into parts has one grid"));
+        }
+        if settings.schedule == Schedule::Sweep && settings.message_start == MessageStart::Sender {
+            return Err(Error::Plan("message start sender has no meaning under the schedule sweep"));
         }
         let sizes = std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids).collect();
         Ok(Self { model, settings, sizes })
@@ -111,14 +115,28 @@ impl Plan {
         all - cut
     }
 
-    /// Message entries that one step on a grid computes: a loop every directed message, a half-step half of them.
+    /// Message entries that one step on a grid computes: a loop every directed message, a half-step half of them; a
+    /// loop of [`Schedule::Sweep`] all but those down across a seam.
     ///
     /// # Panics
     /// Where there is no such grid.
     #[must_use]
     pub fn updates_per_step(&self, grid: usize) -> u64 {
-        let messages = 2 / u64::from(self.settings.schedule.steps_per_loop()) * self.edges(grid);
+        let edges = self.edges(grid);
+        let messages = match self.settings.schedule {
+            Schedule::Sync => 2 * edges,
+            Schedule::Checkerboard => edges,
+            Schedule::Sweep => 2 * edges - self.seam_edges(grid),
+        };
         messages.saturating_mul(self.model.labels() as u64)
+    }
+
+    /// Edges between two bands of [`Schedule::Sweep`]; there are none where a cut lies on the seam.
+    fn seam_edges(&self, grid: usize) -> u64 {
+        let Size { width, height } = self.sizes[grid];
+        let seams =
+            (BAND_ROWS..height).step_by(BAND_ROWS).filter(|&y| self.neighbour(grid, (0, y), Side::Up).is_some());
+        width as u64 * seams.count() as u64
     }
 
     /// Message entries that the whole plan computes.
@@ -128,11 +146,19 @@ impl Plan {
         per_step.fold(0, |sum: u64, updates| sum.saturating_add(updates.saturating_mul(self.settings.steps.into())))
     }
 
+    /// What stored data costs of a grid are clipped at: [`Model::clip`], which changes nothing, or the lower
+    /// `K + K div 2` of [`Settings::coarse_clip`], which does.
+    #[must_use]
+    pub fn clip(&self, grid: usize) -> u8 {
+        let truncation = self.model.truncation();
+        if grid > 0 && self.settings.coarse_clip { truncation + truncation / 2 } else { self.model.clip() }
+    }
+
     /// Whether the coarser grid's costs are summed from wide sums kept beside this grid's stored costs, because those
     /// may have been clipped.
     #[must_use]
     pub fn keeps_sums(&self, grid: usize) -> bool {
-        grid + 1 < self.grids() && self.model.max_cost(grid) > u64::from(self.model.clip())
+        grid + 1 < self.grids() && self.model.max_cost(grid) > u64::from(self.clip(grid))
     }
 
     /// Bytes of one such sum: the fewest of 1, 2, 4 and 8 that hold the largest.
@@ -147,7 +173,8 @@ impl Plan {
     }
 
     /// The buffers that the plan asks for, without any padding a backend may add. Messages of two grids are held at a
-    /// time; under [`Schedule::Sync`] they are double buffered.
+    /// time: one each way over every edge, of which a node has two; double buffered under [`Schedule::Sync`]; a single
+    /// one an edge under [`Schedule::Sweep`].
     #[must_use]
     pub fn buffers(&self) -> Vec<Buffer> {
         let pixels = self.image_size().pixels() as u64;
@@ -164,8 +191,12 @@ impl Plan {
                 buffers.push(Buffer { name: "data cost sums", grid, bytes });
             }
             if grid < 2 {
-                let copies = if self.settings.schedule == Schedule::Sync { 2 } else { 1 };
-                buffers.push(Buffer { name: "messages", grid, bytes: volume.saturating_mul(4 * copies) });
+                let messages_per_node = match self.settings.schedule {
+                    Schedule::Sync => 2 * 4,
+                    Schedule::Checkerboard => 4,
+                    Schedule::Sweep => 2,
+                };
+                buffers.push(Buffer { name: "messages", grid, bytes: volume.saturating_mul(messages_per_node) });
             }
         }
         buffers
@@ -216,6 +247,31 @@ mod tests {
         assert!((ratio(Algorithm::Cfcsbp) - 16.8).abs() < 0.1, "{}", ratio(Algorithm::Cfcsbp));
     }
 
+    /// Counted by hand: 555 rows are 35 bands with 34 seams, which 620 columns cross.
+    #[test]
+    fn a_sweep_sends_nothing_down_across_seams() {
+        let one_grid = |cut| {
+            let settings = Settings { grids: 1, cut, ..plan(Algorithm::Sweep, Schedule::Sweep).settings };
+            Plan::new(BABY, Model::new(Profile::Thesis, 1).unwrap(), settings).unwrap()
+        };
+        let cut_at = |y| Some(Cut { x: 0, y, seed_start: false });
+        let all = 2 * (619 * 555 + 620 * 554);
+        assert_eq!(one_grid(None).message_updates(), all - 34 * 620);
+        assert_eq!(one_grid(cut_at(8)).message_updates(), all - 34 * 620 - 2 * 620);
+        assert_eq!(one_grid(cut_at(32)).message_updates(), all - 33 * 620 - 2 * 620);
+        let messages =
+            |plan: &Plan| plan.buffers().iter().filter(|b| b.name == "messages").map(|b| b.bytes).sum::<u64>();
+        assert_eq!(messages(&one_grid(None)), 2 * 620 * 555);
+    }
+
+    #[test]
+    fn coarse_grids_are_clipped_lower_where_asked() {
+        let clipped = plan(Algorithm::Sweep, Schedule::Sweep);
+        assert_eq!([0, 1, 4].map(|grid| clipped.clip(grid)), [69, 25, 25]);
+        assert_eq!([0, 1, 2, 3, 4].map(|grid| clipped.keeps_sums(grid)), [false, true, true, true, false]);
+        assert_eq!(plan(Algorithm::Cfbp, Schedule::Sweep).clip(1), 69);
+    }
+
     #[test]
     fn sums_are_kept_where_costs_may_be_clipped() {
         let plan = plan(Algorithm::Cfbp, Schedule::Sync);
@@ -240,5 +296,6 @@ mod tests {
         assert!(with(|s| s.grids = 2).is_err());
         assert!(with(|s| s.cut = Some(Cut { x: 620, y: 0, seed_start: true })).is_err());
         assert!(with(|s| (s.cut, s.grids) = (None, MAX_GRIDS + 1)).is_err());
+        assert!(with(|s| (s.schedule, s.message_start) = (Schedule::Sweep, MessageStart::Sender)).is_err());
     }
 }

@@ -58,7 +58,7 @@
 //! let device = bp_cpu_scalar::Scalar.open(0)?;
 //! let run = |grids, steps, cut| {
 //!     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
-//!     let settings = Settings { grids, steps, schedule, message_start, cut };
+//!     let settings = Settings { grids, steps, schedule, message_start, cut, coarse_clip: false };
 //!     let mut matcher = Matcher::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
 //!     matcher.solve(&pair)?;
 //!     let energy = Energy::of(&pair, &model, matcher.labels())?;

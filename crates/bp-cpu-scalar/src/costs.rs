@@ -4,8 +4,8 @@ use bp_core::{Error, Plan, memory};
 
 use crate::sums::{self, Sums};
 
-/// Data costs `[node][label]`, each node's least one taken off, clipped at 4K + 1 (see [`bp_core::exactness`]); beside
-/// them the unclipped ones, where the next coarser grid is summed from those.
+/// Data costs `[node][label]`, each node's least one taken off, clipped at [`Plan::clip`]; beside them the unclipped
+/// ones, where the next coarser grid is summed from those.
 pub(crate) struct Costs {
     labels: usize,
     clip: u64,
@@ -18,7 +18,7 @@ impl Costs {
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         Ok(Self {
             labels: plan.model().labels(),
-            clip: plan.model().clip().into(),
+            clip: plan.clip(grid).into(),
             stored: memory::filled("data cost", plan.volume(grid), 0)?,
             sums: plan.keeps_sums(grid).then(|| Sums::new(plan, grid)).transpose()?,
         })

@@ -1,19 +1,22 @@
 //! The reference backend: one thread, the label loop innermost, written to be read.
 //!
 //! It is the baseline that all tables compare with, and its labels and messages are what every other backend must give
-//! to the bit. One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`.
+//! to the bit. One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`. What the
+//! schedule `sweep` does differently stands beside them in `sweep` and `decode`.
 
 mod coarsen;
 mod costs;
+mod decode;
 mod match_cost;
 mod messages;
 mod refine;
 mod select_labels;
 mod solver;
 mod sums;
+mod sweep;
 mod update_messages;
 
-use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
+use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Schedule, Solver};
 
 /// The backend, and its one device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,5 +44,12 @@ impl Backend for Scalar {
 impl Device for Scalar {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
         Ok(Box::new(solver::ScalarSolver::new(plan)?))
+    }
+
+    /// Messages have a slot for each direction here, also under `sweep`, where an edge holds only one of the two.
+    fn planned_bytes(&self, plan: &Plan) -> u64 {
+        let sweep = plan.settings().schedule == Schedule::Sweep;
+        let messages = plan.buffers().into_iter().filter(|buffer| sweep && buffer.name == "messages");
+        messages.fold(plan.bytes(), |bytes, buffer| bytes.saturating_add(buffer.bytes))
     }
 }

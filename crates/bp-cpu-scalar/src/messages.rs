@@ -3,7 +3,7 @@
 use bp_core::{Error, Plan, Schedule, Side, memory};
 
 /// What every node last received from each side: `[side][node][label]`, sides in the order of [`Side::ALL`]. The slots
-/// of neighbours that are not there stay 0.
+/// of neighbours that are not there stay 0, and so do those of messages used up under the schedule `sweep`.
 pub(crate) struct Messages {
     labels: usize,
     received: [Vec<u8>; 4],

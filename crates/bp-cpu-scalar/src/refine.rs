@@ -1,6 +1,6 @@
 //! First messages of a grid.
 
-use bp_core::{MessageStart, Plan, Side};
+use bp_core::{MessageStart, Plan, Schedule, Side};
 
 use crate::messages::Messages;
 
@@ -21,7 +21,7 @@ pub(crate) fn refine(plan: &Plan, grid: usize, coarse: &Messages, fine: &mut Mes
 }
 
 /// The coarse node whose message from `side` the fine node at (x, y) starts with: its own parent, or the node that its
-/// sender's parent sends to; `None` where that parent sends nothing that way.
+/// sender's parent sends to; `None` where it starts with zeros.
 fn coarse_receiver(
     plan: &Plan,
     grid: usize,
@@ -30,8 +30,25 @@ fn coarse_receiver(
     side: Side,
 ) -> Option<usize> {
     let (x, y) = match plan.settings().message_start {
+        MessageStart::Receiver if plan.settings().schedule == Schedule::Sweep => {
+            sweep_receiver(plan, grid, (x, y), side)?
+        }
         MessageStart::Receiver => (x / 2, y / 2),
         MessageStart::Sender => plan.neighbour(grid + 1, (sender.0 / 2, sender.1 / 2), side.opposite())?,
     };
     Some(y * plan.size(grid + 1).width + x)
+}
+
+/// The same under the schedule `sweep`, whose edges hold the message up or the one towards their even end: an odd
+/// parent received nothing from that side, but its neighbour there, which is even, did.
+fn sweep_receiver(plan: &Plan, grid: usize, (x, y): (usize, usize), side: Side) -> Option<(usize, usize)> {
+    let parent = (x / 2, y / 2);
+    let is_even = |(x, y): (usize, usize)| (x + y).is_multiple_of(2);
+    match side {
+        Side::Up => None,
+        Side::Down => Some(parent),
+        Side::Left | Side::Right if !is_even((x, y)) => None,
+        Side::Left | Side::Right if is_even(parent) => Some(parent),
+        Side::Left | Side::Right => plan.neighbour(grid + 1, parent, side),
+    }
 }

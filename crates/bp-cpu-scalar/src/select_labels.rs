@@ -1,11 +1,19 @@
 //! Labels of least belief.
 
-use bp_core::Side;
+use bp_core::{Plan, Schedule, Side};
 
-use crate::{costs::Costs, messages::Messages};
+use crate::{costs::Costs, decode::decode, messages::Messages};
 
-/// Writes the smallest label of least belief of every node. `belief` is room for one node's labels.
-pub(crate) fn select_labels(costs: &Costs, messages: &Messages, labels: &mut [u16], belief: &mut [u8]) {
+/// Writes the label of every node. `belief` is room for one node's labels.
+pub(crate) fn select_labels(plan: &Plan, costs: &Costs, messages: &Messages, labels: &mut [u16], belief: &mut [u8]) {
+    match plan.settings().schedule {
+        Schedule::Sync | Schedule::Checkerboard => least_beliefs(costs, messages, labels, belief),
+        Schedule::Sweep => decode(plan, costs, messages, labels, belief),
+    }
+}
+
+/// The smallest label of least belief of every node.
+fn least_beliefs(costs: &Costs, messages: &Messages, labels: &mut [u16], belief: &mut [u8]) {
     for (node, label) in labels.iter_mut().enumerate() {
         belief.copy_from_slice(costs.of(node));
         for side in Side::ALL {
@@ -13,7 +21,12 @@ pub(crate) fn select_labels(costs: &Costs, messages: &Messages, labels: &mut [u1
                 *belief = belief.saturating_add(message);
             }
         }
-        let least = belief.iter().copied().min();
-        *label = belief.iter().position(|&belief| Some(belief) == least).unwrap_or(0) as u16;
+        *label = smallest_least(belief);
     }
+}
+
+/// The label of the least sum, the smallest on ties.
+pub(crate) fn smallest_least(sums: &[u8]) -> u16 {
+    let least = sums.iter().copied().min();
+    sums.iter().position(|&sum| Some(sum) == least).unwrap_or(0) as u16
 }

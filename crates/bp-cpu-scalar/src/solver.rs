@@ -68,7 +68,7 @@ impl Solver for ScalarSolver {
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        select_labels(&self.costs[0], &self.messages[0], labels, &mut self.h);
+        select_labels(&self.plan, &self.costs[0], &self.messages[0], labels, &mut self.h);
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use bp_core::{Model, Plan, Schedule, Side};
 
-use crate::{costs::Costs, messages::Messages};
+use crate::{costs::Costs, messages::Messages, sweep::sweep};
 
 /// Runs one step of the plan's schedule on `grid`. `h` is room for one message.
 pub(crate) fn update_messages(
@@ -13,6 +13,14 @@ pub(crate) fn update_messages(
     messages: &mut Messages,
     h: &mut [u8],
 ) {
+    match plan.settings().schedule {
+        Schedule::Sync | Schedule::Checkerboard => parallel_step(plan, grid, step, costs, messages, h),
+        Schedule::Sweep => sweep(plan, grid, costs, messages, h),
+    }
+}
+
+/// A step whose messages depend on none of the same step.
+fn parallel_step(plan: &Plan, grid: usize, step: u32, costs: &Costs, messages: &mut Messages, h: &mut [u8]) {
     let size = plan.size(grid);
     let sync = plan.settings().schedule == Schedule::Sync;
     for y in 0..size.height {
@@ -35,7 +43,7 @@ pub(crate) fn update_messages(
 }
 
 /// Sets h to the data cost of `node` plus what it received from all sides but `to`.
-fn gather(costs: &Costs, messages: &Messages, node: usize, to: Side, h: &mut [u8]) {
+pub(crate) fn gather(costs: &Costs, messages: &Messages, node: usize, to: Side, h: &mut [u8]) {
     h.copy_from_slice(costs.of(node));
     for from in Side::ALL.into_iter().filter(|&from| from != to) {
         for (h, &message) in h.iter_mut().zip(messages.received(node, from)) {
@@ -46,7 +54,7 @@ fn gather(costs: &Costs, messages: &Messages, node: usize, to: Side, h: &mut [u8
 
 /// Turns h into a message: `min over a of (h(a) + min(s |a - d|, K))` for every label d, normalised by its minimum,
 /// which is h's. A pass up and a pass down the labels make the lower envelope (Felzenszwalb and Huttenlocher 2006).
-fn send(model: &Model, h: &mut [u8], message: &mut [u8]) {
+pub(crate) fn send(model: &Model, h: &mut [u8], message: &mut [u8]) {
     let (step, truncation) = (model.step(), model.truncation());
     let least = h.iter().copied().min().unwrap_or(0);
     let mut envelope = u8::MAX;

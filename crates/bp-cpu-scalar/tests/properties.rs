@@ -4,15 +4,15 @@
 use std::ops::ControlFlow;
 
 use bp_core::{
-    Algorithm, Backend, Cut, DataCost, Energy, Error, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule,
-    Settings, Size, StereoPair,
+    Algorithm, BAND_ROWS, Backend, Cut, DataCost, Energy, Error, Image, Matcher, MessageStart, Model, Plan, Profile,
+    Schedule, Settings, Size, StereoPair,
     conformance::{Answer, Case, Oracle, assert_same, noise_pair, solve},
 };
 use bp_cpu_scalar::Scalar;
 use proptest::prelude::*;
 
 fn plan_settings(grids: usize, steps: u32, schedule: Schedule) -> Settings {
-    Settings { grids, steps, schedule, message_start: MessageStart::Receiver, cut: None }
+    Settings { grids, steps, schedule, message_start: MessageStart::Receiver, cut: None, coarse_clip: false }
 }
 
 fn answer(pair: &StereoPair, model: Model, settings: Settings) -> Answer {
@@ -32,15 +32,20 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
     let schedule = prop::sample::select(Schedule::ALL.to_vec());
     let start = prop::sample::select(MessageStart::ALL.to_vec());
     let cut = prop::option::of((0..size.width, 0..size.height, any::<bool>()));
-    (1..5_usize, 1..6_u32, schedule, start, cut).prop_map(|(grids, steps, schedule, message_start, cut)| {
-        let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
-        let grids = if cut.is_some() { 1 } else { grids };
-        Settings { grids, steps, schedule, message_start, cut }
-    })
+    (1..5_usize, 1..6_u32, schedule, start, cut, any::<bool>()).prop_map(
+        |(grids, steps, schedule, start, cut, coarse_clip)| {
+            let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
+            let grids = if cut.is_some() { 1 } else { grids };
+            let message_start = if schedule == Schedule::Sweep { MessageStart::Receiver } else { start };
+            Settings { grids, steps, schedule, message_start, cut, coarse_clip }
+        },
+    )
 }
 
 fn any_case() -> impl Strategy<Value = Case> {
-    (1..9_usize, 1..9_usize, any::<u32>(), any_model(1..20)).prop_flat_map(|(width, height, seed, model)| {
+    // Now and then high enough for several bands of the schedule sweep.
+    let height = prop_oneof![3 => 1..9_usize, 1 => 16..52_usize];
+    (1..9_usize, height, any::<u32>(), any_model(1..20)).prop_flat_map(|(width, height, seed, model)| {
         let pair = noise_pair(width, height, seed.into());
         any_settings(pair.size()).prop_map(move |settings| Case {
             plan: Plan::new(pair.size(), model, settings).unwrap(),
@@ -111,6 +116,35 @@ proptest! {
         }
     }
 
+    /// In a column of one band, one loop of sweeps is dynamic programming: messages come up, labels are decided down.
+    #[test]
+    fn one_sweep_solves_a_column_of_one_band_exactly(
+        height in 1..=BAND_ROWS, seed in any::<u32>(), model in any_model(1..9),
+    ) {
+        let pair = noise_pair(1, height, seed.into());
+        let labels = answer(&pair, model, plan_settings(1, 1, Schedule::Sweep)).labels;
+        let nodes: Vec<_> = (0..height).map(|y| (0, y)).collect();
+        let marginals = min_marginals(&DataCost::of_pair(&pair, model).unwrap(), &model, &nodes);
+        let energy = Energy::of(&pair, &model, &labels).unwrap().total();
+        prop_assert_eq!(energy as i64, *marginals[0].iter().min().unwrap());
+    }
+
+    /// After a loop of sweeps every edge holds one message, up or towards its even end.
+    #[test]
+    fn a_sweep_leaves_one_message_an_edge(
+        width in 1..9_usize, height in 1..40_usize, grids in 1..4_usize, seed in any::<u32>(), model in any_model(2..9),
+    ) {
+        let pair = noise_pair(width, height, seed.into());
+        let [left, right, up, _] = answer(&pair, model, plan_settings(grids, 1, Schedule::Sweep)).messages;
+        prop_assert!(up.iter().all(|&message| message == 0));
+        for messages in [left, right] {
+            for (node, message) in messages.chunks(model.labels()).enumerate() {
+                let odd = (node % width + node / width) % 2 == 1;
+                prop_assert!(!odd || message.iter().all(|&message| message == 0));
+            }
+        }
+    }
+
     /// The grid is bipartite: T half-steps from zero are one colour of T synchronous loops.
     #[test]
     fn half_steps_are_half_of_the_synchronous_loops(
@@ -155,19 +189,23 @@ proptest! {
 
     /// What lies in one part of a cut image has no effect on the others.
     #[test]
-    fn no_message_crosses_a_cut(width in 2..9_usize, height in 2..9_usize, seed in any::<u32>(), labels in 1..9_usize) {
+    fn no_message_crosses_a_cut(
+        width in 2..9_usize, height in prop_oneof![2..9_usize, Just(32)], seed in any::<u32>(), labels in 1..9_usize,
+    ) {
         let model = Model::new(Profile::Thesis, labels).unwrap();
         let pair = noise_pair(width, height, seed.into());
         let cut = Cut { seed_start: false, ..Cut::at_centre(pair.size()) };
-        let settings = Settings { cut: Some(cut), ..plan_settings(1, 9, Schedule::Checkerboard) };
         let inside = |node: usize| node % width < cut.x && node / width < cut.y;
         let pixels = pair.left().pixels().iter().enumerate();
         let changed = pixels.map(|(node, &pixel)| if inside(node) { pixel.map(|v| !v) } else { pixel }).collect();
         let left = Image::from_rgb(width, height, changed).unwrap();
         let other = StereoPair::new(left, pair.right().clone()).unwrap();
-        let (a, b) = (answer(&pair, model, settings), answer(&other, model, settings));
-        for node in (0..width * height).filter(|&node| !inside(node)) {
-            prop_assert_eq!(a.labels[node], b.labels[node]);
+        for schedule in [Schedule::Checkerboard, Schedule::Sweep] {
+            let settings = Settings { cut: Some(cut), ..plan_settings(1, 9, schedule) };
+            let (a, b) = (answer(&pair, model, settings), answer(&other, model, settings));
+            for node in (0..width * height).filter(|&node| !inside(node)) {
+                prop_assert_eq!(a.labels[node], b.labels[node]);
+            }
         }
     }
 }

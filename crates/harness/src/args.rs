@@ -81,7 +81,7 @@ pub(crate) struct MatchArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Plan")]
 pub(crate) struct PlanArgs {
-    /// Algorithm of the thesis.
+    /// Algorithm: one of the thesis's five, or sweep, which is ours.
     #[arg(long, default_value = "cfcsbp", value_parser = named(&Algorithm::ALL, Algorithm::name))]
     pub(crate) algorithm: Algorithm,
     /// Data cost, with the smoothness that goes with it.
@@ -98,24 +98,29 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true,
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
     pub(crate) min_disparity: i32,
-    /// Loops (k) that the algorithm derives its own from; with --grids, loops on each grid. [default: labels]
+    /// Loops (k) that the algorithm derives its own from; with --grids or sweep, loops on each grid. [default: labels;
+    /// 1 for sweep]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) loops: Option<u32>,
     /// Half-steps on each grid, divided by nothing (schedule checkerboard).
     #[arg(long, value_name = "N", conflicts_with = "loops", value_parser = clap::value_parser!(u32).range(1..=2_000_000))]
     pub(crate) half_steps: Option<u32>,
-    /// Number of grids, coarse to fine; needs --loops or --half-steps, which then count on each grid.
+    /// Number of grids, coarse to fine; except for sweep it needs --loops or --half-steps, which then count on each
+    /// grid.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=bp_core::MAX_GRIDS as i64))]
     pub(crate) grids: Option<u8>,
     /// What cfcsbp and ctcsbp divide the loops by (Z'', Z''''). [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) z: Option<u32>,
-    /// Order of message updates. [default: sync; checkerboard with --half-steps]
+    /// Order of message updates. [default: sync; checkerboard with --half-steps; algorithm sweep has its own]
     #[arg(long, value_parser = named(&Schedule::ALL, Schedule::name))]
     pub(crate) schedule: Option<Schedule>,
     /// By which side finer grids take over messages. [default: receiver]
     #[arg(long, value_parser = named(&MessageStart::ALL, MessageStart::name))]
     pub(crate) message_start: Option<MessageStart>,
+    /// Whether the data costs of coarse grids are clipped at K + K div 2. [default: on for sweep, else off]
+    #[arg(long, value_parser = named(&[true, false], switch))]
+    pub(crate) coarse_clip: Option<bool>,
     /// Whether the census match of the centre is a prior (ctbp, ctcsbp). [default: on]
     #[arg(long, value_parser = named(&[true, false], switch))]
     pub(crate) seed_start: Option<bool>,

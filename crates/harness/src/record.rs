@@ -174,12 +174,15 @@ pub struct Settings {
     pub z: Option<u32>,
     /// Number of grids.
     pub grids: usize,
-    /// Loops (schedule sync) or half-steps (checkerboard) on each grid.
+    /// Loops (schedules sync and sweep) or half-steps (checkerboard) on each grid.
     pub steps_per_grid: u32,
     /// Schedule.
     pub schedule: String,
     /// Side by which finer grids take over messages.
     pub message_start: String,
+    /// Whether the data costs of grids from 1 on are clipped at K + K div 2; records from before that option lack it.
+    #[serde(default)]
+    pub coarse_clip: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
     /// Message entries that the plan predicts to compute.

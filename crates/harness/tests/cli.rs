@@ -78,9 +78,14 @@ const MATCH: &str = "match left.png right.png --labels 12 --output";
 fn a_shifted_pair_is_matched_and_evaluated_in_every_format() {
     let folder = Folder::new();
     let truth = "--ground-truth truth.png --ground-truth-right truth.png --scale 2";
-    for (algorithm, output) in
-        [("bp", "a.pfm"), ("cfbp", "b.png"), ("cfcsbp", "c.PFM"), ("ctbp", "d.png"), ("ctcsbp", "e.pfm")]
-    {
+    for (algorithm, output) in [
+        ("bp", "a.pfm"),
+        ("cfbp", "b.png"),
+        ("cfcsbp", "c.PFM"),
+        ("ctbp", "d.png"),
+        ("ctcsbp", "e.pfm"),
+        ("sweep", "g.png"),
+    ] {
         let report = folder.json(&format!("{MATCH} {output} --algorithm {algorithm} {truth} --json"));
         let bad = report["errors"]["visible"]["bad"][1].as_f64().unwrap();
         assert!(bad < 2.0, "{algorithm}: {bad} % of visible pixels");
@@ -119,13 +124,21 @@ fn settings_change_what_they_say() {
     assert_eq!(steps("--algorithm ctcsbp --loops 30 --z 4"), (1, 7));
     assert_eq!(steps("--algorithm cfbp --grids 3 --loops 4"), (3, 4));
     assert_eq!(steps("--algorithm cfcsbp --grids 3 --half-steps 5"), (3, 5));
+    assert_eq!(steps("--algorithm cfbp --loops 30 --schedule sweep"), (5, 5));
+    assert_eq!(steps("--algorithm sweep"), (5, 1));
+    assert_eq!(steps("--algorithm sweep --grids 3 --schedule sweep"), (3, 1));
+    assert_eq!(steps("--algorithm sweep --loops 4"), (5, 4));
     assert_eq!(run("--half-steps 5")["settings"]["schedule"], "checkerboard");
+    let swept = &run("--algorithm sweep --loops 2")["settings"];
+    assert_eq!((&swept["schedule"], &swept["coarse_clip"], &swept["k"]), (&"sweep".into(), &true.into(), &Value::Null));
+    assert_eq!(run("--algorithm cfbp")["settings"]["coarse_clip"], false);
     let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
     assert_eq!(hash(""), hash(""));
     let default = hash("--algorithm cfbp --grids 3 --loops 1");
     for other in ["--message-start sender", "--slope 1", "--truncation 5", "--profile mrf", "--min-disparity -2"] {
         assert_ne!(hash(&format!("--algorithm cfbp --grids 3 --loops 1 {other}")), default, "{other}");
     }
+    assert_ne!(hash("--algorithm sweep --profile mrf --coarse-clip off"), hash("--algorithm sweep --profile mrf"));
     let seeded = "--algorithm ctbp --loops 1 --profile mrf --seed-start";
     assert_ne!(hash(&format!("{seeded} on")), hash(&format!("{seeded} off")));
 }
@@ -155,6 +168,13 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         ("--algorithm cfbp --seed-start off", ["--seed-start", "ctbp"]),
         ("--algorithm bp --message-start sender", ["--message-start", "cfbp"]),
         ("--half-steps 3 --schedule sync", ["--half-steps", "checkerboard"]),
+        ("--half-steps 3 --schedule sweep", ["--half-steps", "checkerboard"]),
+        ("--algorithm sweep --half-steps 3", ["--half-steps", "sweep"]),
+        ("--algorithm sweep --schedule sync", ["--schedule", "sweep"]),
+        ("--algorithm sweep --z 2", ["--z", "sweep"]),
+        ("--algorithm sweep --message-start receiver", ["--message-start", "sweep"]),
+        ("--schedule sweep --message-start sender", ["message start", "sweep"]),
+        ("--algorithm bp --coarse-clip on", ["--coarse-clip", "cfbp"]),
         ("--half-steps 3 --loops 2", ["--half-steps", "--loops"]),
         ("--truncation 64", ["--truncation", "63"]),
         ("--labels 0", ["--labels", "1024"]),

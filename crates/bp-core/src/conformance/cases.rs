@@ -12,8 +12,9 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let every = small
         .chain(many_labels)
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
-    // Wide enough for several tiles of the widest vectors; fewer models, since the oracle is slow.
-    let wide = [(131, 7), (200, 3), (67, 40)].into_iter().flat_map(|size| {
+    // Wide enough for several tiles of the widest vectors, high enough for several bands, the last one short; fewer
+    // models, since the oracle is slow.
+    let wide = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 50)].into_iter().flat_map(|size| {
         Profile::ALL.into_iter().filter_map(move |profile| Some((size, Model::new(profile, 5).ok()?)))
     });
     every.chain(wide).flat_map(|((width, height), model)| {
@@ -38,13 +39,28 @@ fn models(labels: usize) -> Vec<Model> {
 fn settings(size: Size) -> Vec<Settings> {
     let mut all = Vec::new();
     for schedule in Schedule::ALL {
-        all.extend(Algorithm::ALL.map(|algorithm| algorithm.settings(size, 7, 2, schedule)));
+        all.extend(Algorithm::THESIS.map(|algorithm| algorithm.settings(size, 7, 2, schedule)));
         let cut = Cut { x: size.width / 3, y: 2 * size.height / 3, seed_start: false };
         all.push(Settings { cut: Some(cut), ..Algorithm::Ctbp.settings(size, 4, 1, schedule) });
         let hierarchy = Algorithm::Cfbp.settings(size, 7, 1, schedule);
         all.extend(MessageStart::ALL.map(|message_start| Settings { grids: 3, steps: 3, message_start, ..hierarchy }));
+        all.push(Settings { grids: 3, steps: 2, coarse_clip: true, ..hierarchy });
     }
+    all.extend(sweeps(size));
     all
+}
+
+/// What sets the schedule `sweep` apart: one and two loops, on one grid and several, clipped and not, and cuts inside a
+/// band and on a seam.
+fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
+    let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
+    let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });
+    let unclipped = grids.map(|settings| Settings { coarse_clip: false, ..settings });
+    let cuts = [0, 16, 19, 32].map(|y| {
+        let cut = Cut { x: size.width / 2, y, seed_start: false };
+        Settings { cut: Some(cut), grids: 1, ..ours }
+    });
+    std::iter::once(ours).chain(grids).chain(unclipped).chain(cuts)
 }
 
 /// A pair of coloured noise, the same for the same arguments. Blocks of 4x4 pixels are shifted by 0, 1 or 2, so that

@@ -1,16 +1,21 @@
-//! The same model computed the obvious way: unbounded integers, messages by their definition, nothing clipped.
+//! The same model computed the obvious way: unbounded integers, messages by their definition, nothing clipped but where
+//! that is part of the definition.
+
+mod sweep;
 
 use std::ops::Range;
 
 use crate::{DataCost, Device, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair};
 
-/// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs.
+/// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs, except
+/// those that [`Settings::coarse_clip`](crate::Settings::coarse_clip) says to.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Oracle;
 
 impl Device for Oracle {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
         let grid = |grid: usize| Grid {
+            sums: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
             costs: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
             received: vec![
                 [const { Vec::new() }; 4].map(|_: Vec<i64>| vec![0; plan.model().labels()]);
@@ -23,8 +28,10 @@ impl Device for Oracle {
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
-/// Costs `[node][label]` and received messages `[node][side][label]`.
+/// Costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and received messages
+/// `[node][side][label]`.
 struct Grid {
+    sums: Vec<Vec<i64>>,
     costs: Vec<Vec<i64>>,
     received: Messages,
 }
@@ -39,6 +46,18 @@ impl OracleSolver {
     fn nodes(&self, grid: usize) -> impl Iterator<Item = (usize, (usize, usize))> + use<> {
         let width = self.plan.size(grid).width;
         (0..self.plan.size(grid).pixels()).map(move |node| (node, (node % width, node / width)))
+    }
+
+    /// Makes the costs of a grid from their sums.
+    fn set_costs(&mut self, grid: usize) {
+        let clips = grid > 0 && self.plan.settings().coarse_clip;
+        let truncation = i64::from(self.plan.model().truncation());
+        let Grid { sums, costs, .. } = &mut self.grids[grid];
+        costs.clone_from(sums);
+        for costs in costs.iter_mut().filter(|_| clips) {
+            let least = costs.iter().copied().min().unwrap_or(0);
+            costs.iter_mut().for_each(|cost| *cost = (*cost - least).min(truncation + truncation / 2));
+        }
     }
 
     /// What `node` sends when its costs are `costs`: all but what it received from the receiver, `to`.
@@ -77,6 +96,9 @@ impl OracleSolver {
     fn first_message(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<Vec<i64>> {
         let coarse = self.grids.get(grid + 1)?;
         let (sender_x, sender_y) = self.plan.neighbour(grid, (x, y), side)?;
+        if self.plan.settings().schedule == Schedule::Sweep {
+            return self.first_sweep_message(grid, (x, y), side);
+        }
         let receiver = match self.plan.settings().message_start {
             MessageStart::Receiver => (x / 2, y / 2),
             MessageStart::Sender => self.plan.neighbour(grid + 1, (sender_x / 2, sender_y / 2), side.opposite())?,
@@ -91,21 +113,23 @@ impl Solver for OracleSolver {
         let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
         data_cost.load(pair, seed)?;
         for (node, (x, y)) in self.nodes(0) {
-            for (label, cost) in self.grids[0].costs[node].iter_mut().enumerate() {
+            for (label, cost) in self.grids[0].sums[node].iter_mut().enumerate() {
                 *cost = data_cost.at(x, y, label as u16).into();
             }
         }
+        self.set_costs(0);
         Ok(())
     }
 
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
         let (fine, coarse) = self.grids.split_at_mut(grid);
-        coarse[0].costs.iter_mut().for_each(|costs| costs.fill(0));
-        for (node, costs) in fine[grid - 1].costs.iter().enumerate() {
+        coarse[0].sums.iter_mut().for_each(|sums| sums.fill(0));
+        for (node, costs) in fine[grid - 1].sums.iter().enumerate() {
             let width = self.plan.size(grid - 1).width;
             let parent = (node / width / 2) * self.plan.size(grid).width + (node % width) / 2;
-            coarse[0].costs[parent].iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
+            coarse[0].sums[parent].iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
         }
+        self.set_costs(grid);
         Ok(())
     }
 
@@ -121,12 +145,19 @@ impl Solver for OracleSolver {
     }
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
-        steps.for_each(|step| self.step(grid, step));
+        steps.for_each(|step| match self.plan.settings().schedule {
+            Schedule::Sync | Schedule::Checkerboard => self.step(grid, step),
+            Schedule::Sweep => self.sweep(grid),
+        });
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        let Grid { costs, received } = &self.grids[0];
+        if self.plan.settings().schedule == Schedule::Sweep {
+            self.decode(labels);
+            return Ok(());
+        }
+        let Grid { costs, received, .. } = &self.grids[0];
         for (node, label) in labels.iter_mut().enumerate() {
             let belief = |label: &u16| {
                 let label = usize::from(*label);
@@ -147,6 +178,6 @@ impl Solver for OracleSolver {
     }
 
     fn allocated_bytes(&self) -> u64 {
-        self.grids.iter().map(|grid| 5 * 8 * (grid.costs.len() * self.plan.model().labels()) as u64).sum()
+        self.grids.iter().map(|grid| 6 * 8 * (grid.costs.len() * self.plan.model().labels()) as u64).sum()
     }
 }

@@ -3,8 +3,8 @@
 use std::{fmt::Write as _, io::Write as _, path::Path};
 
 use bp_core::{
-    Cut, Energy, Errors, GroundTruth, MAX_LABELS, Matcher, Model, Plan, Schedule, Settings, Side, Size, Stage,
-    StereoPair,
+    Algorithm, Cut, Energy, Errors, GroundTruth, MAX_LABELS, Matcher, Model, Plan, Schedule, Settings, Side, Size,
+    Stage, StereoPair,
 };
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -118,32 +118,43 @@ fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
 
 /// Refuses options that contradict each other or would do nothing.
 fn check_options(args: &PlanArgs) -> Result<(), Failure> {
-    let algorithm = args.algorithm.name();
-    let needs = |given: bool, holds: bool, option: &str, what: &str| {
-        if given && !holds { Err(Failure::usage(format!("{option} needs {what}, not {algorithm}"))) } else { Ok(()) }
-    };
-    let coarse_to_fine = args.algorithm.is_coarse_to_fine();
-    needs(args.grids.is_some(), coarse_to_fine, "--grids", "--algorithm cfbp or cfcsbp")?;
-    needs(args.message_start.is_some(), coarse_to_fine, "--message-start", "--algorithm cfbp or cfcsbp")?;
-    needs(args.z.is_some(), args.algorithm.divides_loops(), "--z", "--algorithm cfcsbp or ctcsbp")?;
-    needs(args.seed_start.is_some(), args.algorithm.is_cut(), "--seed-start", "--algorithm ctbp or ctcsbp")?;
+    check_algorithm_options(args)?;
     if args.z.is_some() && counts_on_each_grid(args) {
         return Err(Failure::usage(
             "--z divides loops that the algorithm counts, not those of --grids or --half-steps",
         ));
     }
-    if args.grids.is_some() && args.loops.is_none() && args.half_steps.is_none() {
+    let counted = args.loops.is_some() || args.half_steps.is_some() || args.algorithm == Algorithm::Sweep;
+    if args.grids.is_some() && !counted {
         return Err(Failure::usage("--grids needs --loops or --half-steps, which then count on each grid"));
     }
-    if args.half_steps.is_some() && args.schedule == Some(Schedule::Sync) {
+    if args.half_steps.is_some() && args.schedule.is_some_and(|schedule| schedule != Schedule::Checkerboard) {
         return Err(Failure::usage("--half-steps needs --schedule checkerboard"));
     }
     Ok(())
 }
 
+/// Refuses options that are other algorithms'.
+fn check_algorithm_options(args: &PlanArgs) -> Result<(), Failure> {
+    let algorithm = args.algorithm.name();
+    let needs = |given: bool, holds: bool, option: &str, what: &str| {
+        if given && !holds { Err(Failure::usage(format!("{option} needs {what}, not {algorithm}"))) } else { Ok(()) }
+    };
+    let coarse_to_fine = args.algorithm.is_coarse_to_fine();
+    let sweep = args.algorithm == Algorithm::Sweep;
+    needs(args.grids.is_some(), coarse_to_fine, "--grids", "--algorithm cfbp, cfcsbp or sweep")?;
+    needs(args.coarse_clip.is_some(), coarse_to_fine, "--coarse-clip", "--algorithm cfbp, cfcsbp or sweep")?;
+    needs(args.message_start.is_some(), coarse_to_fine && !sweep, "--message-start", "--algorithm cfbp or cfcsbp")?;
+    needs(args.half_steps.is_some(), !sweep, "--half-steps", "an algorithm of the thesis")?;
+    let other_schedule = args.schedule.is_some_and(|schedule| schedule != Schedule::Sweep);
+    needs(other_schedule, !sweep, "--schedule sync or checkerboard", "an algorithm of the thesis")?;
+    needs(args.z.is_some(), args.algorithm.divides_loops(), "--z", "--algorithm cfcsbp or ctcsbp")?;
+    needs(args.seed_start.is_some(), args.algorithm.is_cut(), "--seed-start", "--algorithm ctbp or ctcsbp")
+}
+
 /// Whether loops or half-steps are counted on each grid and divided by nothing.
 fn counts_on_each_grid(args: &PlanArgs) -> bool {
-    args.grids.is_some() || args.half_steps.is_some()
+    args.grids.is_some() || args.half_steps.is_some() || args.algorithm == Algorithm::Sweep
 }
 
 /// A quarter of the width, as OpenCV recommends for belief propagation, rounded up to a multiple of 16.
@@ -152,7 +163,7 @@ fn default_labels(size: Size) -> usize {
 }
 
 fn loops(args: &PlanArgs, labels: usize) -> u32 {
-    args.loops.unwrap_or(labels as u32)
+    args.loops.unwrap_or(if args.algorithm == Algorithm::Sweep { 1 } else { labels as u32 })
 }
 
 fn settings(args: &PlanArgs, size: Size, labels: usize) -> Settings {
@@ -162,14 +173,12 @@ fn settings(args: &PlanArgs, size: Size, labels: usize) -> Settings {
     let mut settings = args.algorithm.settings(size, loops, args.z.unwrap_or(2), schedule);
     if let Some(grids) = args.grids {
         settings.grids = grids.into();
-        settings.steps = loops * schedule.steps_per_loop();
     }
-    if let Some(half_steps) = args.half_steps {
-        settings.steps = half_steps;
+    if counts_on_each_grid(args) {
+        settings.steps = args.half_steps.unwrap_or(loops * settings.schedule.steps_per_loop());
     }
-    if let Some(start) = args.message_start {
-        settings.message_start = start;
-    }
+    settings.message_start = args.message_start.unwrap_or(settings.message_start);
+    settings.coarse_clip = args.coarse_clip.unwrap_or(settings.coarse_clip);
     let seed_start = args.seed_start.unwrap_or(true);
     settings.cut = settings.cut.map(|cut| Cut { seed_start, ..cut });
     settings
@@ -230,7 +239,7 @@ fn text(report: &Report) -> String {
     let record::Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
     let last = min_disparity + *labels as i32 - 1;
     let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
-    let steps = if schedule == "sync" { "loops" } else { "half-steps" };
+    let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
     let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
     let _ = writeln!(text, "{:<10}{plan}, on {}: {}", "plan", report.backend, report.device.name);
     let _ = writeln!(text, "{:<10}{:.1} ms in all", "time", report.total_ms);

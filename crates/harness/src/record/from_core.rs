@@ -46,6 +46,7 @@ impl Settings {
             steps_per_grid: settings.steps,
             schedule: settings.schedule.name().to_owned(),
             message_start: settings.message_start.name().to_owned(),
+            coarse_clip: settings.coarse_clip,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
             message_updates: plan.message_updates(),
             planned_bytes: device.planned_bytes(plan),

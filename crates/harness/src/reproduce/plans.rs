@@ -31,7 +31,7 @@ pub(crate) fn all() -> Vec<Planned> {
         z: algorithm.divides_loops().then_some(z),
         fixed: None,
     };
-    let mut plans: Vec<_> = Algorithm::ALL.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
+    let mut plans: Vec<_> = Algorithm::THESIS.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
     plans.push(thesis("ctcsbp-z3", Algorithm::Ctcsbp, 3));
     plans.push(thesis("ctcsbp-z4", Algorithm::Ctcsbp, 4));
     let census = thesis(CENSUS, Algorithm::Cfbp, Z);
