@@ -1,0 +1,176 @@
+//! Data costs of a coarser grid.
+
+use bp_core::Plan;
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
+
+use crate::{
+    costs::{self, Costs, Sum, Sums, Widen},
+    layout::{BLOCK, Layout},
+    match_cost::block,
+};
+
+/// A coarse node's cost is the sum of its up to four children's unclipped costs, label by label. Layouts and costs are
+/// those of the finer grid, `grid - 1`, and of `grid`.
+pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout; 2], fine: &Costs, coarse: &mut Costs) {
+    let args = Grids { level, layouts, clip: plan.clip(grid) };
+    // The type that sums fit, also where none are kept.
+    let bytes = plan.sum_bytes(grid);
+    match (&fine.sums, bytes) {
+        (Sums::None, 1) => args.narrow_rows(&fine.stored, coarse),
+        (Sums::U8(sums), 1) => args.narrow_rows(sums, coarse),
+        (Sums::None, _) => args.rows::<u8, u16>(&fine.stored, coarse),
+        (Sums::U8(sums), _) => args.rows::<u8, u16>(sums, coarse),
+        (Sums::U16(sums), 2) => args.rows::<u16, u16>(sums, coarse),
+        (Sums::U16(sums), _) => args.rows::<u16, u32>(sums, coarse),
+        (Sums::U32(sums), 4) => args.rows::<u32, u32>(sums, coarse),
+        (Sums::U32(sums), _) => args.rows::<u32, u64>(sums, coarse),
+        (Sums::U64(sums), _) => args.rows::<u64, u64>(sums, coarse),
+    }
+}
+
+struct Grids<'a> {
+    level: Level,
+    layouts: [&'a Layout; 2],
+    clip: u8,
+}
+
+/// Finds the kept sums of a type.
+pub(crate) trait Kept: Sum {
+    fn of(sums: &mut Sums) -> Option<&mut [Self]>;
+}
+
+macro_rules! kept {
+    ($($type:ty => $variant:ident),*) => { $(
+        impl Kept for $type {
+            fn of(sums: &mut Sums) -> Option<&mut [Self]> {
+                if let Sums::$variant(sums) = sums { Some(sums) } else { None }
+            }
+        }
+    )* };
+}
+
+kept!(u8 => U8, u16 => U16, u32 => U32, u64 => U64);
+
+impl Grids<'_> {
+    fn rows<F: Sum + Widen<C>, C: Kept>(&self, fine: &[F], coarse: &mut Costs) {
+        let Costs { stored, sums } = coarse;
+        costs::rows(self.layouts[1], stored, C::of(sums), |y, stored, keep| {
+            dispatch!(self.level, simd => self.row(simd, self.children(fine, y), stored, keep));
+        });
+    }
+
+    /// The same where all sums fit 8 bits, as those of the largest grids do.
+    fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
+        let Costs { stored, sums } = coarse;
+        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, keep| {
+            dispatch!(self.level, simd => self.narrow_row(simd, self.children(fine, y), stored, keep));
+        });
+    }
+
+    /// The two rows of the finer grid that make row `y`; the second may be missing.
+    fn children<'a, F>(&self, fine: &'a [F], y: usize) -> [&'a [F]; 2] {
+        let row = self.layouts[0].row();
+        let (upper, rest) = fine[2 * y * row..].split_at(row);
+        [upper, rest.get(..row).unwrap_or_default()]
+    }
+
+    #[inline(always)]
+    fn narrow_row<S: Simd>(&self, simd: S, children: [&[u8]; 2], stored: &mut [u8], mut keep: Option<&mut [u8]>) {
+        let layout = self.layouts[1];
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for at in (0..layout.nodes(0)).step_by(S::u8s::LEN) {
+                    let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
+                    let least = self.narrow_vectors(simd, children, at, raw);
+                    for (plane, least) in least.into_iter().enumerate() {
+                        let range = plane * layout.plane()..(plane + 1) * layout.plane();
+                        let kept = keep.as_deref().map(|keep| &keep[range.clone()]);
+                        costs::normalise(simd, layout, (at, self.clip), least, kept, &mut stored[range]);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Sums a vector of nodes of either plane and returns the least cost of each.
+    #[inline(always)]
+    fn narrow_vectors<S: Simd>(&self, simd: S, children: [&[u8]; 2], at: usize, raw: &mut [u8]) -> [S::u8s; 2] {
+        let [fine, layout] = self.layouts;
+        let mut least = [S::u8s::splat(simd, u8::MAX); 2];
+        for label in 0..layout.labels {
+            let mut sums = [S::u8s::splat(simd, 0); 2];
+            for row in children.into_iter().filter(|row| !row.is_empty()) {
+                for plane in 0..2 {
+                    let lanes = &row[plane * fine.plane() + label * fine.lanes..][..fine.lanes];
+                    for half in 0..2 {
+                        let from = 2 * at + half * S::u8s::LEN;
+                        if from < fine.lanes {
+                            sums[half] += S::u8s::from_slice(simd, &lanes[from..from + S::u8s::LEN]);
+                        }
+                    }
+                }
+            }
+            let planes = sums[0].deinterleave(sums[1]);
+            for (plane, sum) in [planes.0, planes.1].into_iter().enumerate() {
+                sum.store_slice(&mut raw[plane * layout.plane() + label * layout.lanes + at..][..S::u8s::LEN]);
+                least[plane] = least[plane].min(sum);
+            }
+        }
+        least
+    }
+
+    /// One row of the coarse grid from its two of the fine one; the second may be missing.
+    #[inline(always)]
+    fn row<S: Simd, F: Sum + Widen<C>, C: Sum>(
+        &self,
+        simd: S,
+        children: [&[F]; 2],
+        stored: &mut [u8],
+        mut keep: Option<&mut [C]>,
+    ) {
+        let [fine, layout] = self.layouts;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for (plane, stored) in stored.chunks_exact_mut(layout.plane()).enumerate() {
+                    let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
+                    for at in (0..layout.nodes(plane)).step_by(BLOCK) {
+                        let sum = |label| sum_children(fine, children, plane, at, label);
+                        costs::store(layout, self.clip, at, sum, stored, keep.as_deref_mut());
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// Sums for a block of coarse nodes. The children of coarse column X are lane X of both planes, so those of lane i of a
+/// coarse plane are lanes 2i + plane.
+#[inline(always)]
+fn sum_children<F: Sum + Widen<C>, C: Sum>(
+    fine: &Layout,
+    children: [&[F]; 2],
+    plane: usize,
+    at: usize,
+    label: usize,
+) -> [C; BLOCK] {
+    let mut sum = [C::default(); BLOCK];
+    for row in children.into_iter().filter(|row| !row.is_empty()) {
+        for lanes in row.chunks_exact(fine.plane()) {
+            let lanes = &lanes[label * fine.lanes..][..fine.lanes];
+            for half in 0..2 {
+                let from = 2 * at + half * BLOCK;
+                // The last block of coarse lanes may reach beyond the fine ones.
+                if from < fine.lanes {
+                    let lanes = block(lanes, from);
+                    for i in 0..BLOCK / 2 {
+                        let to = half * BLOCK / 2 + i;
+                        sum[to] = sum[to] + lanes[2 * i + plane].widen();
+                    }
+                }
+            }
+        }
+    }
+    sum
+}

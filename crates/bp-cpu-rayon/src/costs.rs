@@ -1,0 +1,173 @@
+//! The data costs of one grid.
+
+use bp_core::{Error, Plan, memory};
+use fearless_simd::{Simd, SimdBase};
+use rayon::prelude::*;
+
+use crate::layout::{BLOCK, Layout};
+
+/// Data costs as they are stored and as coarser grids are summed from, both `[height][plane][label][lane]`.
+pub(crate) struct Costs {
+    /// Each node's least taken off, clipped at [`Plan::clip`].
+    pub(crate) stored: Vec<u8>,
+    /// Neither; where the plan keeps them.
+    pub(crate) sums: Sums,
+}
+
+/// Unclipped costs in the narrowest integer that holds them.
+pub(crate) enum Sums {
+    /// The stored costs serve.
+    None,
+    U8(Vec<u8>),
+    U16(Vec<u16>),
+    U32(Vec<u32>),
+    U64(Vec<u64>),
+}
+
+impl Costs {
+    /// Room for the costs of `grid`.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+        let layout = Layout::new(plan, grid);
+        let (what, len) = ("data cost sums", volume(&layout));
+        let sums = match plan.sum_bytes(grid) {
+            _ if !plan.keeps_sums(grid) => Sums::None,
+            1 => Sums::U8(memory::filled(what, len, 0)?),
+            2 => Sums::U16(memory::filled(what, len, 0)?),
+            4 => Sums::U32(memory::filled(what, len, 0)?),
+            _ => Sums::U64(memory::filled(what, len, 0)?),
+        };
+        Ok(Self { stored: memory::filled("data cost", len, 0)?, sums })
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.stored)
+            + match &self.sums {
+                Sums::None => 0,
+                Sums::U8(sums) => memory::bytes(sums),
+                Sums::U16(sums) => memory::bytes(sums),
+                Sums::U32(sums) => memory::bytes(sums),
+                Sums::U64(sums) => memory::bytes(sums),
+            }
+    }
+}
+
+/// Costs of a grid, with padding.
+pub(crate) fn volume(layout: &Layout) -> usize {
+    layout.row().saturating_mul(layout.size.height)
+}
+
+/// Bytes that [`Costs`] hold, predicted.
+pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
+    let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
+    (volume(&Layout::new(plan, grid)) as u64).saturating_mul(1 + sum_bytes as u64)
+}
+
+/// Calls `row(y, stored, sums)` for all rows of a grid, on several threads.
+pub(crate) fn rows<T: Send>(
+    layout: &Layout,
+    stored: &mut [u8],
+    sums: Option<&mut [T]>,
+    row: impl Fn(usize, &mut [u8], Option<&mut [T]>) + Sync,
+) {
+    let stored = stored.par_chunks_exact_mut(layout.row());
+    match sums {
+        Some(sums) => {
+            let both = stored.zip(sums.par_chunks_exact_mut(layout.row())).enumerate();
+            both.for_each(|(y, (stored, sums))| row(y, stored, Some(sums)));
+        }
+        None => stored.enumerate().for_each(|(y, stored)| row(y, stored, None)),
+    }
+}
+
+/// An unsigned integer that costs are summed in.
+pub(crate) trait Sum:
+    Copy + Default + Ord + Send + Sync + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self>
+{
+    const MAX: Self;
+
+    /// Clips at `clip`.
+    fn clipped(self, clip: u8) -> u8;
+}
+
+/// A narrower one, made wider.
+pub(crate) trait Widen<T> {
+    fn widen(self) -> T;
+}
+
+macro_rules! sums {
+    ($($type:ty),*) => { $(
+        impl Sum for $type {
+            const MAX: Self = <$type>::MAX;
+
+            #[inline(always)]
+            fn clipped(self, clip: u8) -> u8 {
+                self.min(clip.into()) as u8
+            }
+        }
+    )* };
+}
+
+sums!(u8, u16, u32, u64);
+
+macro_rules! widen {
+    ($($from:ty => $to:ty),*) => { $(
+        impl Widen<$to> for $from {
+            #[inline(always)]
+            fn widen(self) -> $to {
+                self.into()
+            }
+        }
+    )* };
+}
+
+widen!(u8 => u8, u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
+
+/// Stores a block of nodes: `raw(label)` gives their unclipped costs, `keep` takes those in as well. Called twice for
+/// every label, since what to take off is not known before all have been seen.
+#[inline(always)]
+pub(crate) fn store<T: Sum>(
+    layout: &Layout,
+    clip: u8,
+    at: usize,
+    raw: impl Fn(usize) -> [T; BLOCK],
+    stored: &mut [u8],
+    mut keep: Option<&mut [T]>,
+) {
+    let mut least = [T::MAX; BLOCK];
+    for label in 0..layout.labels {
+        let costs = raw(label);
+        for (least, cost) in least.iter_mut().zip(costs) {
+            *least = cost.min(*least);
+        }
+    }
+    for label in 0..layout.labels {
+        let costs = raw(label);
+        let start = label * layout.lanes + at;
+        for ((stored, cost), least) in stored[start..start + BLOCK].iter_mut().zip(costs).zip(least) {
+            *stored = (cost - least).clipped(clip);
+        }
+        if let Some(keep) = &mut keep {
+            keep[start..start + BLOCK].copy_from_slice(&costs);
+        }
+    }
+}
+
+/// Stores a vector of nodes whose unclipped costs are in `kept`, or already in `stored`, and whose least ones are known.
+#[inline(always)]
+pub(crate) fn normalise<S: Simd>(
+    simd: S,
+    layout: &Layout,
+    (at, clip): (usize, u8),
+    least: S::u8s,
+    kept: Option<&[u8]>,
+    stored: &mut [u8],
+) {
+    let clip = S::u8s::splat(simd, clip);
+    for label in 0..layout.labels {
+        let start = label * layout.lanes + at;
+        let stored = &mut stored[start..start + S::u8s::LEN];
+        let raw = S::u8s::from_slice(simd, kept.map_or(&*stored, |kept| &kept[start..start + S::u8s::LEN]));
+        (raw - least).min(clip).store_slice(stored);
+    }
+}

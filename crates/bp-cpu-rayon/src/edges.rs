@@ -1,0 +1,108 @@
+//! Messages, one an edge.
+
+use bp_core::{Error, Plan, Side, memory};
+
+use crate::layout::{BLOCK, Layout};
+
+/// Planes of a row: the edges to the row above of both planes of nodes, then those inside the pairs of columns, then
+/// those between the pairs.
+const PLANES: usize = 4;
+
+/// One message an edge, updated in place: a node that sends over an edge has just read what came the other way, and the
+/// other end will read before it answers. Row y of storage holds the edges up from row y and those inside row y; one
+/// row more, of zeros, follows the last.
+pub(crate) struct Edges {
+    values: Vec<u8>,
+}
+
+impl Edges {
+    /// Room for the edges of `grid` and of every coarser one.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+        Ok(Self { values: memory::filled("messages", bytes(&Layout::new(plan, grid)), 0)? })
+    }
+
+    /// Room for nothing.
+    pub(crate) fn none() -> Self {
+        Self { values: Vec::new() }
+    }
+
+    /// The rows of a grid.
+    pub(crate) fn rows<'a>(&'a self, layout: &'a Layout) -> Rows<'a> {
+        Rows { layout, values: self.values.get(..bytes(layout)).unwrap_or_default() }
+    }
+
+    /// The rows of a grid, to be split among threads by [`row_bytes`].
+    pub(crate) fn rows_mut(&mut self, layout: &Layout) -> &mut [u8] {
+        self.values.get_mut(..bytes(layout)).unwrap_or_default()
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.values)
+    }
+}
+
+/// Bytes that the edges of a grid need.
+pub(crate) fn bytes(layout: &Layout) -> usize {
+    row_bytes(layout).saturating_mul(layout.size.height + 1)
+}
+
+/// Bytes of a row.
+pub(crate) fn row_bytes(layout: &Layout) -> usize {
+    PLANES * plane(layout)
+}
+
+/// Bytes of a plane. Nodes of plane 1 reach one lane further in the edges between pairs, hence the block more.
+fn plane(layout: &Layout) -> usize {
+    layout.plane() + BLOCK
+}
+
+/// Reads the messages of a whole grid.
+#[derive(Clone, Copy)]
+pub(crate) struct Rows<'a> {
+    layout: &'a Layout,
+    values: &'a [u8],
+}
+
+impl<'a> Rows<'a> {
+    /// What the nodes of `plane` in row `y` received from `side`, `[label][lane]`; `None` where that row has no neighbours
+    /// there. Lanes without a neighbour hold anything.
+    pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<&'a [u8]> {
+        let (row, index, shift) = match (side, plane) {
+            (Side::Up, _) => (y, plane, 0),
+            (Side::Down, _) => (y + 1, plane, 0),
+            (Side::Right, 0) | (Side::Left, 1) => (y, 2, 0),
+            (Side::Left, _) => (y, 3, 0),
+            (Side::Right, _) => (y, 3, 1),
+        };
+        let bytes = self::plane(self.layout);
+        let joined = matches!(side, Side::Left | Side::Right) || self.layout.joined_above(row);
+        joined.then(|| &self.values[(PLANES * row + index) * bytes + shift..][..bytes - shift])
+    }
+}
+
+/// The edges of the nodes of one plane in one row, for updating.
+pub(crate) struct Slots<'a> {
+    /// The edges to the neighbours in the same pair of columns, the next pair, above and below, `[label][lane]`.
+    pub(crate) slots: [&'a mut [u8]; 4],
+}
+
+/// The edges of the nodes of `plane` in the first of the two rows that `rows` starts with.
+pub(crate) fn slots<'a>(layout: &Layout, rows: &'a mut [u8], plane: usize) -> Slots<'a> {
+    let bytes = self::plane(layout);
+    let (row, below) = rows.split_at_mut(PLANES * bytes);
+    let (above, inside) = row.split_at_mut(2 * bytes);
+    let (same, next) = inside.split_at_mut(bytes);
+    let above = &mut above[plane * bytes..][..bytes];
+    let below = &mut below[plane * bytes..][..bytes];
+    Slots { slots: [same, &mut next[plane..], above, below] }
+}
+
+/// Copies the edges of the nodes of `plane` in the first of the two rows.
+pub(crate) fn copy(layout: &Layout, from: &[u8], to: &mut [u8], plane: usize) {
+    let bytes = self::plane(layout);
+    for index in [plane, 2, 3, PLANES + plane] {
+        let range = index * bytes..(index + 1) * bytes;
+        to[range.clone()].copy_from_slice(&from[range]);
+    }
+}

@@ -1,0 +1,83 @@
+//! Where the values of a grid lie.
+
+use bp_core::{Plan, Side, Size};
+
+/// Nodes that are computed together; every row of lanes is a whole number of blocks.
+pub(crate) const BLOCK: usize = 64;
+
+/// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
+/// plane in one row have one checkerboard colour, and the four neighbours of consecutive lanes are consecutive lanes, so
+/// a vector of nodes is one load everywhere. A plane holds values `[label][lane]`.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout {
+    /// Size of the grid.
+    pub(crate) size: Size,
+    /// Number of labels.
+    pub(crate) labels: usize,
+    /// Lanes from one label to the next: those of a plane, and padding.
+    pub(crate) lanes: usize,
+    /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
+    /// neighbour in the next pair.
+    masks: [[Vec<u8>; 2]; 2],
+    /// By row: whether it exchanges messages with the row above.
+    joined_above: Vec<bool>,
+}
+
+impl Layout {
+    /// The layout of a grid of `plan`.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Self {
+        let size = plan.size(grid);
+        let lanes = lanes(size);
+        let mask = |plane: usize, side: Side| {
+            let joined = |lane: usize| {
+                let x = 2 * lane + plane;
+                x < size.width && plan.neighbour(grid, (x, 0), side).is_some()
+            };
+            (0..lanes).map(|lane| if joined(lane) { u8::MAX } else { 0 }).collect()
+        };
+        Self {
+            size,
+            labels: plan.model().labels(),
+            lanes,
+            masks: [[mask(0, Side::Right), mask(0, Side::Left)], [mask(1, Side::Left), mask(1, Side::Right)]],
+            joined_above: (0..size.height).map(|y| plan.neighbour(grid, (0, y), Side::Up).is_some()).collect(),
+        }
+    }
+
+    /// Number of nodes of a plane in a row.
+    pub(crate) fn nodes(&self, plane: usize) -> usize {
+        (self.size.width + 1 - plane) / 2
+    }
+
+    /// Entries of a plane of a row.
+    pub(crate) fn plane(&self) -> usize {
+        self.labels * self.lanes
+    }
+
+    /// Entries of both planes of a row.
+    pub(crate) fn row(&self) -> usize {
+        2 * self.plane()
+    }
+
+    /// Of `plane`: the masks of the neighbours in the same and in the next pair of columns, `[lane]`.
+    pub(crate) fn masks(&self, plane: usize) -> [&[u8]; 2] {
+        self.masks[plane].each_ref().map(Vec::as_slice)
+    }
+
+    /// Whether row `y` exchanges messages with the row above; not so for the row below the last.
+    pub(crate) fn joined_above(&self, y: usize) -> bool {
+        self.joined_above.get(y).copied().unwrap_or(false)
+    }
+
+    /// The nodes of a row: column, plane and lane.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
+        (0..self.size.width).map(|x| (x, x % 2, x / 2))
+    }
+}
+
+/// Lanes of a plane, padded to whole blocks; where labels would lie a multiple of 256 bytes apart, they would share few
+/// of a cache's sets, so there is one block more.
+pub(crate) fn lanes(size: Size) -> usize {
+    let blocks = size.width.div_ceil(2).div_ceil(BLOCK);
+    BLOCK * if blocks.is_multiple_of(4) { blocks + 1 } else { blocks }
+}

@@ -1,0 +1,91 @@
+//! The fast CPU backend: vectors of pixels, threads by rayon, messages updated in place and in cache. Its labels and
+//! messages are the scalar backend's to the bit, on every instruction set and with any number of threads.
+//!
+//! Its devices are the instruction sets of this processor, the widest first. Work is shared by the threads of the rayon
+//! pool that it is called in; [`rayon::ThreadPool::install`] runs it in another than the global one.
+//!
+//! [`layout`] says how values lie in memory, [`edges`] why one message an edge is enough, [`wavefront`] how several
+//! steps pass over the image at once. One file a kernel: [`match_cost`], [`coarsen`], [`refine`], [`update_messages`],
+//! [`select_labels`].
+
+mod coarsen;
+mod costs;
+mod edges;
+mod features;
+mod layout;
+mod match_cost;
+mod refine;
+mod select_labels;
+mod solver;
+mod sweep;
+mod update_messages;
+mod wavefront;
+
+use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
+use fearless_simd::Level;
+
+/// The backend.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rayon;
+
+/// The instruction sets that this processor has, the widest first, and their names.
+fn levels() -> Vec<(Level, &'static str)> {
+    let best = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let levels = [
+        best.as_avx512().map(|level| (Level::Avx512(level), "AVX-512")),
+        best.as_avx2().map(|level| (Level::Avx2(level), "AVX2")),
+        best.as_sse4_2().map(|level| (Level::Sse4_2(level), "SSE4.2")),
+        best.as_sse2().map(|level| (Level::Sse2(level), "SSE2")),
+    ];
+    #[cfg(target_arch = "aarch64")]
+    let levels = [best.as_neon().map(|level| (Level::Neon(level), "NEON"))];
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+    let levels = [Some((best, "baseline"))];
+    levels.into_iter().flatten().collect()
+}
+
+impl Backend for Rayon {
+    fn name(&self) -> &'static str {
+        "rayon"
+    }
+
+    fn devices(&self) -> Vec<DeviceInfo> {
+        let workers = rayon::current_num_threads();
+        let threads = if workers == 1 { "1 thread".to_owned() } else { format!("{workers} threads") };
+        let info = |(_, name)| DeviceInfo {
+            name: format!("CPU, {name}, {threads}"),
+            api: None,
+            driver: None,
+            software_rasteriser: false,
+            workers,
+        };
+        levels().into_iter().map(info).collect()
+    }
+
+    fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {
+        let levels = levels();
+        match levels.get(device) {
+            Some(&(level, _)) => Ok(Box::new(RayonDevice { level })),
+            None => {
+                let reason = format!("this processor has {} instruction sets, numbered from 0", levels.len());
+                Err(Error::Unavailable { backend: self.name(), device, reason })
+            }
+        }
+    }
+}
+
+/// An instruction set.
+struct RayonDevice {
+    level: Level,
+}
+
+impl Device for RayonDevice {
+    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+        Ok(Box::new(solver::RayonSolver::new(self.level, plan)?))
+    }
+
+    fn planned_bytes(&self, plan: &Plan) -> u64 {
+        solver::planned_bytes(plan)
+    }
+}

@@ -1,0 +1,214 @@
+//! Data costs of the image.
+
+use bp_core::{Plan, Profile, Seed};
+use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
+
+use crate::{
+    costs::{self, Costs, Sum, Sums},
+    features::Features,
+    layout::{BLOCK, Layout},
+};
+
+/// Computes the costs of grid 0.
+pub(crate) fn match_cost(
+    level: Level,
+    plan: &Plan,
+    layout: &Layout,
+    features: &Features,
+    seed: Option<Seed>,
+    costs: &mut Costs,
+) {
+    let Costs { stored, sums } = costs;
+    let row = |y| Row { plan, layout, features, y };
+    match plan.model().profile() {
+        Profile::Mrf => match sums {
+            Sums::U16(sums) => costs::rows(layout, stored, Some(sums), |y, stored, keep| {
+                dispatch!(level, simd => planes(simd, &row(y), stored, keep, |row, place, label| row.sum_of_differences(place, label)));
+            }),
+            _ => costs::rows(layout, stored, None, |y, stored, keep| {
+                dispatch!(level, simd => planes(simd, &row(y), stored, keep, |row, place, label| row.sum_of_differences(place, label)));
+            }),
+        },
+        profile => {
+            let sums = if let Sums::U8(sums) = sums { Some(sums.as_mut_slice()) } else { None };
+            let census = profile == Profile::Census;
+            costs::rows(layout, stored, sums, |y, stored, keep| {
+                dispatch!(level, simd => row(y).narrow(simd, census, stored, keep));
+            });
+        }
+    }
+    if let Some(seed) = seed {
+        fix(plan, layout, seed, stored);
+    }
+}
+
+/// A row to be matched.
+struct Row<'a> {
+    plan: &'a Plan,
+    layout: &'a Layout,
+    features: &'a Features,
+    y: usize,
+}
+
+/// Stores the costs of both planes of a row.
+#[inline(always)]
+fn planes<S: Simd, T: Sum>(
+    simd: S,
+    row: &Row<'_>,
+    stored: &mut [u8],
+    mut keep: Option<&mut [T]>,
+    cost: impl Fn(&Row<'_>, (usize, usize), usize) -> [T; BLOCK],
+) {
+    let (layout, clip) = (row.layout, row.plan.clip(0));
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (plane, stored) in stored.chunks_exact_mut(layout.plane()).enumerate() {
+                let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
+                for at in (0..layout.nodes(plane)).step_by(BLOCK) {
+                    let keep = keep.as_deref_mut();
+                    costs::store(layout, clip, at, |label| cost(row, (plane, at), label), stored, keep);
+                }
+            }
+        },
+    );
+}
+
+impl Row<'_> {
+    /// Stores the costs of both planes for the profiles of small costs.
+    #[inline(always)]
+    fn narrow<S: Simd>(&self, simd: S, census: bool, stored: &mut [u8], mut keep: Option<&mut [u8]>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let bytes = self.layout.plane();
+                for (plane, stored) in stored.chunks_exact_mut(bytes).enumerate() {
+                    let mut keep = keep.as_mut().map(|keep| &mut keep[plane * bytes..][..bytes]);
+                    for at in (0..self.layout.nodes(plane)).step_by(S::u8s::LEN) {
+                        let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
+                        let least = if census {
+                            self.vector::<S>(simd, (plane, at), raw, hamming_distance::<S>)
+                        } else {
+                            self.vector::<S>(simd, (plane, at), raw, truncated_difference::<S>)
+                        };
+                        let clip = self.plan.clip(0);
+                        costs::normalise(simd, self.layout, (at, clip), least, keep.as_deref(), stored);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Computes the costs of a vector of nodes and returns the least of each.
+    #[inline(always)]
+    fn vector<S: Simd>(
+        &self,
+        simd: S,
+        (plane, at): (usize, usize),
+        raw: &mut [u8],
+        cost: impl Fn(S, S::u8s, S::u8s) -> S::u8s,
+    ) -> S::u8s {
+        let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
+        let left = load(self.features.left(self.y, 0, plane), at);
+        let node = load(self.features.inside(plane), at + BLOCK);
+        let outside = S::u8s::splat(simd, self.plan.model().profile().out_of_range_cost() as u8);
+        let right = [0, 1].map(|parity| (self.features.right(self.y, 0, parity), self.features.inside(parity)));
+        let mut least = S::u8s::splat(simd, u8::MAX);
+        for label in 0..self.layout.labels {
+            let (parity, start) = self.matching(plane, at, label);
+            let (right, inside) = (load(right[parity].0, start), load(right[parity].1, start));
+            let cost = (cost(simd, left, right) & inside | outside & !inside) & node;
+            cost.store_slice(&mut raw[label * self.layout.lanes + at..][..S::u8s::LEN]);
+            least = least.min(cost);
+        }
+        least
+    }
+
+    /// Sum over the channels of the differences.
+    #[inline(always)]
+    fn sum_of_differences(&self, place: (usize, usize), label: usize) -> [u16; BLOCK] {
+        let outside = self.plan.model().profile().out_of_range_cost();
+        let mut sum = [0; BLOCK];
+        for channel in 0..3 {
+            let Block { left, right, .. } = self.block(place, label, channel);
+            for i in 0..BLOCK {
+                sum[i] += u16::from(left[i].abs_diff(right[i]));
+            }
+        }
+        let Block { inside, node, .. } = self.block(place, label, 0);
+        std::array::from_fn(|i| match (inside[i], node[i]) {
+            (_, 0) => 0,
+            (0, _) => outside,
+            _ => sum[i],
+        })
+    }
+
+    /// Which lanes of the right image the nodes of `plane` from lane `at` on match under a label: the parity of their
+    /// columns, and where they start in [`Features::right`].
+    #[inline(always)]
+    fn matching(&self, plane: usize, at: usize, label: usize) -> (usize, usize) {
+        // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
+        let shift = plane as i64 - i64::from(self.plan.model().disparity(label as u16));
+        let (parity, shift) = ((shift & 1) as usize, shift >> 1);
+        let nodes = self.layout.nodes(parity) as i64;
+        (parity, ((at as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
+    }
+
+    /// The features that a block of nodes of a plane compares under a label.
+    #[inline(always)]
+    fn block(&self, (plane, at): (usize, usize), label: usize, channel: usize) -> Block<'_> {
+        let (parity, start) = self.matching(plane, at, label);
+        Block {
+            left: block(self.features.left(self.y, channel, plane), at),
+            right: block(self.features.right(self.y, channel, parity), start),
+            inside: block(self.features.inside(parity), start),
+            node: block(self.features.inside(plane), at + BLOCK),
+        }
+    }
+}
+
+/// `min(Hamming distance of census codes, 6)`.
+#[inline(always)]
+fn hamming_distance<S: Simd>(simd: S, left: S::u8s, right: S::u8s) -> S::u8s {
+    (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
+}
+
+/// `(7 min(difference of grey values, 15) + 5) div 10`, from a table.
+#[inline(always)]
+fn truncated_difference<S: Simd>(simd: S, left: S::u8s, right: S::u8s) -> S::u8s {
+    let difference = left.saturating_sub(right) | right.saturating_sub(left);
+    let table = u8x16::from_fn(simd, |difference| (7 * difference as u8 + 5) / 10);
+    S::u8s::block_splat(table).swizzle_dyn_within_blocks(difference.min(S::u8s::splat(simd, 15)))
+}
+
+struct Block<'a> {
+    left: &'a [u8; BLOCK],
+    right: &'a [u8; BLOCK],
+    /// 255 where the right image has a column, else 0.
+    inside: &'a [u8; BLOCK],
+    /// 255 where the left one has.
+    node: &'a [u8; BLOCK],
+}
+
+/// A block of lanes.
+#[inline(always)]
+pub(crate) fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
+    match lanes[at..].first_chunk() {
+        Some(block) => block,
+        None => panic!("rows are padded to whole blocks"),
+    }
+}
+
+/// Fixes the costs of the nodes around a known match, see [`Seed`].
+fn fix(plan: &Plan, layout: &Layout, seed: Seed, stored: &mut [u8]) {
+    let model = plan.model();
+    let dear = model.profile().max_cost().min(plan.clip(0).into()) as u8;
+    for (y, row) in stored.chunks_exact_mut(layout.row()).enumerate() {
+        for (_, plane, lane) in layout.columns().filter(|&(x, ..)| seed.touches(x, y)) {
+            for label in 0..layout.labels {
+                let near = (label as u16).abs_diff(seed.label) <= 1;
+                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { dear };
+            }
+        }
+    }
+}

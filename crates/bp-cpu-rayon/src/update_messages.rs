@@ -1,0 +1,137 @@
+//! Message passing: the kernel that sends the messages of one plane of nodes in one row.
+
+use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
+
+/// Which messages a node sends. Those it does not send stay what they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sends {
+    /// All four.
+    All,
+    /// Those to both sides.
+    Sides,
+    /// Those to both sides and down.
+    SidesAndDown,
+    /// The one down.
+    Down,
+}
+
+/// What nodes send from.
+pub(crate) struct Nodes<'a> {
+    /// Data costs `[label][lane]`.
+    pub(crate) costs: &'a [u8],
+    /// Masks of the first two slots, see [`crate::layout::Layout::masks`].
+    pub(crate) masks: [&'a [u8]; 2],
+    /// Number of nodes.
+    pub(crate) nodes: usize,
+    /// Lanes from one label to the next.
+    pub(crate) lanes: usize,
+    /// Cost of one step between labels, see [`bp_core::Model::step`].
+    pub(crate) step: u8,
+    /// Truncation K.
+    pub(crate) truncation: u8,
+}
+
+/// Sends messages, in place: each takes the place of the one that came over the same edge. To send up, exchange the last
+/// two slots.
+pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
+    match sends {
+        Sends::All => dispatch!(level, simd => row::<_, true, true, true>(simd, nodes, slots)),
+        Sends::Sides => dispatch!(level, simd => row::<_, true, false, false>(simd, nodes, slots)),
+        Sends::SidesAndDown => dispatch!(level, simd => row::<_, true, false, true>(simd, nodes, slots)),
+        Sends::Down => dispatch!(level, simd => row::<_, false, false, true>(simd, nodes, slots)),
+    }
+}
+
+/// Whole vectors as long as there are nodes for them, then narrow ones.
+#[inline(always)]
+fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    slots: [&mut [u8]; 4],
+) {
+    let [same, next, up, down] = slots;
+    // One length for all, known before the loops, spares a check at every access.
+    let len = nodes.costs.len();
+    let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
+    let mut at = 0;
+    while at + S::u8s::LEN <= nodes.nodes {
+        vector::<S, S::u8s, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        at += S::u8s::LEN;
+    }
+    while at < nodes.nodes {
+        vector::<S, u8x16<S>, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        at += u8x16::<S>::LEN;
+    }
+}
+
+/// One vector of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
+/// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
+#[inline(always)]
+fn vector<S: Simd, V: SimdInt<S, Element = u8>, const SIDES: bool, const UP: bool, const DOWN: bool>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    slots: &mut [&mut [u8]; 4],
+    at: usize,
+) {
+    let sent = [SIDES, SIDES, UP, DOWN];
+    let splat = |value| V::splat(simd, value);
+    let masks = nodes.masks.map(|mask| V::from_slice(simd, &mask[at..at + V::LEN]));
+    let (step, truncation) = (splat(nodes.step), splat(nodes.truncation));
+    let mut least = [splat(u8::MAX); 4];
+    let mut envelope = least;
+    let mut start = at;
+    while start + V::LEN <= nodes.costs.len() {
+        let range = start..start + V::LEN;
+        let h = gather::<S, V>(simd, nodes, masks, slots, start);
+        for side in 0..4 {
+            if sent[side] {
+                envelope[side] = envelope[side].saturating_add(step).min(h[side]);
+                least[side] = least[side].min(envelope[side]);
+            }
+        }
+        for side in 0..4 {
+            if sent[side] {
+                envelope[side].store_slice(&mut slots[side][range.clone()]);
+            }
+        }
+        start += nodes.lanes;
+    }
+    envelope = [splat(u8::MAX); 4];
+    while start > at {
+        start -= nodes.lanes;
+        let range = start..start + V::LEN;
+        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, where a load waits for a store.
+        for side in 0..4 {
+            if sent[side] {
+                let half = V::from_slice(simd, &slots[side][range.clone()]);
+                envelope[side] = envelope[side].saturating_add(step).min(half);
+            }
+        }
+        for side in 0..4 {
+            if sent[side] {
+                (envelope[side] - least[side]).min(truncation).store_slice(&mut slots[side][range.clone()]);
+            }
+        }
+    }
+}
+
+/// For each side, the data cost plus what was received from the other three. A sum of two messages is at most 2K, so
+/// only what the data cost adds may saturate.
+#[inline(always)]
+fn gather<S: Simd, V: SimdInt<S, Element = u8>>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    masks: [V; 2],
+    slots: &[&mut [u8]; 4],
+    start: usize,
+) -> [V; 4] {
+    let range = start..start + V::LEN;
+    let load = |values: &[u8]| V::from_slice(simd, &values[range.clone()]);
+    let cost = load(nodes.costs);
+    let [same, next] = [load(slots[0]) & masks[0], load(slots[1]) & masks[1]];
+    let [up, down] = [load(slots[2]), load(slots[3])];
+    let sides = cost.saturating_add(same + next);
+    let (vertical_up, vertical_down) = (sides.saturating_add(down), sides.saturating_add(up));
+    let vertical = cost.saturating_add(up + down);
+    [vertical.saturating_add(next), vertical.saturating_add(same), vertical_up, vertical_down]
+}

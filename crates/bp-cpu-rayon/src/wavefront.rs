@@ -1,0 +1,132 @@
+//! The order in which several steps pass over the rows of a grid while those stay in cache, on several threads.
+
+use std::ops::Range;
+
+/// Bytes of rows that one thread keeps in reach: more steps at a time need more rows.
+const WINDOW: usize = 6 << 20;
+
+/// Most steps at a time; more than that save nothing.
+const MOST_STEPS: usize = 16;
+
+/// How many steps to run at a time over rows of so many bytes: each step holds one row more.
+pub(crate) fn fused_steps(row_bytes: usize) -> usize {
+    (WINDOW / row_bytes.max(1)).clamp(1, MOST_STEPS)
+}
+
+/// The rows of a grid, for steps that read and write row y and the one after it, and that need both neighbours of row y
+/// to have made the step before.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wavefront {
+    /// Number of rows.
+    pub(crate) height: usize,
+    /// How many steps.
+    pub(crate) steps: usize,
+}
+
+impl Wavefront {
+    /// Calls `step(rows, y, t)` for every row y and step t, with the rows of each buffer from row y on. Buffers hold one
+    /// row more than the grid has.
+    ///
+    /// Rows are split into bands. First each band makes those steps that need no other band: a row less at each seam
+    /// with every step. Then the gaps at the seams are filled. What is computed does not depend on how many bands there
+    /// are.
+    pub(crate) fn run<const N: usize>(
+        self,
+        buffers: [Chunk<'_>; N],
+        step: &(impl Fn([&mut [u8]; N], usize, usize) + Sync),
+    ) {
+        let band = self.band();
+        let last = (self.height - 1) / band;
+        let mut buffers = buffers;
+        let bands = buffers.each_mut().map(Chunk::reborrow);
+        each_band(bands, 0..last + 1, band, &|rows, index| {
+            let (first, end) = (index * band, (index + 1) * band);
+            let range = |t| {
+                let from = if index == 0 { 0 } else { first + t };
+                from..if index == last { self.height } else { end - 1 - t }
+            };
+            self.skewed(rows, first, range, step);
+        });
+        let seams = buffers.map(|buffer| buffer.split_at(band / 2).1);
+        each_band(seams, 0..last, band, &|rows, index| {
+            let seam = (index + 1) * band;
+            self.skewed(rows, index * band + band / 2, |t| seam - 1 - t..(seam + t).min(self.height), step);
+        });
+    }
+
+    /// Rows of a band: enough for the gaps at two seams, else as few as give each thread two bands.
+    fn band(self) -> usize {
+        let threads = rayon::current_num_threads();
+        let bands = if threads == 1 { 1 } else { 2 * threads };
+        self.height.div_ceil(bands).max(2 * self.steps)
+    }
+
+    /// Makes the steps on `range(t)` of the rows: step t follows step t - 1 one row behind. `rows` start at row `first`.
+    fn skewed<const N: usize>(
+        self,
+        mut rows: [Chunk<'_>; N],
+        first: usize,
+        range: impl Fn(usize) -> Range<usize>,
+        step: &impl Fn([&mut [u8]; N], usize, usize),
+    ) {
+        let (from, to) = (range(0).start.min(range(self.steps - 1).start), range(0).end.max(range(self.steps - 1).end));
+        for front in from..to + self.steps {
+            for t in 0..self.steps {
+                let Some(y) = front.checked_sub(t).filter(|y| range(t).contains(y)) else { continue };
+                step(rows.each_mut().map(|chunk| chunk.from_row(y - first)), y, t);
+            }
+        }
+    }
+}
+
+/// Some rows of a buffer.
+pub(crate) struct Chunk<'a> {
+    /// The rows.
+    pub(crate) rows: &'a mut [u8],
+    /// Bytes of one.
+    pub(crate) row_bytes: usize,
+}
+
+impl<'a> Chunk<'a> {
+    fn reborrow(&mut self) -> Chunk<'_> {
+        Chunk { rows: self.rows, row_bytes: self.row_bytes }
+    }
+
+    fn from_row(&mut self, row: usize) -> &mut [u8] {
+        &mut self.rows[row * self.row_bytes..]
+    }
+
+    /// The first `rows` rows, and the others.
+    fn split_at(self, rows: usize) -> (Self, Self) {
+        let (first, second) = self.rows.split_at_mut((rows * self.row_bytes).min(self.rows.len()));
+        let row_bytes = self.row_bytes;
+        (Self { rows: first, row_bytes }, Self { rows: second, row_bytes })
+    }
+}
+
+/// Calls `f(rows, index)` for every band of `band` rows, on several threads; the last one has all rows that are left.
+pub(crate) fn each_band<const N: usize>(
+    buffers: [Chunk<'_>; N],
+    bands: Range<usize>,
+    band: usize,
+    f: &(impl Fn([Chunk<'_>; N], usize) + Sync),
+) {
+    match bands.len() {
+        0 => {}
+        1 => f(buffers, bands.start),
+        several => {
+            let middle = bands.start + several / 2;
+            let mut second = [const { None }; N];
+            let mut index = 0;
+            let first = buffers.map(|buffer| {
+                let (first, rest) = buffer.split_at(several / 2 * band);
+                second[index] = Some(rest);
+                index += 1;
+                first
+            });
+            let second = second.map(|rest| rest.unwrap_or(Chunk { rows: &mut [], row_bytes: 0 }));
+            let halves = (bands.start..middle, middle..bands.end);
+            rayon::join(|| each_band(first, halves.0, band, f), || each_band(second, halves.1, band, f));
+        }
+    }
+}
