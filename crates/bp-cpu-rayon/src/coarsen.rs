@@ -5,7 +5,7 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
     costs::{self, Costs, Sum, Sums, Widen},
-    layout::{BLOCK, Layout},
+    layout::{BLOCK, Layout, STRIP},
     match_cost::block,
 };
 
@@ -80,41 +80,47 @@ impl Grids<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                for at in (0..layout.nodes(0)).step_by(S::u8s::LEN) {
+                for strip in layout.strips(0) {
                     let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
-                    let least = self.narrow_vectors(simd, children, at, raw);
-                    for (plane, least) in least.into_iter().enumerate() {
+                    let least = self.narrow_strip(simd, children, strip, raw);
+                    for (plane, least) in least.iter().enumerate() {
                         let range = plane * layout.plane()..(plane + 1) * layout.plane();
                         let kept = keep.as_deref().map(|keep| &keep[range.clone()]);
-                        costs::normalise(simd, layout, (at, self.clip), least, kept, &mut stored[range]);
+                        costs::normalise(simd, layout, strip, self.clip, least, kept, &mut stored[range]);
                     }
                 }
             },
         );
     }
 
-    /// Sums a vector of nodes of either plane and returns the least cost of each.
+    /// Sums a strip of nodes of either plane and returns the least cost of each.
     #[inline(always)]
-    fn narrow_vectors<S: Simd>(&self, simd: S, children: [&[u8]; 2], at: usize, raw: &mut [u8]) -> [S::u8s; 2] {
+    fn narrow_strip<S: Simd>(
+        &self,
+        simd: S,
+        children: [&[u8]; 2],
+        (at, lanes): (usize, usize),
+        raw: &mut [u8],
+    ) -> [[u8; STRIP]; 2] {
         let [fine, layout] = self.layouts;
-        let mut least = [S::u8s::splat(simd, u8::MAX); 2];
+        let (first, second) = raw.split_at_mut(layout.plane());
+        let raw = [first, second];
+        let mut least = [[u8::MAX; STRIP]; 2];
         for label in 0..layout.labels {
-            let mut sums = [S::u8s::splat(simd, 0); 2];
-            for row in children.into_iter().filter(|row| !row.is_empty()) {
-                for plane in 0..2 {
-                    let lanes = &row[plane * fine.plane() + label * fine.lanes..][..fine.lanes];
-                    for half in 0..2 {
-                        let from = 2 * at + half * S::u8s::LEN;
-                        if from < fine.lanes {
-                            sums[half] += S::u8s::from_slice(simd, &lanes[from..from + S::u8s::LEN]);
-                        }
-                    }
+            let rows = children.map(|row| {
+                let lanes = |plane: usize| row.get(plane * fine.plane() + label * fine.lanes..).unwrap_or_default();
+                [lanes(0), lanes(1)].map(|lanes| lanes.get(..fine.lanes).unwrap_or_default())
+            });
+            for lane in (0..lanes).step_by(S::u8s::LEN) {
+                let from = 2 * (at + lane);
+                let half = |from: usize| sum_of_children(simd, &rows, from);
+                let planes = half(from).deinterleave(half(from + S::u8s::LEN));
+                for (plane, sum) in [planes.0, planes.1].into_iter().enumerate() {
+                    let start = label * layout.lanes + at + lane;
+                    sum.store_slice(&mut raw[plane][start..start + S::u8s::LEN]);
+                    let least = &mut least[plane][lane..lane + S::u8s::LEN];
+                    sum.min(S::u8s::from_slice(simd, least)).store_slice(least);
                 }
-            }
-            let planes = sums[0].deinterleave(sums[1]);
-            for (plane, sum) in [planes.0, planes.1].into_iter().enumerate() {
-                sum.store_slice(&mut raw[plane * layout.plane() + label * layout.lanes + at..][..S::u8s::LEN]);
-                least[plane] = least[plane].min(sum);
             }
         }
         least
@@ -143,6 +149,18 @@ impl Grids<'_> {
             },
         );
     }
+}
+
+/// Sums of fine lanes over planes and rows; nothing where there are no such lanes.
+#[inline(always)]
+fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::u8s {
+    let mut sum = S::u8s::splat(simd, 0);
+    for lanes in rows.iter().flatten() {
+        if from < lanes.len() {
+            sum += S::u8s::from_slice(simd, &lanes[from..from + S::u8s::LEN]);
+        }
+    }
+    sum
 }
 
 /// Sums for a block of coarse nodes. The children of coarse column X are lane X of both planes, so those of lane i of a

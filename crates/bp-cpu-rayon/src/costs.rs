@@ -4,7 +4,7 @@ use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::layout::{BLOCK, Layout};
+use crate::layout::{BLOCK, Layout, STRIP};
 
 /// Data costs as they are stored and as coarser grids are summed from, both `[height][plane][label][lane]`.
 pub(crate) struct Costs {
@@ -153,21 +153,27 @@ pub(crate) fn store<T: Sum>(
     }
 }
 
-/// Stores a vector of nodes whose unclipped costs are in `kept`, or already in `stored`, and whose least ones are known.
+/// Stores a strip of nodes whose unclipped costs are in `kept`, or already in `stored`, and whose least ones are known.
 #[inline(always)]
 pub(crate) fn normalise<S: Simd>(
     simd: S,
     layout: &Layout,
-    (at, clip): (usize, u8),
-    least: S::u8s,
+    (at, lanes): (usize, usize),
+    clip: u8,
+    least: &[u8; STRIP],
     kept: Option<&[u8]>,
     stored: &mut [u8],
 ) {
     let clip = S::u8s::splat(simd, clip);
     for label in 0..layout.labels {
         let start = label * layout.lanes + at;
-        let stored = &mut stored[start..start + S::u8s::LEN];
-        let raw = S::u8s::from_slice(simd, kept.map_or(&*stored, |kept| &kept[start..start + S::u8s::LEN]));
-        (raw - least).min(clip).store_slice(stored);
+        let stored = &mut stored[start..start + lanes];
+        let kept = kept.map(|kept| &kept[start..start + lanes]);
+        for lane in (0..lanes).step_by(S::u8s::LEN) {
+            let range = lane..lane + S::u8s::LEN;
+            let raw = S::u8s::from_slice(simd, kept.map_or(&stored[range.clone()], |kept| &kept[range.clone()]));
+            let least = S::u8s::from_slice(simd, &least[range.clone()]);
+            (raw - least).min(clip).store_slice(&mut stored[range]);
+        }
     }
 }

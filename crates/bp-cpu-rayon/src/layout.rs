@@ -2,8 +2,11 @@
 
 use bp_core::{Plan, Side, Size};
 
-/// Nodes that are computed together; every row of lanes is a whole number of blocks.
+/// Every row of lanes is a whole number of blocks; no vector is longer.
 pub(crate) const BLOCK: usize = 64;
+
+/// Lanes whose running minima stay in the first cache while all their labels pass by.
+pub(crate) const STRIP: usize = 8 * BLOCK;
 
 /// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
 /// plane in one row have one checkerboard colour, and the four neighbours of consecutive lanes are consecutive lanes, so
@@ -17,7 +20,7 @@ pub(crate) struct Layout {
     /// Lanes from one label to the next: those of a plane, and padding.
     pub(crate) lanes: usize,
     /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
-    /// neighbour in the next pair.
+    /// neighbour in the next pair. With a block of zeros before and after.
     masks: [[Vec<u8>; 2]; 2],
     /// By row: whether it exchanges messages with the row above.
     joined_above: Vec<bool>,
@@ -33,7 +36,8 @@ impl Layout {
                 let x = 2 * lane + plane;
                 x < size.width && plan.neighbour(grid, (x, 0), side).is_some()
             };
-            (0..lanes).map(|lane| if joined(lane) { u8::MAX } else { 0 }).collect()
+            let mask = (0..lanes).map(|lane| if joined(lane) { u8::MAX } else { 0 });
+            std::iter::repeat_n(0, BLOCK).chain(mask).chain(std::iter::repeat_n(0, BLOCK)).collect()
         };
         Self {
             size,
@@ -61,7 +65,18 @@ impl Layout {
 
     /// Of `plane`: the masks of the neighbours in the same and in the next pair of columns, `[lane]`.
     pub(crate) fn masks(&self, plane: usize) -> [&[u8]; 2] {
+        self.padded_masks(plane).map(|mask| &mask[BLOCK..BLOCK + self.lanes])
+    }
+
+    /// The same with a block of zeros before and after.
+    pub(crate) fn padded_masks(&self, plane: usize) -> [&[u8]; 2] {
         self.masks[plane].each_ref().map(Vec::as_slice)
+    }
+
+    /// The lanes of a plane in strips: where each starts, and how many lanes it has, whole blocks.
+    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let lanes = self.nodes(plane).next_multiple_of(BLOCK);
+        (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
     }
 
     /// Whether row `y` exchanges messages with the row above; not so for the row below the last.

@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 use crate::{
     costs::{self, Costs, Sum, Sums},
     features::Features,
-    layout::{BLOCK, Layout},
+    layout::{BLOCK, Layout, STRIP},
 };
 
 /// Computes the costs of grid 0.
@@ -84,42 +84,47 @@ impl Row<'_> {
                 let bytes = self.layout.plane();
                 for (plane, stored) in stored.chunks_exact_mut(bytes).enumerate() {
                     let mut keep = keep.as_mut().map(|keep| &mut keep[plane * bytes..][..bytes]);
-                    for at in (0..self.layout.nodes(plane)).step_by(S::u8s::LEN) {
+                    for strip in self.layout.strips(plane) {
                         let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
                         let least = if census {
-                            self.vector::<S>(simd, (plane, at), raw, hamming_distance::<S>)
+                            self.strip(simd, plane, strip, raw, hamming_distance::<S>)
                         } else {
-                            self.vector::<S>(simd, (plane, at), raw, truncated_difference::<S>)
+                            self.strip(simd, plane, strip, raw, truncated_difference::<S>)
                         };
                         let clip = self.plan.clip(0);
-                        costs::normalise(simd, self.layout, (at, clip), least, keep.as_deref(), stored);
+                        costs::normalise(simd, self.layout, strip, clip, &least, keep.as_deref(), stored);
                     }
                 }
             },
         );
     }
 
-    /// Computes the costs of a vector of nodes and returns the least of each.
+    /// Computes the costs of a strip of nodes and returns the least of each.
     #[inline(always)]
-    fn vector<S: Simd>(
+    fn strip<S: Simd>(
         &self,
         simd: S,
-        (plane, at): (usize, usize),
+        plane: usize,
+        (at, lanes): (usize, usize),
         raw: &mut [u8],
         cost: impl Fn(S, S::u8s, S::u8s) -> S::u8s,
-    ) -> S::u8s {
-        let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
-        let left = load(self.features.left(self.y, 0, plane), at);
-        let node = load(self.features.inside(plane), at + BLOCK);
+    ) -> [u8; STRIP] {
         let outside = S::u8s::splat(simd, self.plan.model().profile().out_of_range_cost() as u8);
+        let left = &self.features.left(self.y, 0, plane)[at..at + lanes];
+        let node = &self.features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
         let right = [0, 1].map(|parity| (self.features.right(self.y, 0, parity), self.features.inside(parity)));
-        let mut least = S::u8s::splat(simd, u8::MAX);
+        let mut least = [u8::MAX; STRIP];
         for label in 0..self.layout.labels {
-            let (parity, start) = self.matching(plane, at, label);
-            let (right, inside) = (load(right[parity].0, start), load(right[parity].1, start));
-            let cost = (cost(simd, left, right) & inside | outside & !inside) & node;
-            cost.store_slice(&mut raw[label * self.layout.lanes + at..][..S::u8s::LEN]);
-            least = least.min(cost);
+            let raw = &mut raw[label * self.layout.lanes + at..][..lanes];
+            for lane in (0..lanes).step_by(S::u8s::LEN) {
+                let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
+                let (parity, start) = self.matching(plane, at + lane, label);
+                let (right, inside) = (load(right[parity].0, start), load(right[parity].1, start));
+                let cost = cost(simd, load(left, lane), right) & inside | outside & !inside;
+                let cost = cost & load(node, lane);
+                cost.store_slice(&mut raw[lane..lane + S::u8s::LEN]);
+                cost.min(load(&least, lane)).store_slice(&mut least[lane..lane + S::u8s::LEN]);
+            }
         }
         least
     }

@@ -3,7 +3,10 @@
 use bp_core::{MessageStart, Plan, Schedule, Side};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use crate::{edges::Rows, layout::Layout};
+use crate::{
+    edges::Rows,
+    layout::{BLOCK, Layout},
+};
 
 /// The last messages of the next coarser grid.
 #[derive(Clone, Copy)]
@@ -54,7 +57,7 @@ struct Source<'a> {
 struct Received<'a> {
     /// `[label][lane]`.
     values: &'a [u8],
-    /// 255 where a lane has a neighbour that sends, else 0.
+    /// 255 where a lane has a neighbour that sends, else 0, from a block before the first lane on.
     mask: Option<&'a [u8]>,
     /// By how many lanes further on messages are taken.
     moved: isize,
@@ -75,7 +78,7 @@ fn source<'a>(plan: &Plan, coarser: Coarser<'a>, (plane, y): (usize, usize), sid
     let columns =
         if plan.settings().schedule == Schedule::Sweep { swept(side, y)? } else { columns(side, plane, by_sender) };
     let received = |(plane, moved): (usize, isize)| {
-        let mask = matches!(side, Side::Left | Side::Right).then(|| layout.masks(plane)[slot(side, plane)]);
+        let mask = matches!(side, Side::Left | Side::Right).then(|| layout.padded_masks(plane)[slot(side, plane)]);
         Some(Received { values: coarser.received[(plane + y) % 2].towards(side, plane, y)?, mask, moved })
     };
     let [even, odd] = columns.map(received);
@@ -112,14 +115,11 @@ fn expand<S: Simd>(simd: S, layout: &Layout, source: &Source<'_>, plane: usize, 
     simd.vectorize(
         #[inline(always)]
         || {
-            for at in (0..layout.nodes(plane)).step_by(2 * S::u8s::LEN) {
-                let [even, odd] = &source.planes;
-                let masks = [even.mask(simd, at / 2), odd.mask(simd, at / 2)];
-                for label in 0..layout.labels {
-                    let from = label * source.lanes + at / 2;
-                    let (even, odd) = (even.load(simd, from) & masks[0], odd.load(simd, from) & masks[1]);
-                    let (low, high) = even.interleave(odd);
-                    let to = &mut slot[label * layout.lanes..][..layout.lanes];
+            let [even, odd] = &source.planes;
+            for label in 0..layout.labels {
+                let (from, to) = (label * source.lanes, &mut slot[label * layout.lanes..][..layout.lanes]);
+                for at in (0..layout.nodes(plane)).step_by(2 * S::u8s::LEN) {
+                    let (low, high) = even.load(simd, from, at / 2).interleave(odd.load(simd, from, at / 2));
                     low.store_slice(&mut to[at..at + S::u8s::LEN]);
                     if at + S::u8s::LEN < layout.lanes {
                         high.store_slice(&mut to[at + S::u8s::LEN..at + 2 * S::u8s::LEN]);
@@ -131,21 +131,20 @@ fn expand<S: Simd>(simd: S, layout: &Layout, source: &Source<'_>, plane: usize, 
 }
 
 impl Received<'_> {
-    /// Where the lanes that messages are taken from have a sender, from fine lane `2 lane` on.
+    /// The messages of a vector of lanes of the label that starts at `from`; zeros where a lane has no sender.
     #[inline(always)]
-    fn mask<S: Simd>(&self, simd: S, lane: usize) -> S::u8s {
-        let Some(mask) = self.mask else { return S::u8s::splat(simd, u8::MAX) };
-        S::u8s::from_fn(simd, |i| {
-            (lane + i).checked_add_signed(self.moved).map_or(0, |lane| *mask.get(lane).unwrap_or(&0))
-        })
-    }
-
-    #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, from: usize) -> S::u8s {
-        match from.checked_add_signed(self.moved) {
+    fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> S::u8s {
+        let values = match (from + lane).checked_add_signed(self.moved) {
             Some(from) => S::u8s::from_slice(simd, &self.values[from..from + S::u8s::LEN]),
             // The lane before the first: the mask drops it.
             None => S::u8s::from_fn(simd, |i| if i == 0 { 0 } else { self.values[i - 1] }),
+        };
+        match self.mask {
+            Some(mask) => {
+                let start = (BLOCK + lane).wrapping_add_signed(self.moved);
+                values & S::u8s::from_slice(simd, &mask[start..start + S::u8s::LEN])
+            }
+            None => values,
         }
     }
 }

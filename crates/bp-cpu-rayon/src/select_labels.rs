@@ -5,8 +5,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
 use crate::{
-    layout::{BLOCK, Layout},
-    match_cost::block,
+    layout::{Layout, STRIP},
     refine::slot,
     solver::Answer,
 };
@@ -85,17 +84,19 @@ impl<'a> Answer<'a> {
         beside: bool,
         row: &mut [u16],
     ) {
-        let nodes = Nodes { layout: self.layout, model: self.model, costs: self.costs(plane, y), received };
-        for at in (0..self.layout.nodes(plane)).step_by(BLOCK) {
-            let up = above.map(|above| decided(above, 2 * at as isize + plane as isize));
-            let sides = [Side::Left, Side::Right].map(|side| {
-                let dx = if side == Side::Left { -1 } else { 1 };
-                let labels = || decided(row, 2 * at as isize + plane as isize + dx);
-                beside.then(|| (labels(), self.mask(plane, side).map(|mask| *block(mask, at))))
-            });
-            let [left, right] = sides;
-            let known = [left, right, up.map(|labels| (labels, None))];
-            let labels = dispatch!(self.level, simd => nodes.block(simd, at, &known));
+        let nodes = Nodes { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
+        for (at, lanes) in self.layout.strips(plane) {
+            let column = 2 * at as isize + plane as isize;
+            let beside = |side, dx| {
+                let labels = beside.then(|| decided(row, column + dx))?;
+                Some(Known { labels, mask: self.mask(plane, side).map(|mask| &mask[at..at + lanes]) })
+            };
+            let known = [
+                beside(Side::Left, -1),
+                beside(Side::Right, 1),
+                above.map(|above| Known { labels: decided(above, column), mask: None }),
+            ];
+            let labels = dispatch!(self.level, simd => nodes.strip(simd, (at, lanes), &received, &known));
             let columns = row.iter_mut().skip(2 * at + plane).step_by(2);
             columns.zip(labels).for_each(|(out, label)| *out = label);
         }
@@ -103,105 +104,110 @@ impl<'a> Answer<'a> {
 }
 
 /// Labels of every second column from `x` on; 0 outside.
-fn decided(row: &[u16], x: isize) -> [u16; BLOCK] {
-    match usize::try_from(x).ok().and_then(|x| row.get(x..x + 2 * BLOCK)) {
-        Some(row) => std::array::from_fn(|lane| row[2 * lane]),
-        None => std::array::from_fn(|lane| {
-            let x = usize::try_from(x + 2 * lane as isize).ok();
-            x.and_then(|x| row.get(x)).copied().unwrap_or(0)
-        }),
-    }
+fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
+    let mut labels = [0; STRIP];
+    let first = usize::from(x < 0);
+    let columns = row.get(x.max(x + 2 * first as isize) as usize..).unwrap_or_default();
+    labels[first..].iter_mut().zip(columns.iter().step_by(2)).for_each(|(label, &decided)| *label = decided);
+    labels
 }
 
-/// Decided labels of neighbours of a block of nodes, and where there are any.
-type Known = ([u16; BLOCK], Option<[u8; BLOCK]>);
+/// Decided labels of neighbours of a strip of nodes, and where there are any.
+struct Known<'a> {
+    labels: [u16; STRIP],
+    mask: Option<&'a [u8]>,
+}
 
 /// The nodes of one plane in one row.
 struct Nodes<'a> {
     layout: &'a Layout,
     model: &'a Model,
     costs: &'a [u8],
-    received: [Option<Received<'a>>; 4],
 }
 
 impl Nodes<'_> {
+    /// Decides a strip of nodes, chunk by chunk of labels, since what is compared has 8 bits.
     #[inline(always)]
-    fn block<S: Simd>(&self, simd: S, at: usize, known: &[Option<Known>; 3]) -> [u16; BLOCK] {
+    fn strip<S: Simd>(
+        &self,
+        simd: S,
+        strip: (usize, usize),
+        received: &[Option<Received<'_>>; 4],
+        known: &[Option<Known<'_>>; 3],
+    ) -> [u16; STRIP] {
         simd.vectorize(
             #[inline(always)]
             || {
-                let mut labels = [0; BLOCK];
-                for lane in (0..BLOCK).step_by(S::u8s::LEN) {
-                    self.vector(simd, at, lane, known, &mut labels[lane..lane + S::u8s::LEN]);
+                let mut labels = [0; STRIP];
+                let mut best = [u8::MAX; STRIP];
+                for from in (0..self.layout.labels).step_by(CHUNK) {
+                    let near = known.each_ref().map(|known| known.as_ref().map(|known| near(known, from)));
+                    let before = best;
+                    let mut index = [0; STRIP];
+                    for label in from..(from + CHUNK).min(self.layout.labels) {
+                        self.compare(simd, strip, (label, label - from), received, &near, &mut best, &mut index);
+                    }
+                    for lane in 0..strip.1 {
+                        if best[lane] < before[lane] {
+                            labels[lane] = from as u16 + u16::from(index[lane]);
+                        }
+                    }
                 }
                 labels
             },
         )
     }
 
-    /// Decides one vector of nodes: chunk by chunk of labels, since a label's index has 8 bits.
+    /// Compares the cost of a label, of which only the last 8 bits are written down, with the best so far.
     #[inline(always)]
-    fn vector<S: Simd>(&self, simd: S, at: usize, lane: usize, known: &[Option<Known>; 3], out: &mut [u16]) {
-        let zero = S::u8s::splat(simd, 0);
-        let mut received: [(&[u8], S::u8s); 4] = [(&[], zero); 4];
-        let mut sides = 0;
-        for (values, mask) in self.received.iter().flatten() {
-            received[sides] = (&values[at + lane..], vector_of(simd, mask.map(|mask| &mask[at + lane..])));
-            sides += 1;
-        }
-        let mut best = S::u8s::splat(simd, u8::MAX);
-        for from in (0..self.layout.labels).step_by(CHUNK) {
-            let mut near = [(zero, zero); 3];
-            let mut decided = 0;
-            for (labels, mask) in known.iter().flatten() {
-                let mask = vector_of(simd, mask.as_ref().map(|mask| &mask[lane..]));
-                near[decided] = (relative(simd, &labels[lane..], from), mask);
-                decided += 1;
+    #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
+    fn compare<S: Simd>(
+        &self,
+        simd: S,
+        (at, lanes): (usize, usize),
+        (label, low): (usize, usize),
+        received: &[Option<Received<'_>>; 4],
+        near: &[Option<Near<'_>>; 3],
+        best: &mut [u8; STRIP],
+        index: &mut [u8; STRIP],
+    ) {
+        let start = label * self.layout.lanes + at;
+        let here = S::u8s::splat(simd, (low + FAR) as u8);
+        let low = S::u8s::splat(simd, low as u8);
+        let costs = &self.costs[start..start + lanes];
+        for lane in (0..lanes).step_by(S::u8s::LEN) {
+            let range = lane..lane + S::u8s::LEN;
+            let load = |values: &[u8]| S::u8s::from_slice(simd, &values[range.clone()]);
+            let mut sum = S::u8s::splat(simd, 0);
+            for (values, mask) in received.iter().flatten() {
+                let message = load(&values[start..start + lanes]);
+                sum += mask.map_or(message, |mask| message & load(&mask[at..at + lanes]));
             }
-            let before = best;
-            let mut index = zero;
-            for label in from..(from + CHUNK).min(self.layout.labels) {
-                let start = label * self.layout.lanes;
-                let mut sum = zero;
-                for &(values, mask) in &received[..sides] {
-                    sum += S::u8s::from_slice(simd, &values[start..start + S::u8s::LEN]) & mask;
-                }
-                let here = S::u8s::splat(simd, (label - from + FAR) as u8);
-                for &(label, mask) in &near[..decided] {
-                    let distance = here.saturating_sub(label) | label.saturating_sub(here);
-                    sum += smoothness::<S>(simd, self.model, distance) & mask;
-                }
-                let start = start + at + lane;
-                // What is added to the data cost is at most 4K.
-                let belief = S::u8s::from_slice(simd, &self.costs[start..start + S::u8s::LEN]).saturating_add(sum);
-                index = belief.simd_lt(best).select(S::u8s::splat(simd, (label - from) as u8), index);
-                best = belief.min(best);
+            for (labels, mask) in near.iter().flatten() {
+                let label = load(labels);
+                let distance = here.saturating_sub(label) | label.saturating_sub(here);
+                let cost = smoothness::<S>(simd, self.model, distance);
+                sum += mask.map_or(cost, |mask| cost & load(mask));
             }
-            let lower = best.simd_lt(before).select(S::u8s::splat(simd, u8::MAX), zero);
-            for ((out, &index), &lower) in out.iter_mut().zip(index.as_slice()).zip(lower.as_slice()) {
-                *out = if lower > 0 { from as u16 + u16::from(index) } else { *out };
-            }
+            // What is added to the data cost is at most 4K.
+            let belief = load(costs).saturating_add(sum);
+            let least = load(best);
+            belief.simd_lt(least).select(low, load(index)).store_slice(&mut index[range.clone()]);
+            belief.min(least).store_slice(&mut best[range.clone()]);
         }
     }
 }
 
-/// A vector of a mask; all ones without one.
-#[inline(always)]
-fn vector_of<S: Simd>(simd: S, mask: Option<&[u8]>) -> S::u8s {
-    match mask {
-        Some(mask) => S::u8s::from_slice(simd, &mask[..S::u8s::LEN]),
-        None => S::u8s::splat(simd, u8::MAX),
-    }
-}
+/// Labels relative to a chunk of labels, clamped to where distances count, and where there are any.
+type Near<'a> = ([u8; STRIP], Option<&'a [u8]>);
 
-/// Labels relative to a chunk of labels, clamped to where distances count.
 #[inline(always)]
-fn relative<S: Simd>(simd: S, labels: &[u16], from: usize) -> S::u8s {
-    let mut relative = [0; BLOCK];
-    for (relative, &label) in relative.iter_mut().zip(labels) {
+fn near<'a>(known: &Known<'a>, from: usize) -> Near<'a> {
+    let mut relative = [0; STRIP];
+    for (relative, &label) in relative.iter_mut().zip(&known.labels) {
         *relative = (label + FAR as u16).saturating_sub(from as u16).min(255) as u8;
     }
-    S::u8s::from_slice(simd, &relative[..S::u8s::LEN])
+    (relative, known.mask)
 }
 
 /// The smoothness cost of distances between labels; the product fits, since distances beyond K div s count as that plus 1.
