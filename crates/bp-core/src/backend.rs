@@ -39,7 +39,7 @@ pub struct DeviceInfo {
 }
 
 /// An open device.
-pub trait Device {
+pub trait Device: Send + Sync {
     /// Allocates everything that solving `plan` needs.
     ///
     /// # Errors

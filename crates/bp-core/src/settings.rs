@@ -88,11 +88,11 @@ impl Algorithm {
     }
 }
 
-/// Rows of a band of [`Schedule::Sweep`]: band b has the rows `16 b..16 b + 16` of its grid, the last perhaps fewer.
-pub const BAND_ROWS: usize = 16;
+/// Rows of a band of [`Schedule::Sweep`]: band b has the rows `32 b..32 b + 32` of its grid, the last perhaps fewer.
+pub const BAND_ROWS: usize = 32;
 
 /// In which order messages are updated. A loop is one update of every directed message; under [`Schedule::Sweep`] of
-/// all but those down across a seam.
+/// all but those across a seam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Schedule {
     /// All messages of a loop come from those of the loop before.
@@ -104,20 +104,18 @@ pub enum Schedule {
     /// way: sending takes the place of what came the other way, which is used up and counts as zeros for its receiver.
     /// A node is even where (x + y) of its own grid is even. Where there is no neighbour, nothing is sent.
     ///
-    /// Rows are cut into bands of [`BAND_ROWS`]; the edges between two bands are a seam. A loop processes all
-    /// even-numbered bands, then all odd-numbered ones. Bands of one phase share no edge, so their order does not
-    /// matter. A band is processed so:
+    /// Rows are cut into bands of [`BAND_ROWS`]; the edges between two bands are a seam. Nothing is sent across a seam,
+    /// so that bands are independent of each other: in all loops a band's last row holds its first message from below,
+    /// and its first row nothing from above. A loop processes each band so:
     ///
-    /// 1. What the edges of its upper seam hold is dropped: it came up for the band above, which had its turn or will
-    ///    get a new one.
-    /// 2. Forward, rows from top to bottom. In a row all even nodes send left, right and down, each message computed
+    /// 1. Forward, rows from top to bottom. In a row all even nodes send left, right and down, each message computed
     ///    from what the node holds before it sends any; then all odd nodes send down. The band's last row sends
     ///    nothing down.
-    /// 3. Backward, rows from bottom to top. In a row all odd nodes send left, right and up, computed likewise; then
-    ///    all even nodes send up. The first row sends up across the seam too.
+    /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up, computed likewise; then
+    ///    all even nodes send up. The band's first row sends nothing up.
     ///
-    /// So after a loop every vertical edge holds the message up, every horizontal one that from its odd to its even
-    /// end.
+    /// So after a loop every vertical edge holds a message up, that of a seam the first one; every horizontal edge holds
+    /// the message from its odd to its even end.
     ///
     /// **First messages** of a finer grid are what those edges hold on the coarser one. The parent P of (x, y) is
     /// (x div 2, y div 2). From below every node starts with what P received from below; from above with zeros. From
@@ -125,14 +123,14 @@ pub enum Schedule {
     /// is even, else with what P's left neighbour received from its left, zeros where P has none; from the right
     /// likewise with left and right swapped. As everywhere, only where the node has a neighbour on that side.
     ///
-    /// **Labels** are decided one after another, in odd-numbered bands first, then in even-numbered ones; in a band
-    /// from its top row to its bottom row, in a row first of even nodes, then of odd ones. A label is the smallest that
-    /// minimises D plus, with f the labels of neighbours decided before and V the smoothness cost,
+    /// **Labels** of each band are decided one after another, from its top row to its bottom row, in a row first of even
+    /// nodes, then of odd ones. A label is the smallest that minimises D plus, with f the labels of neighbours decided
+    /// before and V the smoothness cost,
     ///
     /// - of an even node: `V(d, f_up)` and the messages from the left, the right and below;
     /// - of an odd node: `V(d, f_up) + V(d, f_left) + V(d, f_right)` and the message from below.
     ///
-    /// `V(d, f_up)` is left out in the first row of an odd-numbered band, since the row above is not decided yet.
+    /// `V(d, f_up)` is left out in the first row of every band.
     Sweep,
 }
 

@@ -6,7 +6,8 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use crate::{
     costs::{self, Costs, Sum, Sums, Widen},
     layout::{BLOCK, Layout, STRIP},
-    match_cost::block,
+    match_cost::Matching,
+    sweep::Windows,
 };
 
 /// A coarse node's cost is the sum of its up to four children's unclipped costs, label by label. Layouts and costs are
@@ -26,6 +27,21 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
         (Sums::U32(sums), _) => args.rows::<u32, u64>(sums, coarse),
         (Sums::U64(sums), _) => args.rows::<u64, u64>(sums, coarse),
     }
+}
+
+/// The same from a grid 0 whose costs are not stored: its rows are computed two at a time.
+pub(crate) fn coarsen_unstored(matching: &Matching<'_>, windows: &Windows, layout: &Layout, coarse: &mut Costs) {
+    let (fine, clip) = (matching.layout, matching.plan.clip(1));
+    let grids = Grids { level: matching.level, layouts: [fine, layout], clip };
+    grids.narrow_rows_of(coarse, |y, sum| {
+        windows.with(|window| {
+            let rows = (2 * y..fine.size.height.min(2 * y + 2)).zip(window.costs.chunks_exact_mut(fine.row()));
+            rows.for_each(|(y, raw)| matching.unclipped_row(y, raw));
+            let (upper, rest) = window.costs.split_at(fine.row());
+            let lower = if 2 * y + 1 < fine.size.height { &rest[..fine.row()] } else { &[] };
+            sum([upper, lower]);
+        });
+    });
 }
 
 struct Grids<'a> {
@@ -61,9 +77,16 @@ impl Grids<'_> {
 
     /// The same where all sums fit 8 bits, as those of the largest grids do.
     fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
+        self.narrow_rows_of(coarse, |y, sum| sum(self.children(fine, y)));
+    }
+
+    /// The same of rows that are made when needed: `children(y, sum)` calls `sum` with them.
+    fn narrow_rows_of(&self, coarse: &mut Costs, children: impl Fn(usize, &mut dyn FnMut([&[u8]; 2])) + Sync) {
         let Costs { stored, sums } = coarse;
-        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, keep| {
-            dispatch!(self.level, simd => self.narrow_row(simd, self.children(fine, y), stored, keep));
+        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, mut keep| {
+            children(y, &mut |children| {
+                dispatch!(self.level, simd => self.narrow_row(simd, children, stored, keep.as_deref_mut()));
+            });
         });
     }
 
@@ -142,8 +165,15 @@ impl Grids<'_> {
                 for (plane, stored) in stored.chunks_exact_mut(layout.plane()).enumerate() {
                     let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
                     for at in (0..layout.nodes(plane)).step_by(BLOCK) {
-                        let sum = |label| sum_children(fine, children, plane, at, label);
-                        costs::store(layout, self.clip, at, sum, stored, keep.as_deref_mut());
+                        costs::store(
+                            layout,
+                            self.clip,
+                            at,
+                            #[inline(always)]
+                            |label| sum_children(fine, children, plane, at, label),
+                            stored,
+                            keep.as_deref_mut(),
+                        );
                     }
                 }
             },
@@ -173,22 +203,19 @@ fn sum_children<F: Sum + Widen<C>, C: Sum>(
     at: usize,
     label: usize,
 ) -> [C; BLOCK] {
-    let mut sum = [C::default(); BLOCK];
+    let mut sums = [C::default(); 2 * BLOCK];
     for row in children.into_iter().filter(|row| !row.is_empty()) {
-        for lanes in row.chunks_exact(fine.plane()) {
-            let lanes = &lanes[label * fine.lanes..][..fine.lanes];
-            for half in 0..2 {
-                let from = 2 * at + half * BLOCK;
-                // The last block of coarse lanes may reach beyond the fine ones.
-                if from < fine.lanes {
-                    let lanes = block(lanes, from);
-                    for i in 0..BLOCK / 2 {
-                        let to = half * BLOCK / 2 + i;
-                        sum[to] = sum[to] + lanes[2 * i + plane].widen();
-                    }
-                }
+        for fine_plane in 0..2 {
+            let lanes = &row[fine_plane * fine.plane() + label * fine.lanes..][..fine.lanes];
+            // The last block of coarse lanes may reach beyond the fine ones.
+            for (sum, lane) in sums.iter_mut().zip(&lanes[2 * at..]) {
+                *sum = *sum + lane.widen();
             }
         }
     }
-    sum
+    let mut every_second = [C::default(); BLOCK];
+    for (i, sum) in every_second.iter_mut().enumerate() {
+        *sum = sums[2 * i + plane];
+    }
+    every_second
 }

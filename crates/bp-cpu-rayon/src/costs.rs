@@ -39,6 +39,11 @@ impl Costs {
         Ok(Self { stored: memory::filled("data cost", len, 0)?, sums })
     }
 
+    /// Room for nothing.
+    pub(crate) fn none() -> Self {
+        Self { stored: Vec::new(), sums: Sums::None }
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.stored)

@@ -1,6 +1,7 @@
 //! Messages, one an edge.
 
 use bp_core::{Error, Plan, Side, memory};
+use rayon::{prelude::*, slice::ChunksMut};
 
 use crate::layout::{BLOCK, Layout};
 
@@ -28,7 +29,13 @@ impl Edges {
 
     /// The rows of a grid.
     pub(crate) fn rows<'a>(&'a self, layout: &'a Layout) -> Rows<'a> {
-        Rows { layout, values: self.values.get(..bytes(layout)).unwrap_or_default() }
+        Rows { layout, first: 0, values: self.values.get(..bytes(layout)).unwrap_or_default() }
+    }
+
+    /// For every band of so many rows, the edges inside its rows and down from them, as [`inside_and_down`] has them.
+    pub(crate) fn bands_mut(&mut self, layout: &Layout, rows: usize) -> ChunksMut<'_, u8> {
+        let all = layout.size.height * row_bytes(layout);
+        self.rows_mut(layout)[2 * plane(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
     }
 
     /// The rows of a grid, to be split among threads by [`row_bytes`].
@@ -40,6 +47,11 @@ impl Edges {
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.values)
     }
+}
+
+/// Of rows of edges, all but those up from the first row.
+pub(crate) fn inside_and_down<'a>(layout: &Layout, rows: &'a [u8]) -> &'a [u8] {
+    &rows[2 * plane(layout)..]
 }
 
 /// Bytes that the edges of a grid need.
@@ -61,10 +73,17 @@ fn plane(layout: &Layout) -> usize {
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'a> {
     layout: &'a Layout,
+    /// Row that the values start with.
+    first: usize,
     values: &'a [u8],
 }
 
 impl<'a> Rows<'a> {
+    /// Rows of edges that start at row `first`.
+    pub(crate) fn new(layout: &'a Layout, first: usize, values: &'a [u8]) -> Self {
+        Self { layout, first, values }
+    }
+
     /// What the nodes of `plane` in row `y` received from `side`, `[label][lane]`; `None` where that row has no neighbours
     /// there. Lanes without a neighbour hold anything.
     pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<&'a [u8]> {
@@ -77,7 +96,7 @@ impl<'a> Rows<'a> {
         };
         let bytes = self::plane(self.layout);
         let joined = matches!(side, Side::Left | Side::Right) || self.layout.joined_above(row);
-        joined.then(|| &self.values[(PLANES * row + index) * bytes + shift..][..bytes - shift])
+        joined.then(|| &self.values[(PLANES * (row - self.first) + index) * bytes + shift..][..bytes - shift])
     }
 }
 

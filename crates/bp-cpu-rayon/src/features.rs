@@ -1,6 +1,7 @@
 //! What a profile compares: a few bytes a pixel of each image.
 
-use bp_core::{Error, Image, Model, Profile, Size, StereoPair, memory};
+use bp_core::{Error, Image, Model, Profile, Size, StereoPair, image::grey, memory};
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use crate::layout::{self, BLOCK};
@@ -43,15 +44,18 @@ impl Features {
     }
 
     /// Takes in another pair.
-    pub(crate) fn load(&mut self, pair: &StereoPair) {
+    pub(crate) fn load(&mut self, level: Level, pair: &StereoPair) {
         let Self { profile, size, lanes, left, right, grey, .. } = self;
-        for (image, grey) in [pair.left(), pair.right()].into_iter().zip(grey.iter_mut()) {
-            let rows = grey.par_chunks_mut(size.width + 2);
-            rows.with_min_len(MIN_ROWS).enumerate().for_each(|(y, row)| grey_row(image, y, row));
-        }
         let [left_grey, right_grey] = grey;
-        fill(*profile, pair.left(), left_grey, left, (*lanes, 0));
-        fill(*profile, pair.right(), right_grey, right, (*lanes + 2 * BLOCK, BLOCK));
+        let right = (right.as_mut_slice(), *lanes + 2 * BLOCK, BLOCK);
+        let views = [(pair.left(), left_grey, (left.as_mut_slice(), *lanes, 0)), (pair.right(), right_grey, right)];
+        for (image, grey, (out, lanes, offset)) in views {
+            let rows = grey.par_chunks_mut(size.width + 2).with_min_len(MIN_ROWS).enumerate();
+            rows.for_each(|(y, row)| dispatch!(level, simd => grey_row(simd, image, y, row)));
+            let rows = out.par_chunks_mut(2 * lanes * channels(*profile)).with_min_len(MIN_ROWS).enumerate();
+            let view = View { profile: *profile, image, grey };
+            rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows, (lanes, offset))));
+        }
     }
 
     /// Features of the left pixels of a row, `[lane]`.
@@ -95,57 +99,67 @@ fn grey_bytes(size: Size, profile: Profile) -> usize {
     if profile == Profile::Census { size.height * (size.width + 2) } else { 0 }
 }
 
-fn grey_row(image: &Image, y: usize, row: &mut [u8]) {
+#[inline(always)]
+fn grey_row<S: Simd>(simd: S, image: &Image, y: usize, row: &mut [u8]) {
     let width = image.size().width;
-    for (x, grey) in row[1..=width].iter_mut().enumerate() {
-        *grey = image.grey(x, y);
-    }
+    let pixels = &image.pixels()[y * width..][..width];
+    simd.vectorize(
+        #[inline(always)]
+        || row[1..=width].iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+    );
     row[0] = row[1];
     row[width + 1] = row[width];
 }
 
-/// Writes the features of an image; lane 0 lies `offset` entries after the start of each row of `lanes`.
-fn fill(profile: Profile, image: &Image, grey: &[u8], out: &mut [u8], (lanes, offset): (usize, usize)) {
-    let width = image.size().width;
-    let rows = out.par_chunks_mut(2 * lanes * channels(profile)).with_min_len(MIN_ROWS).enumerate();
-    rows.for_each(|(y, rows)| {
-        let mut channels = rows.chunks_exact_mut(2 * lanes);
-        match profile {
-            Profile::Thesis => channels.for_each(|out| split(out, offset, (0..width).map(|x| image.grey(x, y)))),
-            Profile::Census => channels.for_each(|out| census_row(grey, (width, image.size().height), y, out, offset)),
-            Profile::Mrf => {
-                let pixels = &image.pixels()[y * width..][..width];
-                for channel in 0..3 {
-                    let Some(out) = channels.next() else { return };
-                    split(out, offset, pixels.iter().map(|pixel| pixel[channel]));
-                }
+/// An image to be taken in.
+struct View<'a> {
+    profile: Profile,
+    image: &'a Image,
+    /// See [`Features::grey`].
+    grey: &'a [u8],
+}
+
+impl View<'_> {
+    /// Writes the features of a row; lane 0 lies `offset` entries after the start of each row of `lanes`.
+    #[inline(always)]
+    fn fill<S: Simd>(&self, simd: S, y: usize, rows: &mut [u8], (lanes, offset): (usize, usize)) {
+        let width = self.image.size().width;
+        let pixels = &self.image.pixels()[y * width..][..width];
+        for (channel, out) in rows.chunks_exact_mut(2 * lanes).enumerate() {
+            let (even, odd) = out.split_at_mut(lanes);
+            for (parity, plane) in [even, odd].into_iter().enumerate() {
+                let plane = &mut plane[offset..offset + (width + 1 - parity) / 2];
+                simd.vectorize(
+                    #[inline(always)]
+                    || match self.profile {
+                        Profile::Census => self.census(y, parity, plane),
+                        Profile::Thesis => every_second(plane, &pixels[parity..], |&pixel| grey(pixel)),
+                        Profile::Mrf => every_second(plane, &pixels[parity..], |pixel| pixel[channel]),
+                    },
+                );
             }
         }
-    });
-}
-
-/// Deals the values of a row to the two parities of columns.
-fn split(out: &mut [u8], offset: usize, values: impl Iterator<Item = u8>) {
-    let (even, odd) = out.split_at_mut(out.len() / 2);
-    for (x, value) in values.enumerate() {
-        let plane = if x.is_multiple_of(2) { &mut *even } else { &mut *odd };
-        plane[offset + x / 2] = value;
     }
-}
 
-/// The census codes of a row, as [`bp_core::census::code`] gives them.
-fn census_row(grey: &[u8], (width, height): (usize, usize), y: usize, out: &mut [u8], offset: usize) {
-    let row = |y: usize| &grey[y * (width + 2)..][..width + 2];
-    let [above, centre, below] = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
-    let (even, odd) = out.split_at_mut(out.len() / 2);
-    for (parity, plane) in [even, odd].into_iter().enumerate() {
-        let nodes = (width + 1 - parity) / 2;
-        let at = |row: &[u8], lane: usize, dx: usize| row[2 * lane + parity + dx];
-        for (lane, code) in plane[offset..offset + nodes].iter_mut().enumerate() {
-            let middle = at(centre, lane, 1);
-            let neighbours =
-                [(above, 0), (above, 1), (above, 2), (centre, 0), (centre, 2), (below, 0), (below, 1), (below, 2)];
-            *code = neighbours.iter().fold(0, |code, &(row, dx)| code << 1 | u8::from(at(row, lane, dx) > middle));
+    /// The census codes of the columns of a parity, as [`bp_core::census::code`] gives them.
+    #[inline(always)]
+    fn census(&self, y: usize, parity: usize, codes: &mut [u8]) {
+        let Size { width, height } = self.image.size();
+        let row = |y: usize| &self.grey[y * (width + 2) + parity..][..width + 2 - parity];
+        let [above, centre, below] = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
+        codes.fill(0);
+        for (row, dx) in
+            [(above, 0), (above, 1), (above, 2), (centre, 0), (centre, 2), (below, 0), (below, 1), (below, 2)]
+        {
+            let neighbours = row[dx..].iter().step_by(2);
+            for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(centre[1..].iter().step_by(2)) {
+                *code = *code << 1 | u8::from(neighbour > middle);
+            }
         }
     }
+}
+
+#[inline(always)]
+fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
+    plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
 }

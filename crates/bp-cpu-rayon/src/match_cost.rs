@@ -9,36 +9,70 @@ use crate::{
     layout::{BLOCK, Layout, STRIP},
 };
 
+/// What a pair's data costs are computed from, row by row.
+pub(crate) struct Matching<'a> {
+    pub(crate) level: Level,
+    pub(crate) plan: &'a Plan,
+    pub(crate) layout: &'a Layout,
+    pub(crate) features: &'a Features,
+    pub(crate) seed: Option<Seed>,
+}
+
+/// Whether all costs of grid 0 fit 8 bits.
+pub(crate) fn is_narrow(plan: &Plan) -> bool {
+    plan.sum_bytes(0) == 1
+}
+
 /// Computes the costs of grid 0.
-pub(crate) fn match_cost(
-    level: Level,
-    plan: &Plan,
-    layout: &Layout,
-    features: &Features,
-    seed: Option<Seed>,
-    costs: &mut Costs,
-) {
-    let Costs { stored, sums } = costs;
-    let row = |y| Row { plan, layout, features, y };
-    match plan.model().profile() {
-        Profile::Mrf => match sums {
-            Sums::U16(sums) => costs::rows(layout, stored, Some(sums), |y, stored, keep| {
-                dispatch!(level, simd => planes(simd, &row(y), stored, keep, |row, place, label| row.sum_of_differences(place, label)));
-            }),
-            _ => costs::rows(layout, stored, None, |y, stored, keep| {
-                dispatch!(level, simd => planes(simd, &row(y), stored, keep, |row, place, label| row.sum_of_differences(place, label)));
-            }),
-        },
-        profile => {
-            let sums = if let Sums::U8(sums) = sums { Some(sums.as_mut_slice()) } else { None };
-            let census = profile == Profile::Census;
-            costs::rows(layout, stored, sums, |y, stored, keep| {
-                dispatch!(level, simd => row(y).narrow(simd, census, stored, keep));
-            });
+pub(crate) fn match_cost(matching: &Matching<'_>, costs: &mut Costs) {
+    let (layout, Costs { stored, sums }) = (matching.layout, costs);
+    match sums {
+        Sums::U8(sums) => {
+            costs::rows(layout, stored, Some(sums), |y, stored, sums| matching.narrow_row(y, stored, sums));
         }
+        Sums::U16(sums) => {
+            costs::rows(layout, stored, Some(sums), |y, stored, sums| matching.wide_row(y, stored, sums));
+        }
+        _ if is_narrow(matching.plan) => costs::rows(layout, stored, None, |y, stored, _: Option<&mut [u8]>| {
+            matching.narrow_row(y, stored, None);
+        }),
+        _ => costs::rows(layout, stored, None, |y, stored, _: Option<&mut [u16]>| matching.wide_row(y, stored, None)),
     }
-    if let Some(seed) = seed {
-        fix(plan, layout, seed, stored);
+}
+
+impl Matching<'_> {
+    /// Stores the costs of a row whose profile is narrow, and its unclipped ones too if asked.
+    pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
+        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
+        dispatch!(self.level, simd => row.narrow(simd, stored, sums));
+        self.fix(y, stored);
+    }
+
+    /// The unclipped costs of a row whose profile is narrow.
+    pub(crate) fn unclipped_row(&self, y: usize, raw: &mut [u8]) {
+        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
+        dispatch!(self.level, simd => row.unclipped(simd, raw));
+    }
+
+    fn wide_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u16]>) {
+        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
+        dispatch!(self.level, simd => planes(simd, &row, stored, sums, |row, place, label| {
+            row.sum_of_differences(place, label)
+        }));
+        self.fix(y, stored);
+    }
+
+    /// Fixes the costs of the nodes around a known match, see [`Seed`].
+    fn fix(&self, y: usize, row: &mut [u8]) {
+        let Some(seed) = self.seed else { return };
+        let layout = self.layout;
+        let dear = self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8;
+        for (_, plane, lane) in layout.columns().filter(|&(x, ..)| seed.touches(x, y)) {
+            for label in 0..layout.labels {
+                let near = (label as u16).abs_diff(seed.label) <= 1;
+                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { dear };
+            }
+        }
     }
 }
 
@@ -67,7 +101,15 @@ fn planes<S: Simd, T: Sum>(
                 let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
                 for at in (0..layout.nodes(plane)).step_by(BLOCK) {
                     let keep = keep.as_deref_mut();
-                    costs::store(layout, clip, at, |label| cost(row, (plane, at), label), stored, keep);
+                    costs::store(
+                        layout,
+                        clip,
+                        at,
+                        #[inline(always)]
+                        |label| cost(row, (plane, at), label),
+                        stored,
+                        keep,
+                    );
                 }
             }
         },
@@ -77,7 +119,7 @@ fn planes<S: Simd, T: Sum>(
 impl Row<'_> {
     /// Stores the costs of both planes for the profiles of small costs.
     #[inline(always)]
-    fn narrow<S: Simd>(&self, simd: S, census: bool, stored: &mut [u8], mut keep: Option<&mut [u8]>) {
+    fn narrow<S: Simd>(&self, simd: S, stored: &mut [u8], mut keep: Option<&mut [u8]>) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -86,17 +128,37 @@ impl Row<'_> {
                     let mut keep = keep.as_mut().map(|keep| &mut keep[plane * bytes..][..bytes]);
                     for strip in self.layout.strips(plane) {
                         let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
-                        let least = if census {
-                            self.strip(simd, plane, strip, raw, hamming_distance::<S>)
-                        } else {
-                            self.strip(simd, plane, strip, raw, truncated_difference::<S>)
-                        };
+                        let least = self.costs(simd, plane, strip, raw);
                         let clip = self.plan.clip(0);
                         costs::normalise(simd, self.layout, strip, clip, &least, keep.as_deref(), stored);
                     }
                 }
             },
         );
+    }
+
+    /// Writes the unclipped costs of both planes.
+    #[inline(always)]
+    fn unclipped<S: Simd>(&self, simd: S, raw: &mut [u8]) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for (plane, raw) in raw.chunks_exact_mut(self.layout.plane()).enumerate() {
+                    for strip in self.layout.strips(plane) {
+                        self.costs(simd, plane, strip, raw);
+                    }
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
+        if self.plan.model().profile() == Profile::Census {
+            self.strip(simd, plane, strip, raw, hamming_distance::<S>)
+        } else {
+            self.strip(simd, plane, strip, raw, truncated_difference::<S>)
+        }
     }
 
     /// Computes the costs of a strip of nodes and returns the least of each.
@@ -197,23 +259,9 @@ struct Block<'a> {
 
 /// A block of lanes.
 #[inline(always)]
-pub(crate) fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
+fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
     match lanes[at..].first_chunk() {
         Some(block) => block,
         None => panic!("rows are padded to whole blocks"),
-    }
-}
-
-/// Fixes the costs of the nodes around a known match, see [`Seed`].
-fn fix(plan: &Plan, layout: &Layout, seed: Seed, stored: &mut [u8]) {
-    let model = plan.model();
-    let dear = model.profile().max_cost().min(plan.clip(0).into()) as u8;
-    for (y, row) in stored.chunks_exact_mut(layout.row()).enumerate() {
-        for (_, plane, lane) in layout.columns().filter(|&(x, ..)| seed.touches(x, y)) {
-            for label in 0..layout.labels {
-                let near = (label as u16).abs_diff(seed.label) <= 1;
-                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { dear };
-            }
-        }
     }
 }

@@ -1,13 +1,13 @@
 //! Labels: those of least belief, or in sequence, given the labels already decided.
 
-use bp_core::{BAND_ROWS, Model, Side};
-use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
+use bp_core::{Model, Plan, Schedule, Side};
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
 use crate::{
+    edges::Rows,
     layout::{Layout, STRIP},
     refine::slot,
-    solver::Answer,
 };
 
 /// Labels that are compared at a time: as many as let the distances to decided labels, which count up to
@@ -16,6 +16,17 @@ const CHUNK: usize = 128;
 
 /// A distance of labels that costs the truncation whatever the slope is, unless that is 0.
 const FAR: usize = 64;
+
+/// What labels are read off: rows of a grid from row `first` on.
+pub(crate) struct Answer<'a> {
+    pub(crate) level: Level,
+    pub(crate) model: &'a Model,
+    pub(crate) layout: &'a Layout,
+    pub(crate) first: usize,
+    pub(crate) stored: &'a [u8],
+    /// What nodes of either checkerboard colour received.
+    pub(crate) received: [Rows<'a>; 2],
+}
 
 /// Writes the smallest label of least belief of every node, `[height][width]`.
 pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
@@ -27,29 +38,29 @@ pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
     });
 }
 
-/// Decodes after sweeps: bands of odd index first, rows from top to bottom, even nodes before odd ones.
-pub(crate) fn decode(answer: &Answer<'_>, labels: &mut [u16]) {
-    let (width, height) = (answer.layout.size.width, answer.layout.size.height);
-    let band = BAND_ROWS * width;
-    if let Some(rows) = labels.get_mut(band..) {
-        let bands = rows.par_chunks_mut(2 * band).enumerate();
-        bands.for_each(|(index, rows)| answer.decode_band((2 * index + 1) * BAND_ROWS, None, rows));
-    }
-    // A band of even index also reads the row above it.
-    let (first, others) = labels.split_at_mut((2 * BAND_ROWS - 1).min(height) * width);
-    let decode_others = || {
-        others.par_chunks_mut(2 * band).enumerate().for_each(|(index, rows)| {
-            let (above, rows) = rows.split_at_mut(width);
-            answer.decode_band(2 * (index + 1) * BAND_ROWS, Some(above), rows);
-        });
-    };
-    rayon::join(|| answer.decode_band(0, None, first), decode_others);
-}
-
 /// What one node received, `[label][lane]`, and where there is a node that sent it, `[lane]`.
 type Received<'a> = (&'a [u8], Option<&'a [u8]>);
 
 impl<'a> Answer<'a> {
+    fn costs(&self, plane: usize, y: usize) -> &'a [u8] {
+        &self.stored[(y - self.first) * self.layout.row() + plane * self.layout.plane()..][..self.layout.plane()]
+    }
+
+    /// Copies out what the nodes of as many rows as `messages` has room for received from `side`.
+    pub(crate) fn read_messages(&self, plan: &Plan, side: Side, messages: &mut [u8]) {
+        let one_an_edge = plan.settings().schedule == Schedule::Sweep;
+        let nodes = (self.first..).flat_map(|y| self.layout.columns().map(move |column| (column, y)));
+        for (((x, plane, lane), y), out) in nodes.zip(messages.chunks_exact_mut(self.layout.labels)) {
+            let colour = (x + y) % 2;
+            let went_away = one_an_edge && (side == Side::Up || side != Side::Down && colour == 1);
+            let there = plan.neighbour(0, (x, y), side).is_some() && !went_away;
+            let values = if there { self.received[colour].towards(side, plane, y) } else { None };
+            for (label, out) in out.iter_mut().enumerate() {
+                *out = values.map_or(0, |values| values[label * self.layout.lanes + lane]);
+            }
+        }
+    }
+
     fn received(&self, (plane, y): (usize, usize), side: Side) -> Option<Received<'a>> {
         let values = self.received[(plane + y) % 2].towards(side, plane, y)?;
         Some((values, self.mask(plane, side)))
@@ -60,17 +71,17 @@ impl<'a> Answer<'a> {
         self.layout.masks(plane).get(slot(side, plane)).copied()
     }
 
-    /// Decodes the band that starts at row `first`; `rows` may go on after it.
-    fn decode_band(&self, first: usize, above: Option<&[u16]>, rows: &mut [u16]) {
-        let mut above = above;
-        for (row, y) in rows.chunks_exact_mut(self.layout.size.width).zip(first..first + BAND_ROWS) {
+    /// Decodes a band after sweeps, from its first row down, even nodes before odd ones.
+    pub(crate) fn decode_band(&self, labels: &mut [u16]) {
+        let mut above = None;
+        for (row, y) in labels.chunks_exact_mut(self.layout.size.width).zip(self.first..) {
             let (even, odd) = (y % 2, 1 - y % 2);
             let up = above.filter(|_| self.layout.joined_above(y));
             let [left, right, _, down] = Side::ALL.map(|side| self.received((even, y), side));
             self.decide((even, y), [left, right, None, down], up, false, row);
             let down = self.received((odd, y), Side::Down);
             self.decide((odd, y), [None, None, None, down], up, true, row);
-            above = Some(row);
+            above = Some(&*row);
         }
     }
 

@@ -2,19 +2,19 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Model, Plan, Schedule, Seed, Side, Solver, StereoPair};
+use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, StereoPair, memory};
 use fearless_simd::Level;
 
 use crate::{
-    coarsen::coarsen,
+    coarsen::{coarsen, coarsen_unstored},
     costs::{self, Costs},
     edges::{self, Edges, Rows},
     features::{self, Features},
     layout::Layout,
-    match_cost::match_cost,
+    match_cost::{Matching, is_narrow, match_cost},
     refine::{Coarser, refine},
-    select_labels::{decode, select_labels},
-    sweep::sweep,
+    select_labels::{Answer, select_labels},
+    sweep::{self, Bands, CostSource, Windows},
     update_messages::{Nodes, Sends, update_messages},
     wavefront::{Chunk, Wavefront, fused_steps},
 };
@@ -29,6 +29,10 @@ pub(crate) struct RayonSolver {
     /// Messages of even grids and, where the plan has several grids, of odd ones: only a grid and its next coarser one
     /// are needed at a time.
     messages: [Messages; 2],
+    windows: Windows,
+    seed: Option<Seed>,
+    /// Labels of a swept image, decided while its messages are in cache.
+    decided: Vec<u16>,
 }
 
 /// The messages of one grid: as many sets of one an edge as the schedule needs. A grid is bipartite, so that a
@@ -39,45 +43,93 @@ struct Messages {
     sets: [Edges; 2],
 }
 
-/// Sets of messages that a schedule needs.
-fn sets(schedule: Schedule) -> usize {
-    if schedule == Schedule::Sweep { 1 } else { 2 }
+impl Messages {
+    fn none() -> Self {
+        Self { sets: [Edges::none(), Edges::none()] }
+    }
+}
+
+/// Sets of messages that are kept of a grid: of a swept image none.
+fn sets(plan: &Plan, grid: usize) -> usize {
+    match plan.settings().schedule {
+        Schedule::Sweep => usize::from(grid > 0),
+        Schedule::Sync | Schedule::Checkerboard => 2,
+    }
+}
+
+/// The two grids whose messages need the most room: the finest of even and of odd index that keep any.
+fn largest(plan: &Plan) -> [usize; 2] {
+    if sets(plan, 0) == 0 { [2, 1] } else { [0, 1] }
+}
+
+/// Whether the costs of a grid are stored. Those of a swept image are computed as often as needed.
+fn is_stored(plan: &Plan, grid: usize) -> bool {
+    grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
 }
 
 /// Bytes that a solver will allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
-    let messages = |grid| edges::bytes(&Layout::new(plan, grid)) as u64 * sets(plan.settings().schedule) as u64;
-    let buffers = (0..plan.grids()).map(|grid| costs::bytes(plan, grid)).chain((0..plan.grids().min(2)).map(messages));
+    let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
+    let costs = stored.map(|grid| costs::bytes(plan, grid));
+    let kept = largest(plan).into_iter().filter(|&grid| grid < plan.grids());
+    let messages = kept.map(|grid| edges::bytes(&Layout::new(plan, grid)) as u64 * sets(plan, grid) as u64);
     let labels = 2 * plan.image_size().pixels() as u64;
-    buffers.fold(features::bytes(plan.image_size(), plan.model()) + labels, u64::saturating_add)
+    let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
+    let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), sweep::bytes(plan)];
+    costs.chain(messages).chain(others).fold(0, u64::saturating_add)
 }
 
 impl RayonSolver {
     /// Allocates all buffers.
     pub(crate) fn new(level: Level, plan: &Plan) -> Result<Self, Error> {
         let set = |grid, set| {
-            let needed = grid < plan.grids() && set < sets(plan.settings().schedule);
+            let needed = grid < plan.grids() && set < sets(plan, grid);
             if needed { Edges::new(plan, grid) } else { Ok(Edges::none()) }
         };
         let messages = |grid| Ok::<_, Error>(Messages { sets: [set(grid, 0)?, set(grid, 1)?] });
+        let costs = |grid| if is_stored(plan, grid) { Costs::new(plan, grid) } else { Ok(Costs::none()) };
+        let [even, odd] = largest(plan);
+        let decided = if plan.settings().schedule == Schedule::Sweep { plan.image_size().pixels() } else { 0 };
         Ok(Self {
             level,
             layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect(),
             features: Features::new(plan.image_size(), plan.model())?,
-            costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid)).collect::<Result<_, _>>()?,
-            messages: [messages(0)?, messages(1)?],
+            costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
+            messages: [messages(even)?, messages(odd)?],
+            windows: Windows::new(plan)?,
+            seed: None,
+            decided: memory::filled("labels", decided, 0)?,
             plan: plan.clone(),
         })
     }
 
+    fn matching(&self) -> Matching<'_> {
+        let Self { level, plan, layouts, features, seed, .. } = self;
+        Matching { level: *level, plan, layout: &layouts[0], features, seed: *seed }
+    }
+
+    /// The bands of a grid that is swept.
+    fn bands(&self, grid: usize) -> Bands<'_> {
+        let Self { level, plan, layouts, windows, .. } = self;
+        let costs = if is_stored(plan, grid) {
+            CostSource::Stored(&self.costs[grid].stored)
+        } else {
+            CostSource::Computed(self.matching())
+        };
+        let coarser = self.coarser(grid);
+        Bands { level: *level, plan, layout: &layouts[grid], costs, coarser, windows }
+    }
+
+    /// The messages that a grid starts with.
+    fn coarser(&self, grid: usize) -> Option<Coarser<'_>> {
+        let layout = self.layouts.get(grid + 1)?;
+        Some(Coarser { layout, received: received(&self.plan, layout, &self.messages[(grid + 1) % 2]) })
+    }
+
     fn answer(&self) -> Answer<'_> {
-        Answer {
-            level: self.level,
-            model: self.plan.model(),
-            layout: &self.layouts[0],
-            stored: &self.costs[0].stored,
-            received: received(&self.plan, &self.layouts[0], &self.messages[0]),
-        }
+        let (level, model, layout) = (self.level, self.plan.model(), &self.layouts[0]);
+        let received = received(&self.plan, layout, &self.messages[0]);
+        Answer { level, model, layout, first: 0, stored: &self.costs[0].stored, received }
     }
 }
 
@@ -96,11 +148,13 @@ fn received<'a>(plan: &Plan, layout: &'a Layout, messages: &'a Messages) -> [Row
 
 /// What updating the messages of a grid needs besides those.
 pub(crate) struct Grid<'a> {
-    level: Level,
-    plan: &'a Plan,
+    pub(crate) level: Level,
+    pub(crate) plan: &'a Plan,
     pub(crate) layout: &'a Layout,
-    costs: &'a [u8],
-    coarser: Option<Coarser<'a>>,
+    /// Row that `costs` start with.
+    pub(crate) first: usize,
+    pub(crate) costs: &'a [u8],
+    pub(crate) coarser: Option<Coarser<'a>>,
 }
 
 impl Grid<'_> {
@@ -128,7 +182,7 @@ impl Grid<'_> {
     fn nodes(&self, plane: usize, y: usize) -> Nodes<'_> {
         let (layout, model) = (self.layout, self.plan.model());
         Nodes {
-            costs: &self.costs[y * layout.row() + plane * layout.plane()..][..layout.plane()],
+            costs: &self.costs[(y - self.first) * layout.row() + plane * layout.plane()..][..layout.plane()],
             masks: layout.masks(plane),
             nodes: layout.nodes(plane),
             lanes: layout.lanes,
@@ -144,22 +198,6 @@ impl Grid<'_> {
                 slot.fill(0);
             }
         }
-    }
-}
-
-/// What labels are read off.
-pub(crate) struct Answer<'a> {
-    pub(crate) level: Level,
-    pub(crate) model: &'a Model,
-    pub(crate) layout: &'a Layout,
-    stored: &'a [u8],
-    /// What nodes of either checkerboard colour received.
-    pub(crate) received: [Rows<'a>; 2],
-}
-
-impl Answer<'_> {
-    pub(crate) fn costs(&self, plane: usize, y: usize) -> &[u8] {
-        &self.stored[y * self.layout.row() + plane * self.layout.plane()..][..self.layout.plane()]
     }
 }
 
@@ -186,80 +224,107 @@ fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&
 
 impl Solver for RayonSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
-        self.features.load(pair);
-        match_cost(self.level, &self.plan, &self.layouts[0], &self.features, seed, &mut self.costs[0]);
+        self.features.load(self.level, pair);
+        self.seed = seed;
+        if is_stored(&self.plan, 0) {
+            let mut costs = std::mem::replace(&mut self.costs[0], Costs::none());
+            match_cost(&self.matching(), &mut costs);
+            self.costs[0] = costs;
+        }
         Ok(())
     }
 
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
-        let (fine, coarse) = self.costs.split_at_mut(grid);
-        let layouts = [&self.layouts[grid - 1], &self.layouts[grid]];
-        coarsen(self.level, &self.plan, grid, layouts, &fine[grid - 1], &mut coarse[0]);
+        let mut coarse = std::mem::replace(&mut self.costs[grid], Costs::none());
+        if is_stored(&self.plan, grid - 1) {
+            let layouts = [&self.layouts[grid - 1], &self.layouts[grid]];
+            coarsen(self.level, &self.plan, grid, layouts, &self.costs[grid - 1], &mut coarse);
+        } else {
+            coarsen_unstored(&self.matching(), &self.windows, &self.layouts[grid], &mut coarse);
+        }
+        self.costs[grid] = coarse;
         Ok(())
     }
 
-    /// Nothing yet: nodes take over first messages when they first send, see [`refine`].
+    /// Nothing yet: nodes take over first messages when they first send, see [`crate::refine`].
     fn refine(&mut self, _grid: usize) -> Result<(), Error> {
         Ok(())
     }
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
-        let Self { plan, layouts, messages: [even, odd], .. } = self;
-        let (own, coarser) = if grid.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-        let coarser = layouts.get(grid + 1).map(|layout| Coarser { layout, received: received(plan, layout, coarser) });
-        let costs = &self.costs[grid].stored;
-        let grid = Grid { level: self.level, plan, layout: &layouts[grid], costs, coarser };
-        run(&grid, steps.start as usize..steps.end as usize, own);
+        if self.plan.settings().schedule == Schedule::Sweep {
+            // All loops of a band are one piece of work.
+            if steps.end == self.plan.settings().steps {
+                self.sweep(grid);
+            }
+            return Ok(());
+        }
+        let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
+        let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
+        let coarser = self.coarser(grid);
+        let grid_of = Grid { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser };
+        run(&grid_of, steps.start as usize..steps.end as usize, &mut messages);
+        self.messages[grid % 2] = messages;
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => decode(&self.answer(), labels),
+            Schedule::Sweep => labels.copy_from_slice(&self.decided),
             Schedule::Sync | Schedule::Checkerboard => select_labels(&self.answer(), labels),
         }
         Ok(())
     }
 
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
-        let (answer, layout) = (self.answer(), &self.layouts[0]);
-        let one_an_edge = self.plan.settings().schedule == Schedule::Sweep;
-        let nodes = (0..layout.size.height).flat_map(|y| layout.columns().map(move |column| (column, y)));
-        for (((x, plane, lane), y), out) in nodes.zip(messages.chunks_exact_mut(layout.labels)) {
-            let colour = (x + y) % 2;
-            let went_away = one_an_edge && (side == Side::Up || side != Side::Down && colour == 1);
-            let there = self.plan.neighbour(0, (x, y), side).is_some() && !went_away;
-            let values = answer.received[colour].towards(side, plane, y).filter(|_| there);
-            for (label, out) in out.iter_mut().enumerate() {
-                *out = values.map_or(0, |values| values[label * layout.lanes + lane]);
-            }
+        match self.plan.settings().schedule {
+            Schedule::Sweep => self.bands(0).read_messages(side, messages),
+            Schedule::Sync | Schedule::Checkerboard => self.answer().read_messages(&self.plan, side, messages),
         }
         Ok(())
     }
 
     fn fused_steps(&self) -> u32 {
-        u32::try_from(fused_steps(self.layouts[0].row() + edges::row_bytes(&self.layouts[0]))).unwrap_or(u32::MAX)
+        match self.plan.settings().schedule {
+            Schedule::Sweep => u32::MAX,
+            Schedule::Sync | Schedule::Checkerboard => steps_at_a_time(&self.layouts[0]) as u32,
+        }
     }
 
     fn allocated_bytes(&self) -> u64 {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();
-        self.features.bytes() + costs + messages
+        self.features.bytes() + costs + messages + self.windows.bytes() + memory::bytes(&self.decided)
     }
+}
+
+impl RayonSolver {
+    fn sweep(&mut self, grid: usize) {
+        if grid == 0 {
+            let mut decided = std::mem::take(&mut self.decided);
+            self.bands(0).decode(&mut decided);
+            self.decided = decided;
+        } else {
+            let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
+            self.bands(grid).keep_messages(&mut messages.sets[0]);
+            self.messages[grid % 2] = messages;
+        }
+    }
+}
+
+fn steps_at_a_time(layout: &Layout) -> usize {
+    fused_steps(layout.row() + edges::row_bytes(layout))
 }
 
 /// Runs steps of the plan's schedule.
 fn run(grid: &Grid<'_>, steps: Range<usize>, messages: &mut Messages) {
-    let all = grid.plan.settings().steps as usize;
-    let at_a_time = fused_steps(grid.layout.row() + edges::row_bytes(grid.layout));
-    if grid.plan.settings().schedule == Schedule::Sweep {
-        return steps.for_each(|step| sweep(grid, step == 0, messages.sets[0].rows_mut(grid.layout)));
-    }
+    let last = grid.plan.settings().steps as usize - 1;
+    let at_a_time = steps_at_a_time(grid.layout);
     for start in steps.clone().step_by(at_a_time) {
         let steps = start..(start + at_a_time).min(steps.end);
         let [first, second] = messages.sets.each_mut().map(|set| set.rows_mut(grid.layout));
         if grid.plan.settings().schedule == Schedule::Checkerboard {
-            half_steps(grid, steps, 0, [first, second], Some(all - 1));
+            half_steps(grid, steps, 0, [first, second], Some(last));
         } else {
             let halves = (steps.clone(), steps);
             rayon::join(

@@ -73,7 +73,7 @@ impl Wavefront {
         for front in from..to + self.steps {
             for t in 0..self.steps {
                 let Some(y) = front.checked_sub(t).filter(|y| range(t).contains(y)) else { continue };
-                step(rows.each_mut().map(|chunk| chunk.from_row(y - first)), y, t);
+                step(rows.each_mut().map(|chunk| chunk.starting_at(y - first)), y, t);
             }
         }
     }
@@ -92,7 +92,7 @@ impl<'a> Chunk<'a> {
         Chunk { rows: self.rows, row_bytes: self.row_bytes }
     }
 
-    fn from_row(&mut self, row: usize) -> &mut [u8] {
+    fn starting_at(&mut self, row: usize) -> &mut [u8] {
         &mut self.rows[row * self.row_bytes..]
     }
 

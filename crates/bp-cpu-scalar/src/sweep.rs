@@ -1,7 +1,5 @@
 //! Message passing under the schedule `sweep`.
 
-use std::ops::Range;
-
 use bp_core::{BAND_ROWS, Plan, Side};
 
 use crate::{
@@ -10,7 +8,7 @@ use crate::{
     update_messages::{gather, send},
 };
 
-/// Remainder of even nodes (x + y) and even-numbered bands modulo 2.
+/// Remainder of even nodes' x + y modulo 2.
 pub(crate) const EVEN: usize = 0;
 /// Remainder of odd ones.
 pub(crate) const ODD: usize = 1;
@@ -19,15 +17,9 @@ pub(crate) const ODD: usize = 1;
 pub(crate) fn sweep(plan: &Plan, grid: usize, costs: &Costs, messages: &mut Messages, h: &mut [u8]) {
     let height = plan.size(grid).height;
     let mut sweep = Sweep { plan, grid, costs, messages, h };
-    for rows in bands(height, EVEN).chain(bands(height, ODD)) {
-        sweep.band(rows);
+    for first in (0..height).step_by(BAND_ROWS) {
+        sweep.band(first, (first + BAND_ROWS).min(height) - 1);
     }
-}
-
-/// The rows of each even-numbered or each odd-numbered band of a grid.
-pub(crate) fn bands(height: usize, parity: usize) -> impl Iterator<Item = Range<usize>> {
-    let starts = (parity * BAND_ROWS..height).step_by(2 * BAND_ROWS);
-    starts.map(move |start| start..(start + BAND_ROWS).min(height))
 }
 
 /// The even or the odd nodes of row y, as columns.
@@ -45,19 +37,18 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Forward and backward through one band. Nothing needs to be dropped at its upper seam: what was sent up there is
-    /// in the slots of the band above, where the first row's next messages replace it before it is read again.
-    fn band(&mut self, rows: Range<usize>) {
-        let last = rows.end - 1;
-        for y in rows.start..last {
+    /// Forward and backward through the band of these first and last rows.
+    fn band(&mut self, first: usize, last: usize) {
+        for y in first..last {
             self.send_from(y, EVEN, &[Side::Left, Side::Right, Side::Down]);
             self.send_from(y, ODD, &[Side::Down]);
         }
         self.send_from(last, EVEN, &[Side::Left, Side::Right]);
-        for y in rows.rev() {
+        for y in (first + 1..=last).rev() {
             self.send_from(y, ODD, &[Side::Left, Side::Right, Side::Up]);
             self.send_from(y, EVEN, &[Side::Up]);
         }
+        self.send_from(first, ODD, &[Side::Left, Side::Right]);
     }
 
     /// The even or the odd nodes of row y send to these sides.

@@ -44,7 +44,7 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
 
 fn any_case() -> impl Strategy<Value = Case> {
     // Now and then high enough for several bands of the schedule sweep.
-    let height = prop_oneof![3 => 1..9_usize, 1 => 16..52_usize];
+    let height = prop_oneof![3 => 1..9_usize, 1 => 30..70_usize];
     (1..9_usize, height, any::<u32>(), any_model(1..20)).prop_flat_map(|(width, height, seed, model)| {
         let pair = noise_pair(width, height, seed.into());
         any_settings(pair.size()).prop_map(move |settings| Case {
@@ -129,10 +129,34 @@ proptest! {
         prop_assert_eq!(energy as i64, *marginals[0].iter().min().unwrap());
     }
 
+    /// A band's labels and messages are those of an image of its own.
+    #[test]
+    fn sweeps_process_every_band_by_itself(
+        width in 1..9_usize, height in 1..70_usize, steps in 1..3_u32, seed in any::<u32>(), labels in 1..9_usize,
+    ) {
+        // A profile whose data costs see no other row.
+        let model = Model::new(Profile::Thesis, labels).unwrap();
+        let pair = noise_pair(width, height, seed.into());
+        let settings = plan_settings(1, steps, Schedule::Sweep);
+        let whole = answer(&pair, model, settings);
+        let band = |view: &Image, nodes: std::ops::Range<usize>| {
+            Image::from_rgb(width, nodes.len() / width, view.pixels()[nodes].to_vec()).unwrap()
+        };
+        for first in (0..height).step_by(BAND_ROWS) {
+            let nodes = first * width..(first + BAND_ROWS).min(height) * width;
+            let own = StereoPair::new(band(pair.left(), nodes.clone()), band(pair.right(), nodes.clone())).unwrap();
+            let own = answer(&own, model, settings);
+            prop_assert_eq!(&own.labels, &whole.labels[nodes.clone()]);
+            for (own, whole) in own.messages.iter().zip(&whole.messages) {
+                prop_assert_eq!(own, &whole[nodes.start * labels..nodes.end * labels]);
+            }
+        }
+    }
+
     /// After a loop of sweeps every edge holds one message, up or towards its even end.
     #[test]
     fn a_sweep_leaves_one_message_an_edge(
-        width in 1..9_usize, height in 1..40_usize, grids in 1..4_usize, seed in any::<u32>(), model in any_model(2..9),
+        width in 1..9_usize, height in 1..70_usize, grids in 1..4_usize, seed in any::<u32>(), model in any_model(2..9),
     ) {
         let pair = noise_pair(width, height, seed.into());
         let [left, right, up, _] = answer(&pair, model, plan_settings(grids, 1, Schedule::Sweep)).messages;
@@ -190,7 +214,7 @@ proptest! {
     /// What lies in one part of a cut image has no effect on the others.
     #[test]
     fn no_message_crosses_a_cut(
-        width in 2..9_usize, height in prop_oneof![2..9_usize, Just(32)], seed in any::<u32>(), labels in 1..9_usize,
+        width in 2..9_usize, height in prop_oneof![2..9_usize, Just(2 * BAND_ROWS)], seed in any::<u32>(), labels in 1..9_usize,
     ) {
         let model = Model::new(Profile::Thesis, labels).unwrap();
         let pair = noise_pair(width, height, seed.into());

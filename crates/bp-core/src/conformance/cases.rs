@@ -12,12 +12,13 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let every = small
         .chain(many_labels)
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
-    // Wide enough for several tiles of the widest vectors, high enough for several bands, the last one short; fewer
-    // models, since the oracle is slow.
-    let wide = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 50)].into_iter().flat_map(|size| {
+    // Wide enough for several tiles of the widest vectors, high enough for several bands also on coarser grids, the
+    // last one short; fewer models, since the oracle is slow.
+    let wide_or_high = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 70), (3, 65), (2, 130)];
+    let large = wide_or_high.into_iter().flat_map(|size| {
         Profile::ALL.into_iter().filter_map(move |profile| Some((size, Model::new(profile, 5).ok()?)))
     });
-    every.chain(wide).flat_map(|((width, height), model)| {
+    every.chain(large).flat_map(|((width, height), model)| {
         let pair = noise_pair(width, height, model.labels() as u64);
         settings(pair.size()).into_iter().filter_map(move |settings| {
             Some(Case { plan: Plan::new(pair.size(), model, settings).ok()?, pair: pair.clone() })
@@ -50,15 +51,15 @@ fn settings(size: Size) -> Vec<Settings> {
     all
 }
 
-/// What sets the schedule `sweep` apart: one and two loops, on one grid and several, clipped and not, and cuts inside a
-/// band and on a seam.
+/// What sets the schedule `sweep` apart: one and two loops, on one grid and several, clipped and not, and cuts on a
+/// seam and beside it.
 fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
     let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
     let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });
     let unclipped = grids.map(|settings| Settings { coarse_clip: false, ..settings });
-    let cuts = [0, 16, 19, 32].map(|y| {
+    let cuts = [(0, 1), (31, 1), (31, 2), (32, 1), (32, 2), (33, 1), (33, 2)].map(|(y, steps)| {
         let cut = Cut { x: size.width / 2, y, seed_start: false };
-        Settings { cut: Some(cut), grids: 1, ..ours }
+        Settings { cut: Some(cut), grids: 1, steps, ..ours }
     });
     std::iter::once(ours).chain(grids).chain(unclipped).chain(cuts)
 }

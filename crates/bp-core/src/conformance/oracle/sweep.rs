@@ -11,25 +11,19 @@ const ODD: usize = 1;
 impl OracleSolver {
     /// One loop of [`crate::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, grid: usize) {
-        for parity in [EVEN, ODD] {
-            for rows in self.bands(grid, parity) {
-                self.sweep_band(grid, rows);
-            }
+        for rows in self.bands(grid) {
+            self.sweep_band(grid, rows);
         }
     }
 
-    /// The rows of all bands with even or odd numbers.
-    fn bands(&self, grid: usize, parity: usize) -> Vec<Range<usize>> {
+    /// The rows of all bands.
+    fn bands(&self, grid: usize) -> Vec<Range<usize>> {
         let height = self.plan.size(grid).height;
-        let numbers = (0..height.div_ceil(BAND_ROWS)).filter(|number| number % 2 == parity);
-        numbers.map(|number| number * BAND_ROWS..height.min((number + 1) * BAND_ROWS)).collect()
+        (0..height.div_ceil(BAND_ROWS)).map(|b| BAND_ROWS * b..height.min(BAND_ROWS * b + BAND_ROWS)).collect()
     }
 
     fn sweep_band(&mut self, grid: usize, rows: Range<usize>) {
         let (first, last) = (rows.start, rows.end - 1);
-        for x in 0..self.plan.size(grid).width {
-            self.drop_edge(grid, (x, first), Side::Up);
-        }
         for y in rows.clone() {
             if y < last {
                 self.send_row(grid, y, EVEN, &[Side::Left, Side::Right, Side::Down]);
@@ -39,8 +33,12 @@ impl OracleSolver {
             }
         }
         for y in rows.rev() {
-            self.send_row(grid, y, ODD, &[Side::Left, Side::Right, Side::Up]);
-            self.send_row(grid, y, EVEN, &[Side::Up]);
+            if y > first {
+                self.send_row(grid, y, ODD, &[Side::Left, Side::Right, Side::Up]);
+                self.send_row(grid, y, EVEN, &[Side::Up]);
+            } else {
+                self.send_row(grid, y, ODD, &[Side::Left, Side::Right]);
+            }
         }
     }
 
@@ -91,14 +89,11 @@ impl OracleSolver {
     /// Decides labels one after another.
     pub(super) fn decode(&self, labels: &mut [u16]) {
         let width = self.plan.image_size().width;
-        for band_parity in [ODD, EVEN] {
-            for rows in self.bands(0, band_parity) {
-                for y in rows.clone() {
-                    let above_is_decided = band_parity == EVEN || y > rows.start;
-                    for parity in [EVEN, ODD] {
-                        for x in (0..width).filter(|x| (x + y) % 2 == parity) {
-                            labels[y * width + x] = self.decide((x, y), above_is_decided, labels);
-                        }
+        for rows in self.bands(0) {
+            for y in rows.clone() {
+                for parity in [EVEN, ODD] {
+                    for x in (0..width).filter(|x| (x + y) % 2 == parity) {
+                        labels[y * width + x] = self.decide((x, y), y == rows.start, labels);
                     }
                 }
             }
@@ -106,7 +101,7 @@ impl OracleSolver {
     }
 
     /// The smallest best label of (x, y), given those decided before.
-    fn decide(&self, (x, y): (usize, usize), above_is_decided: bool, labels: &[u16]) -> u16 {
+    fn decide(&self, (x, y): (usize, usize), first_row: bool, labels: &[u16]) -> u16 {
         let even = (x + y).is_multiple_of(2);
         let messages: &[Side] = if even { &[Side::Left, Side::Right, Side::Down] } else { &[Side::Down] };
         let decided: &[Side] = if even { &[Side::Up] } else { &[Side::Up, Side::Left, Side::Right] };
@@ -117,7 +112,7 @@ impl OracleSolver {
             for &side in messages {
                 sum += self.grids[0].received[node][side as usize][usize::from(*d)];
             }
-            for &side in decided.iter().filter(|&&side| side != Side::Up || above_is_decided) {
+            for &side in decided.iter().filter(|&&side| !(first_row && side == Side::Up)) {
                 if let Some((x, y)) = self.plan.neighbour(0, (x, y), side) {
                     sum += i64::from(self.plan.model().smoothness(*d, labels[y * width + x]));
                 }

@@ -1,0 +1,37 @@
+//! A prepared matcher matches pair after pair without allocating.
+
+use std::alloc::System;
+
+use bp_core::{Algorithm, Backend, Matcher, Model, Plan, Profile, Schedule, conformance::noise_pair};
+use bp_cpu_rayon::Rayon;
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+#[test]
+fn matching_allocates_nothing() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let pairs = [1, 2, 3].map(|seed| noise_pair(150, 130, seed));
+    let device = Rayon.open(0).unwrap();
+    let mut matchers = Vec::new();
+    for profile in Profile::ALL {
+        for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
+            let model = Model::new(profile, 17).unwrap();
+            let settings = algorithm.settings(pairs[0].size(), 6, 2, schedule);
+            let plan = Plan::new(pairs[0].size(), model, settings).unwrap();
+            matchers.push(pool.install(|| Matcher::new(device.as_ref(), plan)).unwrap());
+        }
+    }
+    pool.install(|| {
+        // Once, so that the pool's own queues have grown.
+        matchers.iter_mut().for_each(|matcher| _ = matcher.solve(&pairs[0]).unwrap());
+        for matcher in &mut matchers {
+            let region = Region::new(ALLOCATOR);
+            pairs.iter().for_each(|pair| _ = matcher.solve(pair).unwrap());
+            let change = region.change();
+            let plan = matcher.plan();
+            assert_eq!((change.allocations, change.reallocations), (0, 0), "{plan:?}");
+        }
+    });
+}
