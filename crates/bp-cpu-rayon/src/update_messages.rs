@@ -42,7 +42,7 @@ pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slo
     }
 }
 
-/// Whole vectors as long as there are nodes for them, then narrow ones.
+/// Two vectors at a time as long as there are nodes for them, then one, then narrow ones.
 #[inline(always)]
 fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
     simd: S,
@@ -54,20 +54,31 @@ fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
+    while at + 2 * S::u8s::LEN <= nodes.nodes {
+        vectors::<S, S::u8s, 2, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        at += 2 * S::u8s::LEN;
+    }
     while at + S::u8s::LEN <= nodes.nodes {
-        vector::<S, S::u8s, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 1, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
         at += S::u8s::LEN;
     }
     while at < nodes.nodes {
-        vector::<S, u8x16<S>, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        vectors::<S, u8x16<S>, 1, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
         at += u8x16::<S>::LEN;
     }
 }
 
-/// One vector of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
+/// `W` vectors of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
 /// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
 #[inline(always)]
-fn vector<S: Simd, V: SimdInt<S, Element = u8>, const SIDES: bool, const UP: bool, const DOWN: bool>(
+fn vectors<
+    S: Simd,
+    V: SimdInt<S, Element = u8>,
+    const W: usize,
+    const SIDES: bool,
+    const UP: bool,
+    const DOWN: bool,
+>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
@@ -75,41 +86,55 @@ fn vector<S: Simd, V: SimdInt<S, Element = u8>, const SIDES: bool, const UP: boo
 ) {
     let sent = [SIDES, SIDES, UP, DOWN];
     let splat = |value| V::splat(simd, value);
-    let masks = nodes.masks.map(|mask| V::from_slice(simd, &mask[at..at + V::LEN]));
     let (step, truncation) = (splat(nodes.step), splat(nodes.truncation));
-    let mut least = [splat(u8::MAX); 4];
+    let mut masks = [[step; 2]; W];
+    for w in 0..W {
+        let from = at + w * V::LEN;
+        masks[w] = nodes.masks.map(|mask| V::from_slice(simd, &mask[from..from + V::LEN]));
+    }
+    let mut least = [[splat(u8::MAX); 4]; W];
     let mut envelope = least;
     let mut start = at;
-    while start + V::LEN <= nodes.costs.len() {
-        let range = start..start + V::LEN;
-        let h = gather::<S, V>(simd, nodes, masks, slots, start);
-        for side in 0..4 {
-            if sent[side] {
-                envelope[side] = envelope[side].saturating_add(step).min(h[side]);
-                least[side] = least[side].min(envelope[side]);
+    while start + W * V::LEN <= nodes.costs.len() {
+        for w in 0..W {
+            let h = gather::<S, V>(simd, nodes, masks[w], slots, start + w * V::LEN);
+            for side in 0..4 {
+                if sent[side] {
+                    envelope[w][side] = envelope[w][side].saturating_add(step).min(h[side]);
+                    least[w][side] = least[w][side].min(envelope[w][side]);
+                }
             }
         }
-        for side in 0..4 {
-            if sent[side] {
-                envelope[side].store_slice(&mut slots[side][range.clone()]);
+        for w in 0..W {
+            let from = start + w * V::LEN;
+            for side in 0..4 {
+                if sent[side] {
+                    envelope[w][side].store_slice(&mut slots[side][from..from + V::LEN]);
+                }
             }
         }
         start += nodes.lanes;
     }
-    envelope = [splat(u8::MAX); 4];
+    envelope = [[splat(u8::MAX); 4]; W];
     while start > at {
         start -= nodes.lanes;
-        let range = start..start + V::LEN;
         // All loads come before the stores: slots often lie a multiple of 4 KiB apart, where a load waits for a store.
-        for side in 0..4 {
-            if sent[side] {
-                let half = V::from_slice(simd, &slots[side][range.clone()]);
-                envelope[side] = envelope[side].saturating_add(step).min(half);
+        for w in 0..W {
+            let from = start + w * V::LEN;
+            for side in 0..4 {
+                if sent[side] {
+                    let half = V::from_slice(simd, &slots[side][from..from + V::LEN]);
+                    envelope[w][side] = envelope[w][side].saturating_add(step).min(half);
+                }
             }
         }
-        for side in 0..4 {
-            if sent[side] {
-                (envelope[side] - least[side]).min(truncation).store_slice(&mut slots[side][range.clone()]);
+        for w in 0..W {
+            let from = start + w * V::LEN;
+            for side in 0..4 {
+                if sent[side] {
+                    let message = (envelope[w][side] - least[w][side]).min(truncation);
+                    message.store_slice(&mut slots[side][from..from + V::LEN]);
+                }
             }
         }
     }

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
+use bytesize::ByteSize;
 use clap::{
     Args, Parser, Subcommand,
     builder::{NonEmptyStringValueParser, OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-use crate::files::PixelLimit;
+use crate::{backends, files::PixelLimit};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
@@ -66,6 +67,13 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
+    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given: bytes, or
+    /// 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
+    #[arg(long, value_name = "SIZE")]
+    pub(crate) max_memory: Option<ByteSize>,
+    /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the later ones.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) repeat: u32,
     /// Ground truth of the left image: errors are measured where it is given.
     #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
     pub(crate) ground_truth: Option<PathBuf>,
@@ -81,15 +89,18 @@ pub(crate) struct MatchArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Plan")]
 pub(crate) struct PlanArgs {
-    /// Algorithm: one of the thesis's five, or sweep, which is ours.
-    #[arg(long, default_value = "cfcsbp", value_parser = named(&Algorithm::ALL, Algorithm::name))]
-    pub(crate) algorithm: Algorithm,
+    /// Algorithm: one of the thesis's five, or sweep, which is ours. [default: sweep]
+    #[arg(long, value_parser = named(&Algorithm::ALL, Algorithm::name))]
+    pub(crate) algorithm: Option<Algorithm>,
     /// Data cost, with the smoothness that goes with it.
     #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
     pub(crate) profile: Profile,
     /// Backend; NAME:INDEX for another than its first device.
-    #[arg(long, default_value = "scalar", value_name = "NAME")]
+    #[arg(long, default_value = backends::DEFAULT, value_name = "NAME")]
     pub(crate) backend: String,
+    /// Threads of the backend rayon. [default: one a core]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) threads: Option<u16>,
     /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
     /// up to a multiple of 16]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
@@ -130,6 +141,13 @@ pub(crate) struct PlanArgs {
     /// Truncation K of the smoothness cost. [default: the profile's]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
     pub(crate) truncation: Option<u8>,
+}
+
+impl PlanArgs {
+    /// The algorithm.
+    pub(crate) fn algorithm(&self) -> Algorithm {
+        self.algorithm.unwrap_or(Algorithm::Sweep)
+    }
 }
 
 /// How ground truth is read.
@@ -191,8 +209,11 @@ pub(crate) struct ReproduceArgs {
     #[arg(long)]
     pub(crate) quick: bool,
     /// Backends, separated by commas; NAME:INDEX for another than a backend's first device.
-    #[arg(long, value_delimiter = ',', default_value = "scalar", value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
+    /// Threads of the backend rayon. [default: one a core]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) threads: Option<u16>,
     /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) samples: Option<u32>,
@@ -220,6 +241,10 @@ pub(crate) struct ScenesArgs {
     /// Which scenes.
     #[command(flatten)]
     pub(crate) data: DataArgs,
+}
+
+fn threads() -> impl TypedValueParser<Value = u16> {
+    clap::value_parser!(u16).range(1..=1024)
 }
 
 fn positive(text: &str) -> Result<f32, String> {

@@ -5,7 +5,10 @@ use bp_core::{Backend, Device, DeviceInfo};
 use crate::failure::Failure;
 
 /// All backends of this build; the first is the reference.
-const ALL: [&dyn Backend; 1] = [&bp_cpu_scalar::Scalar];
+const ALL: [&dyn Backend; 2] = [&bp_cpu_scalar::Scalar, &bp_cpu_rayon::Rayon];
+
+/// The backend of commands that name none.
+pub(crate) const DEFAULT: &str = "rayon";
 
 /// An open device.
 pub(crate) struct Opened {

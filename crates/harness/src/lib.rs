@@ -14,6 +14,7 @@ pub mod record;
 pub mod report;
 pub mod reproduce;
 mod scenes;
+mod threads;
 
 use std::{io::Write, process::ExitCode};
 

@@ -2,6 +2,7 @@
 
 use std::{fs, io};
 
+use bytesize::ByteSize;
 use sha2::{Digest, Sha256};
 use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 
@@ -25,9 +26,13 @@ pub(crate) fn machine(name: Option<&str>) -> Machine {
     Machine { name, cpu, cores, memory_bytes, system: system_name }
 }
 
-/// Refuses what would not fit into the memory that is available now, before anything is allocated. Where the system does
-/// not tell how much that is, allocating will.
-pub(crate) fn check_memory(needed: u64, advice: &str) -> Result<(), Failure> {
+/// Refuses what would not fit into the memory that is allowed, or that is available now, before anything is allocated.
+/// Where the system does not tell how much that is, allocating will.
+pub(crate) fn check_memory(needed: u64, allowed: Option<ByteSize>, advice: &str) -> Result<(), Failure> {
+    if let Some(ByteSize(allowed)) = allowed.filter(|allowed| needed > allowed.as_u64()) {
+        let what = format!("{needed} bytes are needed and --max-memory allows {allowed}; {advice}");
+        return Err(Failure::out_of_memory(what));
+    }
     let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
     let Ok(system) = System::new_with_specifics(what) else { return Ok(()) };
     let available = system.available_memory();

@@ -86,6 +86,8 @@ pub struct Run {
     pub samples: u32,
     /// Backends, in order.
     pub backends: Vec<String>,
+    /// Threads that those share which have threads; records from before there was one lack it.
+    pub threads: Option<usize>,
 }
 
 /// A scene.

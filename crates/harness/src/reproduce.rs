@@ -17,7 +17,7 @@ use crate::{
     record::{Cell, Labelling, Outcome, Record, Run},
     report,
     scenes::Source,
-    tell,
+    tell, threads,
 };
 
 /// Loops of plain BP in a quick run: the fewest of which CFBP and CFCSBP make different numbers of loops. A whole k = L
@@ -39,8 +39,14 @@ pub fn outside_energies(data: &Path) -> Result<Vec<Labelling>, String> {
 /// Runs the command.
 pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     interrupt::listen()?;
+    threads::run_on(args.threads, || run_all(args))
+}
+
+/// Runs what is asked for and writes its report.
+fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     let source = Source::new(&args.data, args.quick)?;
     let devices = run::open_devices(&args.backend)?;
+    threads::check(args.threads, &devices)?;
     let settings = Run {
         data: source.set.name.to_owned(),
         quick: args.quick,
@@ -48,6 +54,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
         k: if args.quick { QUICK_LOOPS } else { source.set.labels as u32 },
         samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
         backends: devices.iter().map(|device| device.name.clone()).collect(),
+        threads: Some(rayon::current_num_threads()),
     };
     tell(&format!("scenes: {}", source.set.described));
     source.check()?;

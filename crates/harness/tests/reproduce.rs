@@ -13,7 +13,18 @@ use harness::record::Record;
 
 fn start(results: &Path) -> Child {
     Command::new(env!("CARGO_BIN_EXE_bp"))
-        .args(["reproduce", "--quick", "--synthetic", "--machine", "test", "--results"])
+        .args([
+            "reproduce",
+            "--quick",
+            "--synthetic",
+            "--machine",
+            "test",
+            "--backend",
+            "scalar,rayon",
+            "--threads",
+            "2",
+            "--results",
+        ])
         .arg(results)
         .stderr(Stdio::null())
         .spawn()
@@ -106,6 +117,7 @@ fn check_report(folder: &Path) {
         assert!(svg.starts_with("<svg") && svg.contains("<title"), "{name}");
         assert!(markdown.contains(&format!("({name}.svg)")) && html.contains(&format!("id=\"{name}\"")), "{name}");
     }
+    assert!(markdown.contains("all share the whole image"), "how parts share several workers");
     assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
     assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
     assert!(!html.contains("src=\"http") && !html.contains("<script"), "one self-contained page");

@@ -144,7 +144,7 @@ fn solve(
     update: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Solved, Failure> {
     let plan = planned.plan(scene.pair.size(), run)?;
-    machine::check_memory(device.device.planned_bytes(&plan), "--quick needs less")?;
+    machine::check_memory(device.device.planned_bytes(&plan), None, "--quick needs less")?;
     let start = Instant::now();
     let mut matcher = Matcher::new(device.device.as_ref(), plan)?;
     let prepare_ms = 1000.0 * start.elapsed().as_secs_f64();

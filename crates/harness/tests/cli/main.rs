@@ -1,78 +1,13 @@
 //! The program as its users meet it: options, files, messages, exit codes.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
+mod folder;
+mod running;
 
+use std::{fs, path::Path, process::Command};
+
+use folder::{Folder, HEIGHT, MATCH, SHIFT, WIDTH, text};
 use serde_json::Value;
-use tempfile::TempDir;
-
-const WIDTH: u32 = 40;
-const HEIGHT: u32 = 24;
-const SHIFT: u32 = 5;
-
-/// A folder with a pair whose right view is shifted by 5 px, and its ground truth, twice the disparity.
-struct Folder(TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
-        let view = |shift: u32| image::GrayImage::from_fn(WIDTH, HEIGHT, |x, y| image::Luma([noise(x + shift, y)]));
-        view(0).save(folder.path("left.png")).unwrap();
-        view(SHIFT).save(folder.path("right.png")).unwrap();
-        view(SHIFT).save(folder.path("right.pgm")).unwrap();
-        image::GrayImage::from_pixel(WIDTH, HEIGHT, image::Luma([10])).save(folder.path("truth.png")).unwrap();
-        image::GrayImage::from_pixel(WIDTH + 1, HEIGHT, image::Luma([10])).save(folder.path("wide.png")).unwrap();
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, arguments: &str) -> Output {
-        let words = arguments.split_whitespace();
-        Command::new(env!("CARGO_BIN_EXE_bp"))
-            .args(words)
-            .current_dir(self.0.path())
-            .env_remove("BP_DATA")
-            .output()
-            .unwrap()
-    }
-
-    fn json(&self, arguments: &str) -> Value {
-        let output = self.run(arguments);
-        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// Asserts an exit code and that the message has all of `words`; that no panic and no file is left.
-    fn fails(&self, arguments: &str, code: i32, words: &[&str]) {
-        let before = listing(self.0.path());
-        let output = self.run(arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments}: {message}");
-        assert!(words.iter().all(|word| message.contains(word)), "{arguments}: {message}");
-        assert!(!message.contains("panicked"), "{message}");
-        assert_eq!(listing(self.0.path()), before, "{arguments} left a file");
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn listing(folder: &Path) -> Vec<PathBuf> {
-    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
-    paths
-}
-
-const MATCH: &str = "match left.png right.png --labels 12 --output";
 
 #[test]
 fn a_shifted_pair_is_matched_and_evaluated_in_every_format() {
@@ -128,8 +63,10 @@ fn settings_change_what_they_say() {
     assert_eq!(steps("--algorithm sweep"), (5, 1));
     assert_eq!(steps("--algorithm sweep --grids 3 --schedule sweep"), (3, 1));
     assert_eq!(steps("--algorithm sweep --loops 4"), (5, 4));
-    assert_eq!(run("--half-steps 5")["settings"]["schedule"], "checkerboard");
-    let swept = &run("--algorithm sweep --loops 2")["settings"];
+    assert_eq!(steps("--grids 2 --loops 3"), (2, 3));
+    assert_eq!(run("--algorithm cfbp --half-steps 5")["settings"]["schedule"], "checkerboard");
+    let swept = &run("--loops 2")["settings"];
+    assert_eq!(*swept, run("--algorithm sweep --loops 2")["settings"]);
     assert_eq!((&swept["schedule"], &swept["coarse_clip"], &swept["k"]), (&"sweep".into(), &true.into(), &Value::Null));
     assert_eq!(run("--algorithm cfbp")["settings"]["coarse_clip"], false);
     let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
@@ -161,19 +98,20 @@ fn a_negative_least_disparity_swaps_the_views() {
 fn contradictory_options_are_usage_errors_that_name_them() {
     let folder = Folder::new();
     for (options, words) in [
-        ("--grids 3", ["--grids", "--loops"]),
+        ("--algorithm cfbp --grids 3", ["--grids", "--loops"]),
         ("--algorithm bp --grids 3 --loops 2", ["--grids", "cfbp"]),
         ("--algorithm bp --z 3", ["--z", "cfcsbp"]),
-        ("--z 3 --half-steps 5", ["--z", "--half-steps"]),
+        ("--algorithm cfcsbp --z 3 --half-steps 5", ["--z", "--half-steps"]),
         ("--algorithm cfbp --seed-start off", ["--seed-start", "ctbp"]),
         ("--algorithm bp --message-start sender", ["--message-start", "cfbp"]),
-        ("--half-steps 3 --schedule sync", ["--half-steps", "checkerboard"]),
-        ("--half-steps 3 --schedule sweep", ["--half-steps", "checkerboard"]),
+        ("--algorithm bp --half-steps 3 --schedule sync", ["--half-steps", "checkerboard"]),
+        ("--algorithm bp --half-steps 3 --schedule sweep", ["--half-steps", "checkerboard"]),
+        ("--half-steps 3", ["--half-steps", "cfbp"]),
         ("--algorithm sweep --half-steps 3", ["--half-steps", "sweep"]),
         ("--algorithm sweep --schedule sync", ["--schedule", "sweep"]),
         ("--algorithm sweep --z 2", ["--z", "sweep"]),
         ("--algorithm sweep --message-start receiver", ["--message-start", "sweep"]),
-        ("--schedule sweep --message-start sender", ["message start", "sweep"]),
+        ("--algorithm cfbp --schedule sweep --message-start sender", ["message start", "sweep"]),
         ("--algorithm bp --coarse-clip on", ["--coarse-clip", "cfbp"]),
         ("--half-steps 3 --loops 2", ["--half-steps", "--loops"]),
         ("--truncation 64", ["--truncation", "63"]),
@@ -183,6 +121,10 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         ("--min-disparity 99999999", ["--min-disparity", "99999999"]),
         ("--mask truth.png", ["--mask", "--ground-truth"]),
         ("--algorithm magic", ["--algorithm", "magic"]),
+        ("--threads 0", ["--threads", "1024"]),
+        ("--backend scalar --threads 3", ["--threads 3", "rayon"]),
+        ("--repeat 0", ["--repeat", "10000"]),
+        ("--max-memory much", ["--max-memory", "much"]),
         ("--scale 0 --ground-truth truth.png", ["--scale", "above 0"]),
     ] {
         folder.fails(&format!("match left.png right.png --output a.png {options}"), 2, &words);
@@ -192,7 +134,9 @@ fn contradictory_options_are_usage_errors_that_name_them() {
     folder.fails("match left.png right.png --output a.png --picture ./a.png", 2, &["a.png", "twice"]);
     folder.fails("match left.png right.png --output ./left.png", 2, &["left.png", "twice"]);
     folder.fails("reproduce --quick --synthetic --backend scalar,scalar:0", 2, &["--backend", "twice"]);
+    folder.fails("reproduce --quick --synthetic --backend scalar --threads 2", 2, &["--threads 2", "rayon"]);
     folder.fails("match left.png right.png --output a.png --backend scalar:1", 5, &["scalar", "device 1"]);
+    folder.fails("match left.png right.png --output a.png --backend rayon:9", 5, &["rayon", "device 9"]);
     folder.fails("match left.png right.png --output a.png --backend magic", 5, &["--backend", "magic", "scalar"]);
 }
 
@@ -253,7 +197,7 @@ fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let status = Command::new(env!("CARGO_BIN_EXE_bp"))
             .args("evaluate truth.png truth.png".split(' '))
-            .current_dir(folder.0.path())
+            .current_dir(folder.path(""))
             .stdout(full)
             .output()
             .unwrap();

@@ -49,11 +49,19 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
             or(row.measured(plan.plan).map(|measured| measured.samples.len().to_string()), "0"),
         ]
     });
-    let one_worker = results.devices().iter().all(|(_, device)| device.workers == 1);
-    let side_by_side = " Parts run one after another; running them side by side needs a backend with several workers, \
-                        and this run has none.";
     let cut = plans.iter().any(Named::is_cut);
-    table.note(format!("{note}{}", if cut && one_worker { side_by_side } else { "" }))
+    table.note(format!("{note}{}", if cut { parts_note(results) } else { "" }))
+}
+
+/// How the parts of a cut image share the workers.
+fn parts_note(results: &Results<'_>) -> &'static str {
+    if results.devices().iter().all(|(_, device)| device.workers == 1) {
+        " Parts run one after another; running them side by side needs a backend with several workers, and this run has \
+         none."
+    } else {
+        " Parts are not run side by side, a worker each: where there are several workers, all share the whole image in \
+         every plan, BP's too."
+    }
 }
 
 fn grids_and_loops(cell: &Cell) -> String {
