@@ -127,34 +127,45 @@ impl View<'_> {
         let pixels = &self.image.pixels()[y * width..][..width];
         for (channel, out) in rows.chunks_exact_mut(2 * lanes).enumerate() {
             let (even, odd) = out.split_at_mut(lanes);
-            for (parity, plane) in [even, odd].into_iter().enumerate() {
-                let plane = &mut plane[offset..offset + (width + 1 - parity) / 2];
-                simd.vectorize(
-                    #[inline(always)]
-                    || match self.profile {
-                        Profile::Census => self.census(y, parity, plane),
-                        Profile::Thesis => every_second(plane, &pixels[parity..], |&pixel| grey(pixel)),
-                        Profile::Mrf => every_second(plane, &pixels[parity..], |pixel| pixel[channel]),
-                    },
-                );
-            }
+            let (even, odd) = (&mut even[offset..][..width.div_ceil(2)], &mut odd[offset..][..width / 2]);
+            simd.vectorize(
+                #[inline(always)]
+                || match self.profile {
+                    Profile::Census => self.census(y, even, odd),
+                    Profile::Thesis => {
+                        every_second(even, pixels, |&pixel| grey(pixel));
+                        every_second(odd, &pixels[1..], |&pixel| grey(pixel));
+                    }
+                    Profile::Mrf => {
+                        every_second(even, pixels, |pixel| pixel[channel]);
+                        every_second(odd, &pixels[1..], |pixel| pixel[channel]);
+                    }
+                },
+            );
         }
     }
 
-    /// The census codes of the columns of a parity, as [`bp_core::census::code`] gives them.
+    /// The census codes of a row, as [`bp_core::census::code`] gives them, dealt to even and odd columns.
     #[inline(always)]
-    fn census(&self, y: usize, parity: usize, codes: &mut [u8]) {
+    fn census(&self, y: usize, even: &mut [u8], odd: &mut [u8]) {
         let Size { width, height } = self.image.size();
-        let row = |y: usize| &self.grey[y * (width + 2) + parity..][..width + 2 - parity];
+        let row = |y: usize| &self.grey[y * (width + 2)..][..width + 2];
         let [above, centre, below] = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
-        codes.fill(0);
-        for (row, dx) in
-            [(above, 0), (above, 1), (above, 2), (centre, 0), (centre, 2), (below, 0), (below, 1), (below, 2)]
-        {
-            let neighbours = row[dx..].iter().step_by(2);
-            for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(centre[1..].iter().step_by(2)) {
-                *code = *code << 1 | u8::from(neighbour > middle);
+        let mut codes = [0; 2 * BLOCK];
+        for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
+            let (x, columns) = (2 * BLOCK * index, even.len() + odd.len());
+            let middle = &centre[x + 1..][..columns];
+            for (row, dx) in
+                [(above, 0), (above, 1), (above, 2), (centre, 0), (centre, 2), (below, 0), (below, 1), (below, 2)]
+            {
+                let neighbours = &row[x + dx..][..columns];
+                for ((code, neighbour), middle) in codes[..columns].iter_mut().zip(neighbours).zip(middle) {
+                    // Older bits leave at the top: what an earlier block left behind is gone after eight.
+                    *code = *code << 1 | u8::from(neighbour > middle);
+                }
             }
+            even.iter_mut().zip(codes.iter().step_by(2)).for_each(|(out, &code)| *out = code);
+            odd.iter_mut().zip(codes[1..].iter().step_by(2)).for_each(|(out, &code)| *out = code);
         }
     }
 }

@@ -67,11 +67,12 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
-    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given: bytes, or
-    /// 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
+    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given:
+    /// bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
     #[arg(long, value_name = "SIZE")]
     pub(crate) max_memory: Option<ByteSize>,
-    /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the later ones.
+    /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
+    /// later ones.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(crate) repeat: u32,
     /// Ground truth of the left image: errors are measured where it is given.
