@@ -1,6 +1,6 @@
 //! Where the values of a grid lie.
 
-use bp_core::{Plan, Side, Size};
+use bp_core::{Plan, Side, Size, memory};
 
 /// Every row of lanes is a whole number of blocks; no vector is longer.
 pub(crate) const BLOCK: usize = 64;
@@ -22,6 +22,8 @@ pub(crate) struct Layout {
     /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
     /// neighbour in the next pair. With a block of zeros before and after.
     masks: [[Vec<u8>; 2]; 2],
+    zeros: Vec<u8>,
+    ones: Vec<u8>,
     /// By row: whether it exchanges messages with the row above.
     joined_above: Vec<bool>,
 }
@@ -44,8 +46,16 @@ impl Layout {
             labels: plan.model().labels(),
             lanes,
             masks: [[mask(0, Side::Right), mask(0, Side::Left)], [mask(1, Side::Left), mask(1, Side::Right)]],
+            zeros: vec![0; plan.model().labels() * lanes],
+            ones: vec![u8::MAX; lanes],
             joined_above: (0..size.height).map(|y| plan.neighbour(grid, (0, y), Side::Up).is_some()).collect(),
         }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let masks: u64 = self.masks.iter().flatten().map(memory::bytes).sum();
+        masks + memory::bytes(&self.zeros) + memory::bytes(&self.ones) + memory::bytes(&self.joined_above)
     }
 
     /// Number of nodes of a plane in a row.
@@ -77,6 +87,16 @@ impl Layout {
     pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let lanes = self.nodes(plane).next_multiple_of(BLOCK);
         (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
+    }
+
+    /// Messages that were never sent, `[label][lane]`.
+    pub(crate) fn zeros(&self) -> &[u8] {
+        &self.zeros
+    }
+
+    /// The mask of a plane all of whose nodes have a neighbour, `[lane]`.
+    pub(crate) fn ones(&self) -> &[u8] {
+        &self.ones
     }
 
     /// Whether row `y` exchanges messages with the row above; not so for the row below the last.

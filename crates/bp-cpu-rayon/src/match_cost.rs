@@ -44,7 +44,14 @@ impl Matching<'_> {
     /// Stores the costs of a row whose profile is narrow, and its unclipped ones too if asked.
     pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
         let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
-        dispatch!(self.level, simd => row.narrow(simd, stored, sums));
+        // To take off a node's least cost changes no message; it only makes room for sums in 8 bits.
+        let model = self.plan.model();
+        let fits = model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into();
+        if fits && sums.is_none() {
+            dispatch!(self.level, simd => row.unclipped(simd, stored));
+        } else {
+            dispatch!(self.level, simd => row.narrow(simd, stored, sums));
+        }
         self.fix(y, stored);
     }
 

@@ -33,13 +33,13 @@ pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
     labels.par_chunks_exact_mut(answer.layout.size.width).enumerate().for_each(|(y, row)| {
         for plane in 0..2 {
             let received = Side::ALL.map(|side| answer.received((plane, y), side));
-            answer.decide((plane, y), received, None, false, row);
+            answer.decide((plane, y), received, |_, _| [], row);
         }
     });
 }
 
-/// What one node received, `[label][lane]`, and where there is a node that sent it, `[lane]`.
-type Received<'a> = (&'a [u8], Option<&'a [u8]>);
+/// What the nodes of a plane received from a side, `[label][lane]`, and where there is a node that sent it, `[lane]`.
+type Received<'a> = (&'a [u8], &'a [u8]);
 
 impl<'a> Answer<'a> {
     fn costs(&self, plane: usize, y: usize) -> &'a [u8] {
@@ -61,14 +61,16 @@ impl<'a> Answer<'a> {
         }
     }
 
-    fn received(&self, (plane, y): (usize, usize), side: Side) -> Option<Received<'a>> {
-        let values = self.received[(plane + y) % 2].towards(side, plane, y)?;
-        Some((values, self.mask(plane, side)))
+    fn received(&self, (plane, y): (usize, usize), side: Side) -> Received<'a> {
+        match self.received[(plane + y) % 2].towards(side, plane, y) {
+            Some(values) => (values, self.mask(plane, side)),
+            None => (self.layout.zeros(), self.layout.ones()),
+        }
     }
 
     /// Where the nodes of `plane` have a neighbour on `side`, `[lane]`; of up and down the rows know.
-    fn mask(&self, plane: usize, side: Side) -> Option<&'a [u8]> {
-        self.layout.masks(plane).get(slot(side, plane)).copied()
+    fn mask(&self, plane: usize, side: Side) -> &'a [u8] {
+        self.layout.masks(plane).get(slot(side, plane)).copied().unwrap_or(self.layout.ones())
     }
 
     /// Decodes a band after sweeps, from its first row down, even nodes before odd ones.
@@ -76,42 +78,50 @@ impl<'a> Answer<'a> {
         let mut above = None;
         for (row, y) in labels.chunks_exact_mut(self.layout.size.width).zip(self.first..) {
             let (even, odd) = (y % 2, 1 - y % 2);
-            let up = above.filter(|_| self.layout.joined_above(y));
+            let above_row = above.filter(|_| self.layout.joined_above(y));
+            let up = |strip, column| Known {
+                labels: decided(above_row.unwrap_or_default(), column),
+                mask: part(if above_row.is_some() { self.layout.ones() } else { self.layout.zeros() }, strip),
+            };
             let [left, right, _, down] = Side::ALL.map(|side| self.received((even, y), side));
-            self.decide((even, y), [left, right, None, down], up, false, row);
+            self.decide((even, y), [left, right, down], |(strip, column), _| [up(strip, column)], row);
+            let beside = |side, (strip, column): (_, isize), row: &[u16]| {
+                let dx = if side == Side::Left { -1 } else { 1 };
+                Known { labels: decided(row, column + dx), mask: part(self.mask(odd, side), strip) }
+            };
             let down = self.received((odd, y), Side::Down);
-            self.decide((odd, y), [None, None, None, down], up, true, row);
+            let known = |(strip, column), row: &[u16]| {
+                let at = (strip, column);
+                [up(strip, column), beside(Side::Left, at, row), beside(Side::Right, at, row)]
+            };
+            self.decide((odd, y), [down], known, row);
             above = Some(&*row);
         }
     }
 
-    /// Decides the nodes of `plane` in row `y`: the smallest label that costs least with what was received from
-    /// sides, with the labels of the row above, and, where `beside`, with those of the other nodes of the row.
-    fn decide(
+    /// Decides the nodes of `plane` in row `y`: the smallest label that costs least with what was received from some
+    /// sides and with the labels already decided on others: `known` tells those for a strip of lanes and its first
+    /// column.
+    fn decide<'b, const M: usize, const K: usize>(
         &self,
         (plane, y): (usize, usize),
-        received: [Option<Received<'_>>; 4],
-        above: Option<&[u16]>,
-        beside: bool,
+        received: [Received<'_>; M],
+        known: impl Fn(((usize, usize), isize), &[u16]) -> [Known<'b>; K],
         row: &mut [u16],
     ) {
         let nodes = Nodes { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
-        for (at, lanes) in self.layout.strips(plane) {
-            let column = 2 * at as isize + plane as isize;
-            let beside = |side, dx| {
-                let labels = beside.then(|| decided(row, column + dx))?;
-                Some(Known { labels, mask: self.mask(plane, side).map(|mask| &mask[at..at + lanes]) })
-            };
-            let known = [
-                beside(Side::Left, -1),
-                beside(Side::Right, 1),
-                above.map(|above| Known { labels: decided(above, column), mask: None }),
-            ];
-            let labels = dispatch!(self.level, simd => nodes.strip(simd, (at, lanes), &received, &known));
-            let columns = row.iter_mut().skip(2 * at + plane).step_by(2);
-            columns.zip(labels).for_each(|(out, label)| *out = label);
+        for strip in self.layout.strips(plane) {
+            let column = 2 * strip.0 + plane;
+            let known = known((strip, column as isize), row);
+            let labels = dispatch!(self.level, simd => nodes.strip(simd, strip, &received, &known));
+            row.iter_mut().skip(column).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
         }
     }
+}
+
+/// The lanes of a strip.
+fn part(lanes: &[u8], (at, count): (usize, usize)) -> &[u8] {
+    &lanes[at..at + count]
 }
 
 /// Labels of every second column from `x` on; 0 outside.
@@ -126,7 +136,7 @@ fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
 /// Decided labels of neighbours of a strip of nodes, and where there are any.
 struct Known<'a> {
     labels: [u16; STRIP],
-    mask: Option<&'a [u8]>,
+    mask: &'a [u8],
 }
 
 /// The nodes of one plane in one row.
@@ -139,12 +149,12 @@ struct Nodes<'a> {
 impl Nodes<'_> {
     /// Decides a strip of nodes, chunk by chunk of labels, since what is compared has 8 bits.
     #[inline(always)]
-    fn strip<S: Simd>(
+    fn strip<S: Simd, const M: usize, const K: usize>(
         &self,
         simd: S,
         strip: (usize, usize),
-        received: &[Option<Received<'_>>; 4],
-        known: &[Option<Known<'_>>; 3],
+        received: &[Received<'_>; M],
+        known: &[Known<'_>; K],
     ) -> [u16; STRIP] {
         simd.vectorize(
             #[inline(always)]
@@ -152,7 +162,7 @@ impl Nodes<'_> {
                 let mut labels = [0; STRIP];
                 let mut best = [u8::MAX; STRIP];
                 for from in (0..self.layout.labels).step_by(CHUNK) {
-                    let near = known.each_ref().map(|known| known.as_ref().map(|known| near(known, from)));
+                    let near = known.each_ref().map(|known| (near(known, from), known.mask));
                     let before = best;
                     let mut index = [0; STRIP];
                     for label in from..(from + CHUNK).min(self.layout.labels) {
@@ -172,13 +182,13 @@ impl Nodes<'_> {
     /// Compares the cost of a label, of which only the last 8 bits are written down, with the best so far.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
-    fn compare<S: Simd>(
+    fn compare<S: Simd, const M: usize, const K: usize>(
         &self,
         simd: S,
         (at, lanes): (usize, usize),
         (label, low): (usize, usize),
-        received: &[Option<Received<'_>>; 4],
-        near: &[Option<Near<'_>>; 3],
+        received: &[Received<'_>; M],
+        near: &[Near<'_>; K],
         best: &mut [u8; STRIP],
         index: &mut [u8; STRIP],
     ) {
@@ -186,19 +196,18 @@ impl Nodes<'_> {
         let here = S::u8s::splat(simd, (low + FAR) as u8);
         let low = S::u8s::splat(simd, low as u8);
         let costs = &self.costs[start..start + lanes];
+        let received = received.map(|(values, mask)| (&values[start..start + lanes], &mask[at..at + lanes]));
         for lane in (0..lanes).step_by(S::u8s::LEN) {
             let range = lane..lane + S::u8s::LEN;
             let load = |values: &[u8]| S::u8s::from_slice(simd, &values[range.clone()]);
             let mut sum = S::u8s::splat(simd, 0);
-            for (values, mask) in received.iter().flatten() {
-                let message = load(&values[start..start + lanes]);
-                sum += mask.map_or(message, |mask| message & load(&mask[at..at + lanes]));
+            for (values, mask) in received {
+                sum += load(values) & load(mask);
             }
-            for (labels, mask) in near.iter().flatten() {
+            for (labels, mask) in near {
                 let label = load(labels);
                 let distance = here.saturating_sub(label) | label.saturating_sub(here);
-                let cost = smoothness::<S>(simd, self.model, distance);
-                sum += mask.map_or(cost, |mask| cost & load(mask));
+                sum += smoothness::<S>(simd, self.model, distance) & load(mask);
             }
             // What is added to the data cost is at most 4K.
             let belief = load(costs).saturating_add(sum);
@@ -210,15 +219,15 @@ impl Nodes<'_> {
 }
 
 /// Labels relative to a chunk of labels, clamped to where distances count, and where there are any.
-type Near<'a> = ([u8; STRIP], Option<&'a [u8]>);
+type Near<'a> = ([u8; STRIP], &'a [u8]);
 
 #[inline(always)]
-fn near<'a>(known: &Known<'a>, from: usize) -> Near<'a> {
+fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
     let mut relative = [0; STRIP];
     for (relative, &label) in relative.iter_mut().zip(&known.labels) {
         *relative = (label + FAR as u16).saturating_sub(from as u16).min(255) as u8;
     }
-    (relative, known.mask)
+    relative
 }
 
 /// The smoothness cost of distances between labels; the product fits, since distances beyond K div s count as that plus 1.

@@ -75,8 +75,9 @@ pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let messages = kept.map(|grid| edges::bytes(&Layout::new(plan, grid)) as u64 * sets(plan, grid) as u64);
     let labels = 2 * plan.image_size().pixels() as u64;
     let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
+    let layouts = (0..plan.grids()).map(|grid| Layout::new(plan, grid).bytes());
     let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), sweep::bytes(plan)];
-    costs.chain(messages).chain(others).fold(0, u64::saturating_add)
+    costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
 
 impl RayonSolver {
@@ -294,7 +295,8 @@ impl Solver for RayonSolver {
     fn allocated_bytes(&self) -> u64 {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();
-        self.features.bytes() + costs + messages + self.windows.bytes() + memory::bytes(&self.decided)
+        let layouts: u64 = self.layouts.iter().map(Layout::bytes).sum();
+        self.features.bytes() + costs + messages + layouts + self.windows.bytes() + memory::bytes(&self.decided)
     }
 }
 
