@@ -1,0 +1,26 @@
+//! The threads that work is shared by.
+
+use crate::{backends::Opened, failure::Failure};
+
+/// Runs `work` on a worker of a pool of so many threads, by default one a core. The rayon backend works in the pool
+/// that it is called in; called from one of its workers, it need not hand every kernel over to another thread.
+pub(crate) fn run_on<T: Send>(
+    threads: Option<u16>,
+    work: impl FnOnce() -> Result<T, Failure> + Send,
+) -> Result<T, Failure> {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from));
+    let failed = |error| Failure::other(format!("cannot start the threads: {error}; fewer --threads may do"));
+    builder.build().map_err(failed)?.install(work)
+}
+
+/// Refuses a number of threads that no device works with.
+pub(crate) fn check(threads: Option<u16>, devices: &[Opened]) -> Result<(), Failure> {
+    match threads.map(usize::from) {
+        Some(threads) if devices.iter().all(|device| device.info.workers != threads) => {
+            let names = devices.iter().map(|device| device.name.as_str()).collect::<Vec<_>>().join(",");
+            let what = format!("--backend {names} has no threads; --backend rayon has");
+            Err(Failure::usage(format!("--threads {threads}: {what}")))
+        }
+        _ => Ok(()),
+    }
+}
