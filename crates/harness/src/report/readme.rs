@@ -8,8 +8,7 @@ use super::{
     results::{Part, Results, Row},
     tables::{
         Named, Table,
-        ours::{CENSUS, means},
-        thesis_plans,
+        ours::{all_plans, means},
     },
 };
 
@@ -63,7 +62,7 @@ fn table(results: &Results<'_>) -> Table {
         "all, %",
         "RMSE, px",
     ];
-    let plans: Vec<Named> = thesis_plans().into_iter().chain([CENSUS]).collect();
+    let plans = all_plans(results);
     let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
     Table::new("", "", &columns).rows(rows.map(|(backend, plan)| row(results, backend, plan)).collect::<Vec<_>>())
 }

@@ -17,36 +17,41 @@ pub(crate) struct Planned {
     profile: Profile,
     /// What loops are divided by.
     pub(crate) z: Option<u32>,
-    /// Grids and loops on each, in place of the thesis's rule.
+    schedule: Schedule,
+    /// Grids and steps on each, in place of the algorithm's own.
     fixed: Option<(usize, u32)>,
 }
 
-/// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and the same model
-/// with the census transform as data cost, on few grids with few loops, which is ours.
+/// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and three of
+/// ours, with the census transform as data cost on few grids: few loops, many half-steps, and one sweep a grid.
 pub(crate) fn all() -> Vec<Planned> {
     let thesis = |name, algorithm: Algorithm, z: u32| Planned {
         name,
         algorithm,
         profile: Profile::Thesis,
         z: algorithm.divides_loops().then_some(z),
+        schedule: Schedule::Sync,
         fixed: None,
     };
     let mut plans: Vec<_> = Algorithm::THESIS.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
     plans.push(thesis("ctcsbp-z3", Algorithm::Ctcsbp, 3));
     plans.push(thesis("ctcsbp-z4", Algorithm::Ctcsbp, 4));
-    let census = thesis(CENSUS, Algorithm::Cfbp, Z);
-    plans.push(Planned { profile: Profile::Census, fixed: Some((5, 2)), ..census });
+    let census = |name, algorithm| Planned { profile: Profile::Census, ..thesis(name, algorithm, Z) };
+    plans.push(Planned { fixed: Some((5, 2)), ..census(CENSUS, Algorithm::Cfbp) });
+    let half_steps = Planned { schedule: Schedule::Checkerboard, ..census("hierarchy", Algorithm::Cfbp) };
+    plans.push(Planned { fixed: Some((5, 10)), ..half_steps });
+    plans.push(Planned { schedule: Schedule::Sweep, fixed: Some((5, 1)), ..census("sweep", Algorithm::Sweep) });
     plans
 }
 
-/// Name of our plan with census costs.
+/// Name of our plan with census costs and few loops.
 pub(crate) const CENSUS: &str = "census";
 
 impl Planned {
     /// The plan for images of `size`.
     pub(crate) fn plan(&self, size: Size, run: &Run) -> Result<Plan, Error> {
         let model = Model::new(self.profile, run.labels)?;
-        let settings = self.algorithm.settings(size, run.k, self.z.unwrap_or(1), Schedule::Sync);
+        let settings = self.algorithm.settings(size, run.k, self.z.unwrap_or(1), self.schedule);
         let settings = match self.fixed {
             Some((grids, steps)) => Settings { grids, steps, ..settings },
             None => settings,

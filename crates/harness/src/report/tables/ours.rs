@@ -10,18 +10,47 @@ use crate::report::{
 pub(in crate::report) const CENSUS: Named =
     Named { plan: "census", title: "ours: census cost, 5 grids x 2 loops", printed: None };
 
+const HIERARCHY: Named =
+    Named { plan: "hierarchy", title: "ours: census cost, 5 grids x 10 half-steps (checkerboard)", printed: None };
+
+const SWEEP: Named = Named { plan: "sweep", title: "ours: census cost, 5 grids x 1 sweep", printed: None };
+
+/// The thesis's plans, and those of ours that were run.
+pub(in crate::report) fn all_plans(results: &Results<'_>) -> Vec<Named> {
+    let run = |plan: &Named| results.record.cells.iter().any(|cell| cell.plan == plan.plan);
+    thesis_plans().into_iter().chain([CENSUS, HIERARCHY, SWEEP].into_iter().filter(run)).collect()
+}
+
 /// Means over the scenes for every plan.
 pub(super) fn profiles(results: &Results<'_>) -> Table {
-    let columns = ["backend", "plan", "B>1 visible, %", "B>1 all, %", "R all, px", "message passing, ms", "total, ms"];
-    let plans: Vec<_> = thesis_plans().into_iter().chain([CENSUS]).collect();
+    let columns = [
+        "backend",
+        "plan",
+        "B>1 visible, %",
+        "B>1 all, %",
+        "R all, px",
+        "message passing, ms",
+        "total, ms",
+        "energy / 1000",
+    ];
+    let plans = all_plans(results);
     let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
     let rows = rows.map(|(backend, plan)| {
         let cells = means(results, backend, plan).map(|mean| or(mean.map(|mean| number(mean, 2)), "not run"));
-        [vec![backend.to_owned(), plan.title.to_owned()], cells.to_vec()].concat()
+        let energy = or(mean_energy(results, backend, plan).map(|energy| number(energy / 1000.0, 0)), "not run");
+        [vec![backend.to_owned(), plan.title.to_owned()], cells.to_vec(), vec![energy]].concat()
     });
     let note = "Means over the scenes, of medians where there are several samples. The thesis's plans use its grey \
-                difference; ours uses the 3x3 census transform that CTBP computes for one pixel as the data cost of all.";
+                difference; ours use the 3x3 census transform that CTBP computes for one pixel as the data cost of all. \
+                Energies of one data cost can be compared, those of the two cannot.";
     Table::new("A.1", "Accuracy and time, means (ours)", &columns).note(note).rows(rows)
+}
+
+/// Mean energy of a plan's labels.
+fn mean_energy(results: &Results<'_>, backend: &str, plan: &Named) -> Option<f64> {
+    let rows = results.rows().filter(|row| row.backend == backend);
+    let energies: Option<Vec<f64>> = rows.map(|row| Some(row.measured(plan.plan)?.energy.total as f64)).collect();
+    Spread::mean(energies?)
 }
 
 /// Mean visible and total bad-pixel percentage, error, message passing time and total time of a plan.
