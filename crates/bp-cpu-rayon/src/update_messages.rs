@@ -31,6 +31,12 @@ pub(crate) struct Nodes<'a> {
     pub(crate) truncation: u8,
 }
 
+impl Nodes<'_> {
+    fn labels(&self) -> usize {
+        self.costs.len() / self.lanes
+    }
+}
+
 /// Sends messages, in place: each takes the place of the one that came over the same edge. To send up, exchange the last
 /// two slots.
 pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
@@ -71,29 +77,38 @@ fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
 /// `W` vectors of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
 /// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
 #[inline(always)]
-fn vectors<
-    S: Simd,
-    V: SimdInt<S, Element = u8>,
-    const W: usize,
-    const SIDES: bool,
-    const UP: bool,
-    const DOWN: bool,
->(
+fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const DOWN: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
     at: usize,
-) {
+) where
+    S: Simd,
+    V: SimdInt<S, Element = u8>,
+{
     let sent = [SIDES, SIDES, UP, DOWN];
-    let splat = |value| V::splat(simd, value);
-    let (step, truncation) = (splat(nodes.step), splat(nodes.truncation));
+    let least = pass_up::<S, V, W>(simd, nodes, sent, slots, at);
+    pass_down::<S, V, W>(simd, nodes, sent, slots, at, least);
+}
+
+/// Writes the envelopes from below to the slots and returns the least entry of each side's h.
+#[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
+fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    sent: [bool; 4],
+    slots: &mut [&mut [u8]; 4],
+    at: usize,
+) -> [[V; 4]; W] {
+    let step = V::splat(simd, nodes.step);
     let mut masks = [[step; 2]; W];
     for w in 0..W {
         let from = at + w * V::LEN;
         masks[w] = nodes.masks.map(|mask| V::from_slice(simd, &mask[from..from + V::LEN]));
     }
-    let mut least = [[splat(u8::MAX); 4]; W];
-    let mut envelope = least;
+    let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
+    let mut least = envelope;
     let mut start = at;
     while start + W * V::LEN <= nodes.costs.len() {
         for w in 0..W {
@@ -115,7 +130,23 @@ fn vectors<
         }
         start += nodes.lanes;
     }
-    envelope = [[splat(u8::MAX); 4]; W];
+    least
+}
+
+/// Turns the envelopes from below into messages.
+#[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
+fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    sent: [bool; 4],
+    slots: &mut [&mut [u8]; 4],
+    at: usize,
+    least: [[V; 4]; W],
+) {
+    let (step, truncation) = (V::splat(simd, nodes.step), V::splat(simd, nodes.truncation));
+    let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
+    let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
         start -= nodes.lanes;
         // All loads come before the stores: slots often lie a multiple of 4 KiB apart, where a load waits for a store.
