@@ -46,7 +46,8 @@ pub trait Device: Send + Sync {
     /// [`Error::OutOfMemory`].
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
 
-    /// Bytes that [`Device::prepare`] will allocate: the plan's own, and what this device pads them with.
+    /// Bytes that [`Device::prepare`] will allocate: by default [`Plan::bytes`]. A device may pad
+    /// buffers, or do without some of them.
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         plan.bytes()
     }
@@ -96,8 +97,8 @@ pub trait Solver: Send {
     /// Those of the device.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error>;
 
-    /// How many steps it likes to be asked for at once, at least 1: a backend that fuses steps says how many. Progress
-    /// is told and stopping is possible between calls only.
+    /// How many steps it likes to be asked for at once, at least 1: a backend that fuses steps says how many, `u32::MAX`
+    /// where all steps on a grid are one piece of work. Progress is told and stopping is possible between calls only.
     fn fused_steps(&self) -> u32 {
         1
     }

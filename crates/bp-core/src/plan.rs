@@ -172,7 +172,8 @@ impl Plan {
         }
     }
 
-    /// The buffers that the plan asks for, without any padding a backend may add. Messages of two grids are held at a
+    /// The buffers of a straightforward implementation; a backend may pad them or do without some, see
+    /// [`crate::Device::planned_bytes`]. Messages of two grids are held at a
     /// time: one each way over every edge, of which a node has two; double buffered under [`Schedule::Sync`]; a single
     /// one an edge under [`Schedule::Sweep`].
     #[must_use]

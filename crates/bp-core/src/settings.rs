@@ -130,7 +130,7 @@ pub enum Schedule {
     /// - of an even node: `V(d, f_up)` and the messages from the left, the right and below;
     /// - of an odd node: `V(d, f_up) + V(d, f_left) + V(d, f_right)` and the message from below.
     ///
-    /// `V(d, f_up)` is left out in the first row of every band.
+    /// `V(d, f_up)` is left out in the first row of every band, and every term where there is no neighbour.
     Sweep,
 }
 

@@ -4,13 +4,13 @@ use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::layout::{BLOCK, Layout, STRIP};
+use crate::layout::{BLOCK, STRIP, Shape};
 
 /// Data costs as they are stored and as coarser grids are summed from, both `[height][plane][label][lane]`.
 pub(crate) struct Costs {
-    /// Each node's least taken off, clipped at [`Plan::clip`].
+    /// Each node's least taken off, and clipped at [`Plan::clip`], where 8 bits need that.
     pub(crate) stored: Vec<u8>,
-    /// Neither; where the plan keeps them.
+    /// Unclipped, nothing taken off; where the plan keeps them.
     pub(crate) sums: Sums,
 }
 
@@ -27,8 +27,7 @@ pub(crate) enum Sums {
 impl Costs {
     /// Room for the costs of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        let layout = Layout::new(plan, grid);
-        let (what, len) = ("data cost sums", volume(&layout));
+        let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
             _ if !plan.keeps_sums(grid) => Sums::None,
             1 => Sums::U8(memory::filled(what, len, 0)?),
@@ -58,27 +57,27 @@ impl Costs {
 }
 
 /// Costs of a grid, with padding.
-pub(crate) fn volume(layout: &Layout) -> usize {
-    layout.row().saturating_mul(layout.size.height)
+pub(crate) fn volume(shape: &Shape) -> usize {
+    shape.row().saturating_mul(shape.size.height)
 }
 
 /// Bytes that [`Costs`] hold, predicted.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
-    (volume(&Layout::new(plan, grid)) as u64).saturating_mul(1 + sum_bytes as u64)
+    (volume(&Shape::new(plan, grid)) as u64).saturating_mul(1 + sum_bytes as u64)
 }
 
 /// Calls `row(y, stored, sums)` for all rows of a grid, on several threads.
 pub(crate) fn rows<T: Send>(
-    layout: &Layout,
+    shape: &Shape,
     stored: &mut [u8],
     sums: Option<&mut [T]>,
     row: impl Fn(usize, &mut [u8], Option<&mut [T]>) + Sync,
 ) {
-    let stored = stored.par_chunks_exact_mut(layout.row());
+    let stored = stored.par_chunks_exact_mut(shape.row());
     match sums {
         Some(sums) => {
-            let both = stored.zip(sums.par_chunks_exact_mut(layout.row())).enumerate();
+            let both = stored.zip(sums.par_chunks_exact_mut(shape.row())).enumerate();
             both.for_each(|(y, (stored, sums))| row(y, stored, Some(sums)));
         }
         None => stored.enumerate().for_each(|(y, stored)| row(y, stored, None)),
@@ -132,7 +131,7 @@ widen!(u8 => u8, u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 
 /// every label, since what to take off is not known before all have been seen.
 #[inline(always)]
 pub(crate) fn store<T: Sum>(
-    layout: &Layout,
+    shape: &Shape,
     clip: u8,
     at: usize,
     raw: impl Fn(usize) -> [T; BLOCK],
@@ -140,15 +139,15 @@ pub(crate) fn store<T: Sum>(
     mut keep: Option<&mut [T]>,
 ) {
     let mut least = [T::MAX; BLOCK];
-    for label in 0..layout.labels {
+    for label in 0..shape.labels {
         let costs = raw(label);
         for (least, cost) in least.iter_mut().zip(costs) {
             *least = cost.min(*least);
         }
     }
-    for label in 0..layout.labels {
+    for label in 0..shape.labels {
         let costs = raw(label);
-        let start = label * layout.lanes + at;
+        let start = label * shape.lanes + at;
         for ((stored, cost), least) in stored[start..start + BLOCK].iter_mut().zip(costs).zip(least) {
             *stored = (cost - least).clipped(clip);
         }
@@ -162,7 +161,7 @@ pub(crate) fn store<T: Sum>(
 #[inline(always)]
 pub(crate) fn normalise<S: Simd>(
     simd: S,
-    layout: &Layout,
+    shape: &Shape,
     (at, lanes): (usize, usize),
     clip: u8,
     least: &[u8; STRIP],
@@ -170,8 +169,8 @@ pub(crate) fn normalise<S: Simd>(
     stored: &mut [u8],
 ) {
     let clip = S::u8s::splat(simd, clip);
-    for label in 0..layout.labels {
-        let start = label * layout.lanes + at;
+    for label in 0..shape.labels {
+        let start = label * shape.lanes + at;
         let stored = &mut stored[start..start + lanes];
         let kept = kept.map(|kept| &kept[start..start + lanes]);
         for lane in (0..lanes).step_by(S::u8s::LEN) {

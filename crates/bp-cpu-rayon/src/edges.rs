@@ -3,7 +3,7 @@
 use bp_core::{Error, Plan, Side, memory};
 use rayon::{prelude::*, slice::ChunksMut};
 
-use crate::layout::{BLOCK, Layout};
+use crate::layout::{BLOCK, Layout, Shape};
 
 /// Planes of a row: the edges to the row above of both planes of nodes, then those inside the pairs of columns, then
 /// those between the pairs.
@@ -19,7 +19,7 @@ pub(crate) struct Edges {
 impl Edges {
     /// Room for the edges of `grid` and of every coarser one.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        Ok(Self { values: memory::filled("messages", bytes(&Layout::new(plan, grid)), 0)? })
+        Ok(Self { values: memory::filled("messages", bytes(&Shape::new(plan, grid)), 0)? })
     }
 
     /// Room for nothing.
@@ -50,23 +50,23 @@ impl Edges {
 }
 
 /// Of rows of edges, all but those up from the first row.
-pub(crate) fn inside_and_down<'a>(layout: &Layout, rows: &'a [u8]) -> &'a [u8] {
-    &rows[2 * plane(layout)..]
+pub(crate) fn inside_and_down<'a>(shape: &Shape, rows: &'a [u8]) -> &'a [u8] {
+    &rows[2 * plane(shape)..]
 }
 
 /// Bytes that the edges of a grid need.
-pub(crate) fn bytes(layout: &Layout) -> usize {
-    row_bytes(layout).saturating_mul(layout.size.height + 1)
+pub(crate) fn bytes(shape: &Shape) -> usize {
+    row_bytes(shape).saturating_mul(shape.size.height + 1)
 }
 
 /// Bytes of a row.
-pub(crate) fn row_bytes(layout: &Layout) -> usize {
-    PLANES * plane(layout)
+pub(crate) fn row_bytes(shape: &Shape) -> usize {
+    PLANES * plane(shape)
 }
 
 /// Bytes of a plane. Nodes of plane 1 reach one lane further in the edges between pairs, hence the block more.
-fn plane(layout: &Layout) -> usize {
-    layout.plane() + BLOCK
+fn plane(shape: &Shape) -> usize {
+    shape.plane() + BLOCK
 }
 
 /// Reads the messages of a whole grid.
@@ -100,26 +100,21 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The edges of the nodes of one plane in one row, for updating.
-pub(crate) struct Slots<'a> {
-    /// The edges to the neighbours in the same pair of columns, the next pair, above and below, `[label][lane]`.
-    pub(crate) slots: [&'a mut [u8]; 4],
-}
-
-/// The edges of the nodes of `plane` in the first of the two rows that `rows` starts with.
-pub(crate) fn slots<'a>(layout: &Layout, rows: &'a mut [u8], plane: usize) -> Slots<'a> {
-    let bytes = self::plane(layout);
+/// The edges of the nodes of `plane` in the first of the two rows that `rows` starts with: to the neighbours in the same
+/// pair of columns, the next pair, above and below, `[label][lane]`.
+pub(crate) fn slots<'a>(shape: &Shape, rows: &'a mut [u8], plane: usize) -> [&'a mut [u8]; 4] {
+    let bytes = self::plane(shape);
     let (row, below) = rows.split_at_mut(PLANES * bytes);
     let (above, inside) = row.split_at_mut(2 * bytes);
     let (same, next) = inside.split_at_mut(bytes);
     let above = &mut above[plane * bytes..][..bytes];
     let below = &mut below[plane * bytes..][..bytes];
-    Slots { slots: [same, &mut next[plane..], above, below] }
+    [same, &mut next[plane..], above, below]
 }
 
 /// Copies the edges of the nodes of `plane` in the first of the two rows.
-pub(crate) fn copy(layout: &Layout, from: &[u8], to: &mut [u8], plane: usize) {
-    let bytes = self::plane(layout);
+pub(crate) fn copy(shape: &Shape, from: &[u8], to: &mut [u8], plane: usize) {
+    let bytes = self::plane(shape);
     for index in [plane, 2, 3, PLANES + plane] {
         let range = index * bytes..(index + 1) * bytes;
         to[range.clone()].copy_from_slice(&from[range]);

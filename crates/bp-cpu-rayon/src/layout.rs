@@ -1,6 +1,8 @@
 //! Where the values of a grid lie.
 
-use bp_core::{Plan, Side, Size, memory};
+use std::ops::Deref;
+
+use bp_core::{Error, Plan, Side, Size, memory};
 
 /// Every row of lanes is a whole number of blocks; no vector is longer.
 pub(crate) const BLOCK: usize = 64;
@@ -11,51 +13,21 @@ pub(crate) const STRIP: usize = 8 * BLOCK;
 /// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
 /// plane in one row have one checkerboard colour, and the four neighbours of consecutive lanes are consecutive lanes, so
 /// a vector of nodes is one load everywhere. A plane holds values `[label][lane]`.
-#[derive(Clone, Debug)]
-pub(crate) struct Layout {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
     /// Size of the grid.
     pub(crate) size: Size,
     /// Number of labels.
     pub(crate) labels: usize,
     /// Lanes from one label to the next: those of a plane, and padding.
     pub(crate) lanes: usize,
-    /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
-    /// neighbour in the next pair. With a block of zeros before and after.
-    masks: [[Vec<u8>; 2]; 2],
-    zeros: Vec<u8>,
-    ones: Vec<u8>,
-    /// By row: whether it exchanges messages with the row above.
-    joined_above: Vec<bool>,
 }
 
-impl Layout {
-    /// The layout of a grid of `plan`.
+impl Shape {
+    /// The shape of a grid of `plan`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Self {
         let size = plan.size(grid);
-        let lanes = lanes(size);
-        let mask = |plane: usize, side: Side| {
-            let joined = |lane: usize| {
-                let x = 2 * lane + plane;
-                x < size.width && plan.neighbour(grid, (x, 0), side).is_some()
-            };
-            let mask = (0..lanes).map(|lane| if joined(lane) { u8::MAX } else { 0 });
-            std::iter::repeat_n(0, BLOCK).chain(mask).chain(std::iter::repeat_n(0, BLOCK)).collect()
-        };
-        Self {
-            size,
-            labels: plan.model().labels(),
-            lanes,
-            masks: [[mask(0, Side::Right), mask(0, Side::Left)], [mask(1, Side::Left), mask(1, Side::Right)]],
-            zeros: vec![0; plan.model().labels() * lanes],
-            ones: vec![u8::MAX; lanes],
-            joined_above: (0..size.height).map(|y| plan.neighbour(grid, (0, y), Side::Up).is_some()).collect(),
-        }
-    }
-
-    /// Bytes held.
-    pub(crate) fn bytes(&self) -> u64 {
-        let masks: u64 = self.masks.iter().flatten().map(memory::bytes).sum();
-        masks + memory::bytes(&self.zeros) + memory::bytes(&self.ones) + memory::bytes(&self.joined_above)
+        Self { size, labels: plan.model().labels(), lanes: lanes(size) }
     }
 
     /// Number of nodes of a plane in a row.
@@ -73,6 +45,74 @@ impl Layout {
         2 * self.plane()
     }
 
+    /// The lanes of a plane in strips: where each starts, and how many lanes it has, whole blocks.
+    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let lanes = self.nodes(plane).next_multiple_of(BLOCK);
+        (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
+    }
+
+    /// The nodes of a row: column, plane and lane.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
+        (0..self.size.width).map(|x| (x, x % 2, x / 2))
+    }
+
+    /// Bytes that a [`Layout`] holds.
+    pub(crate) fn layout_bytes(&self) -> u64 {
+        (4 * (self.lanes + 2 * BLOCK) + 2 * self.lanes + self.size.height) as u64
+    }
+}
+
+/// A shape, and which nodes have which neighbours.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    shape: Shape,
+    /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
+    /// neighbour in the next pair. With a block of zeros before and after.
+    masks: [[Vec<u8>; 2]; 2],
+    /// The mask of nodes none of which has a neighbour, and that of nodes which all have one.
+    none_and_all: [Vec<u8>; 2],
+    /// By row: whether it exchanges messages with the row above.
+    joined_above: Vec<bool>,
+}
+
+impl Deref for Layout {
+    type Target = Shape;
+
+    fn deref(&self) -> &Shape {
+        &self.shape
+    }
+}
+
+impl Layout {
+    /// The layout of a grid of `plan`.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+        let shape = Shape::new(plan, grid);
+        let mask = |plane: usize, side: Side| -> Result<Vec<u8>, Error> {
+            let mut mask = memory::filled("masks", shape.lanes + 2 * BLOCK, 0)?;
+            for lane in 0..shape.nodes(plane) {
+                let joined = plan.neighbour(grid, (2 * lane + plane, 0), side).is_some();
+                mask[BLOCK + lane] = if joined { u8::MAX } else { 0 };
+            }
+            Ok(mask)
+        };
+        let mut joined_above = memory::filled("masks", shape.size.height, false)?;
+        for (y, joined) in joined_above.iter_mut().enumerate() {
+            *joined = plan.neighbour(grid, (0, y), Side::Up).is_some();
+        }
+        Ok(Self {
+            shape,
+            masks: [[mask(0, Side::Right)?, mask(0, Side::Left)?], [mask(1, Side::Left)?, mask(1, Side::Right)?]],
+            none_and_all: [memory::filled("masks", shape.lanes, 0)?, memory::filled("masks", shape.lanes, u8::MAX)?],
+            joined_above,
+        })
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let masks = self.masks.iter().flatten().chain(&self.none_and_all);
+        masks.map(memory::bytes).sum::<u64>() + memory::bytes(&self.joined_above)
+    }
+
     /// Of `plane`: the masks of the neighbours in the same and in the next pair of columns, `[lane]`.
     pub(crate) fn masks(&self, plane: usize) -> [&[u8]; 2] {
         self.padded_masks(plane).map(|mask| &mask[BLOCK..BLOCK + self.lanes])
@@ -83,30 +123,14 @@ impl Layout {
         self.masks[plane].each_ref().map(Vec::as_slice)
     }
 
-    /// The lanes of a plane in strips: where each starts, and how many lanes it has, whole blocks.
-    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let lanes = self.nodes(plane).next_multiple_of(BLOCK);
-        (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
-    }
-
-    /// Messages that were never sent, `[label][lane]`.
-    pub(crate) fn zeros(&self) -> &[u8] {
-        &self.zeros
-    }
-
-    /// The mask of a plane all of whose nodes have a neighbour, `[lane]`.
-    pub(crate) fn ones(&self) -> &[u8] {
-        &self.ones
+    /// The mask of nodes none of which has a neighbour, and that of nodes which all have one, `[lane]`.
+    pub(crate) fn none_and_all(&self) -> [&[u8]; 2] {
+        self.none_and_all.each_ref().map(Vec::as_slice)
     }
 
     /// Whether row `y` exchanges messages with the row above; not so for the row below the last.
     pub(crate) fn joined_above(&self, y: usize) -> bool {
         self.joined_above.get(y).copied().unwrap_or(false)
-    }
-
-    /// The nodes of a row: column, plane and lane.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-        (0..self.size.width).map(|x| (x, x % 2, x / 2))
     }
 }
 

@@ -2,10 +2,13 @@
 //! messages are the scalar backend's to the bit, on every instruction set and with any number of threads.
 //!
 //! Its devices are the instruction sets of this processor, the widest first. Work is shared by the threads of the rayon
-//! pool that it is called in; [`rayon::ThreadPool::install`] runs it in another than the global one.
+//! pool that it is called in; [`rayon::ThreadPool::install`] runs it in another than the global one. A sweep needs room
+//! for every thread, so that the pool in which a plan is prepared says how many can sweep at once, and the one in which
+//! memory is predicted for how many.
 //!
 //! [`layout`] says how values lie in memory, [`edges`] why one message an edge is enough, [`wavefront`] how several
-//! steps pass over the image at once. One file a kernel: [`match_cost`], [`coarsen`], [`refine`], [`update_messages`],
+//! steps pass over the image at once, [`sweep`] how a band is swept by itself, [`features`] what is compared. One file a
+//! kernel: [`match_cost`], [`coarsen`], [`refine`], [`update_messages`],
 //! [`select_labels`].
 
 mod coarsen;

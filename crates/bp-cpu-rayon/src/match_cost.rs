@@ -43,8 +43,8 @@ pub(crate) fn match_cost(matching: &Matching<'_>, costs: &mut Costs) {
 impl Matching<'_> {
     /// Stores the costs of a row whose profile is narrow, and its unclipped ones too if asked.
     pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
-        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
-        // To take off a node's least cost changes no message; it only makes room for sums in 8 bits.
+        let row = Row { matching: self, y };
+        // Neither taking off a node's least cost nor clipping changes a message; both only make room for sums in 8 bits.
         let model = self.plan.model();
         let fits = model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into();
         if fits && sums.is_none() {
@@ -57,19 +57,20 @@ impl Matching<'_> {
 
     /// The unclipped costs of a row whose profile is narrow.
     pub(crate) fn unclipped_row(&self, y: usize, raw: &mut [u8]) {
-        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
+        let row = Row { matching: self, y };
         dispatch!(self.level, simd => row.unclipped(simd, raw));
     }
 
     fn wide_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u16]>) {
-        let row = Row { plan: self.plan, layout: self.layout, features: self.features, y };
+        let row = Row { matching: self, y };
         dispatch!(self.level, simd => planes(simd, &row, stored, sums, |row, place, label| {
             row.sum_of_differences(place, label)
         }));
         self.fix(y, stored);
     }
 
-    /// Fixes the costs of the nodes around a known match, see [`Seed`].
+    /// Fixes the costs of the nodes around a known match, see [`Seed`]. Sums need no fixing: an image with a cut has one
+    /// grid.
     fn fix(&self, y: usize, row: &mut [u8]) {
         let Some(seed) = self.seed else { return };
         let layout = self.layout;
@@ -85,9 +86,7 @@ impl Matching<'_> {
 
 /// A row to be matched.
 struct Row<'a> {
-    plan: &'a Plan,
-    layout: &'a Layout,
-    features: &'a Features,
+    matching: &'a Matching<'a>,
     y: usize,
 }
 
@@ -100,7 +99,7 @@ fn planes<S: Simd, T: Sum>(
     mut keep: Option<&mut [T]>,
     cost: impl Fn(&Row<'_>, (usize, usize), usize) -> [T; BLOCK],
 ) {
-    let (layout, clip) = (row.layout, row.plan.clip(0));
+    let (layout, clip) = (row.matching.layout, row.matching.plan.clip(0));
     simd.vectorize(
         #[inline(always)]
         || {
@@ -130,14 +129,14 @@ impl Row<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let bytes = self.layout.plane();
+                let bytes = self.matching.layout.plane();
                 for (plane, stored) in stored.chunks_exact_mut(bytes).enumerate() {
                     let mut keep = keep.as_mut().map(|keep| &mut keep[plane * bytes..][..bytes]);
-                    for strip in self.layout.strips(plane) {
+                    for strip in self.matching.layout.strips(plane) {
                         let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
                         let least = self.costs(simd, plane, strip, raw);
-                        let clip = self.plan.clip(0);
-                        costs::normalise(simd, self.layout, strip, clip, &least, keep.as_deref(), stored);
+                        let clip = self.matching.plan.clip(0);
+                        costs::normalise(simd, self.matching.layout, strip, clip, &least, keep.as_deref(), stored);
                     }
                 }
             },
@@ -150,8 +149,8 @@ impl Row<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                for (plane, raw) in raw.chunks_exact_mut(self.layout.plane()).enumerate() {
-                    for strip in self.layout.strips(plane) {
+                for (plane, raw) in raw.chunks_exact_mut(self.matching.layout.plane()).enumerate() {
+                    for strip in self.matching.layout.strips(plane) {
                         self.costs(simd, plane, strip, raw);
                     }
                 }
@@ -161,7 +160,7 @@ impl Row<'_> {
 
     #[inline(always)]
     fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
-        if self.plan.model().profile() == Profile::Census {
+        if self.matching.plan.model().profile() == Profile::Census {
             self.strip(simd, plane, strip, raw, hamming_distance::<S>)
         } else {
             self.strip(simd, plane, strip, raw, truncated_difference::<S>)
@@ -178,16 +177,17 @@ impl Row<'_> {
         raw: &mut [u8],
         cost: impl Fn(S, S::u8s, S::u8s) -> S::u8s,
     ) -> [u8; STRIP] {
-        let outside = S::u8s::splat(simd, self.plan.model().profile().out_of_range_cost() as u8);
-        let left = &self.features.left(self.y, 0, plane)[at..at + lanes];
-        let node = &self.features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
-        let right = [0, 1].map(|parity| (self.features.right(self.y, 0, parity), self.features.inside(parity)));
+        let outside = S::u8s::splat(simd, self.matching.plan.model().profile().out_of_range_cost() as u8);
+        let left = &self.matching.features.left(self.y, 0, plane)[at..at + lanes];
+        let node = &self.matching.features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
+        let right = [0, 1]
+            .map(|parity| (self.matching.features.right(self.y, 0, parity), self.matching.features.inside(parity)));
         let mut least = [u8::MAX; STRIP];
-        for label in 0..self.layout.labels {
-            let raw = &mut raw[label * self.layout.lanes + at..][..lanes];
+        for label in 0..self.matching.layout.labels {
+            let raw = &mut raw[label * self.matching.layout.lanes + at..][..lanes];
             for lane in (0..lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
-                let (parity, start) = self.matching(plane, at + lane, label);
+                let (parity, start) = self.lanes(plane, at + lane, label);
                 let (right, inside) = (load(right[parity].0, start), load(right[parity].1, start));
                 let cost = cost(simd, load(left, lane), right) & inside | outside & !inside;
                 let cost = cost & load(node, lane);
@@ -201,7 +201,7 @@ impl Row<'_> {
     /// Sum over the channels of the differences.
     #[inline(always)]
     fn sum_of_differences(&self, place: (usize, usize), label: usize) -> [u16; BLOCK] {
-        let outside = self.plan.model().profile().out_of_range_cost();
+        let outside = self.matching.plan.model().profile().out_of_range_cost();
         let mut sum = [0; BLOCK];
         for channel in 0..3 {
             let Block { left, right, .. } = self.block(place, label, channel);
@@ -220,23 +220,23 @@ impl Row<'_> {
     /// Which lanes of the right image the nodes of `plane` from lane `at` on match under a label: the parity of their
     /// columns, and where they start in [`Features::right`].
     #[inline(always)]
-    fn matching(&self, plane: usize, at: usize, label: usize) -> (usize, usize) {
+    fn lanes(&self, plane: usize, at: usize, label: usize) -> (usize, usize) {
         // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
-        let shift = plane as i64 - i64::from(self.plan.model().disparity(label as u16));
+        let shift = plane as i64 - i64::from(self.matching.plan.model().disparity(label as u16));
         let (parity, shift) = ((shift & 1) as usize, shift >> 1);
-        let nodes = self.layout.nodes(parity) as i64;
+        let nodes = self.matching.layout.nodes(parity) as i64;
         (parity, ((at as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
     }
 
     /// The features that a block of nodes of a plane compares under a label.
     #[inline(always)]
     fn block(&self, (plane, at): (usize, usize), label: usize, channel: usize) -> Block<'_> {
-        let (parity, start) = self.matching(plane, at, label);
+        let (parity, start) = self.lanes(plane, at, label);
         Block {
-            left: block(self.features.left(self.y, channel, plane), at),
-            right: block(self.features.right(self.y, channel, parity), start),
-            inside: block(self.features.inside(parity), start),
-            node: block(self.features.inside(plane), at + BLOCK),
+            left: block(self.matching.features.left(self.y, channel, plane), at),
+            right: block(self.matching.features.right(self.y, channel, parity), start),
+            inside: block(self.matching.features.inside(parity), start),
+            node: block(self.matching.features.inside(plane), at + BLOCK),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Labels: those of least belief, or in sequence, given the labels already decided.
 
-use bp_core::{Model, Plan, Schedule, Side};
+use bp_core::{MAX_TRUNCATION, Model, Plan, Schedule, Side};
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
@@ -10,12 +10,12 @@ use crate::{
     refine::slot,
 };
 
-/// Labels that are compared at a time: as many as let the distances to decided labels, which count up to
-/// [`FAR`] only, stay within 8 bits.
-const CHUNK: usize = 128;
-
 /// A distance of labels that costs the truncation whatever the slope is, unless that is 0.
-const FAR: usize = 64;
+const FAR: usize = MAX_TRUNCATION as usize + 1;
+
+/// Labels that are compared at a time: as many as let distances to decided labels, clamped to [`FAR`] beyond either end,
+/// stay within 8 bits.
+const CHUNK: usize = 256 - 2 * FAR;
 
 /// What labels are read off: rows of a grid from row `first` on.
 pub(crate) struct Answer<'a> {
@@ -62,15 +62,18 @@ impl<'a> Answer<'a> {
     }
 
     fn received(&self, (plane, y): (usize, usize), side: Side) -> Received<'a> {
+        let [none, _] = self.layout.none_and_all();
         match self.received[(plane + y) % 2].towards(side, plane, y) {
             Some(values) => (values, self.mask(plane, side)),
-            None => (self.layout.zeros(), self.layout.ones()),
+            // Any values will do where none counts.
+            None => (self.costs(plane, y), none),
         }
     }
 
     /// Where the nodes of `plane` have a neighbour on `side`, `[lane]`; of up and down the rows know.
     fn mask(&self, plane: usize, side: Side) -> &'a [u8] {
-        self.layout.masks(plane).get(slot(side, plane)).copied().unwrap_or(self.layout.ones())
+        let [_, all] = self.layout.none_and_all();
+        self.layout.masks(plane).get(slot(side, plane)).copied().unwrap_or(all)
     }
 
     /// Decodes a band after sweeps, from its first row down, even nodes before odd ones.
@@ -81,7 +84,7 @@ impl<'a> Answer<'a> {
             let above_row = above.filter(|_| self.layout.joined_above(y));
             let up = |strip, column| Known {
                 labels: decided(above_row.unwrap_or_default(), column),
-                mask: part(if above_row.is_some() { self.layout.ones() } else { self.layout.zeros() }, strip),
+                mask: part(self.layout.none_and_all()[usize::from(above_row.is_some())], strip),
             };
             let [left, right, _, down] = Side::ALL.map(|side| self.received((even, y), side));
             self.decide((even, y), [left, right, down], |(strip, column), _| [up(strip, column)], row);
@@ -179,7 +182,7 @@ impl Nodes<'_> {
         )
     }
 
-    /// Compares the cost of a label, of which only the last 8 bits are written down, with the best so far.
+    /// Compares the cost of a label, of which its place in the chunk is written down, with the best so far.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
     fn compare<S: Simd, const M: usize, const K: usize>(

@@ -10,13 +10,13 @@ use crate::{
     costs::{self, Costs},
     edges::{self, Edges, Rows},
     features::{self, Features},
-    layout::Layout,
+    layout::{Layout, Shape},
     match_cost::{Matching, is_narrow, match_cost},
     refine::{Coarser, refine},
     select_labels::{Answer, select_labels},
     sweep::{self, Bands, CostSource, Windows},
     update_messages::{Nodes, Sends, update_messages},
-    wavefront::{Chunk, Wavefront, fused_steps},
+    wavefront::{Part, Wavefront, fused_steps},
 };
 
 /// A prepared plan.
@@ -63,7 +63,7 @@ fn largest(plan: &Plan) -> [usize; 2] {
 }
 
 /// Whether the costs of a grid are stored. Those of a swept image are computed as often as needed.
-fn is_stored(plan: &Plan, grid: usize) -> bool {
+pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
     grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
 }
 
@@ -72,10 +72,10 @@ pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
     let kept = largest(plan).into_iter().filter(|&grid| grid < plan.grids());
-    let messages = kept.map(|grid| edges::bytes(&Layout::new(plan, grid)) as u64 * sets(plan, grid) as u64);
+    let messages = kept.map(|grid| edges::bytes(&Shape::new(plan, grid)) as u64 * sets(plan, grid) as u64);
     let labels = 2 * plan.image_size().pixels() as u64;
     let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
-    let layouts = (0..plan.grids()).map(|grid| Layout::new(plan, grid).bytes());
+    let layouts = (0..plan.grids()).map(|grid| Shape::new(plan, grid).layout_bytes());
     let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), sweep::bytes(plan)];
     costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
@@ -93,7 +93,7 @@ impl RayonSolver {
         let decided = if plan.settings().schedule == Schedule::Sweep { plan.image_size().pixels() } else { 0 };
         Ok(Self {
             level,
-            layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect(),
+            layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect::<Result<_, _>>()?,
             features: Features::new(plan.image_size(), plan.model())?,
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
             messages: [messages(even)?, messages(odd)?],
@@ -147,6 +147,13 @@ fn received<'a>(plan: &Plan, layout: &'a Layout, messages: &'a Messages) -> [Row
     })
 }
 
+/// Which way a pass over the rows goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Way {
+    Down,
+    Up,
+}
+
 /// What updating the messages of a grid needs besides those.
 pub(crate) struct Grid<'a> {
     pub(crate) level: Level,
@@ -162,22 +169,17 @@ impl Grid<'_> {
     /// Gives nodes of a plane in row `y`, with which `rows` start, their first messages.
     pub(crate) fn refine(&self, (plane, y): (usize, usize), sides: &[Side], rows: &mut [u8]) {
         let mut slots = edges::slots(self.layout, rows, plane);
-        refine(self.level, self.plan, self.layout, self.coarser, (plane, y), sides, &mut slots.slots);
+        refine(self.level, self.plan, self.layout, self.coarser, (plane, y), sides, &mut slots);
     }
 
-    /// Lets nodes of a plane in row `y` send.
-    pub(crate) fn send(&self, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane).slots;
+    /// Lets nodes of a plane in row `y`, with which `rows` start, send in a pass that goes some way.
+    pub(crate) fn send(&self, way: Way, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
+        let mut slots = edges::slots(self.layout, rows, plane);
         self.drop_missing(y, &mut slots);
+        if way == Way::Up {
+            slots.swap(2, 3);
+        }
         update_messages(self.level, sends, &self.nodes(plane, y), slots);
-    }
-
-    /// The same with up in place of down.
-    pub(crate) fn send_up(&self, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane).slots;
-        self.drop_missing(y, &mut slots);
-        let [same, next, up, down] = slots;
-        update_messages(self.level, sends, &self.nodes(plane, y), [same, next, down, up]);
     }
 
     fn nodes(&self, plane: usize, y: usize) -> Nodes<'_> {
@@ -206,7 +208,7 @@ impl Grid<'_> {
 /// `last` is the half-step that goes to the second set.
 fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&mut [u8]; 2], last: Option<usize>) {
     let row_bytes = edges::row_bytes(grid.layout);
-    let [set, other] = sets.map(|rows| Chunk { row_bytes: if rows.is_empty() { 0 } else { row_bytes }, rows });
+    let [set, other] = sets.map(|rows| Part { row_bytes: if rows.is_empty() { 0 } else { row_bytes }, rows });
     let step = |[rows, other]: [&mut [u8]; 2], y: usize, t: usize| {
         let t = steps.start + t;
         let place = ((y + t + sends_first) % 2, y);
@@ -215,9 +217,9 @@ fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&
         }
         if last == Some(t) {
             edges::copy(grid.layout, rows, other, place.0);
-            grid.send(place, Sends::All, other);
+            grid.send(Way::Down, place, Sends::All, other);
         } else {
-            grid.send(place, Sends::All, rows);
+            grid.send(Way::Down, place, Sends::All, rows);
         }
     };
     Wavefront { height: grid.layout.size.height, steps: steps.len() }.run([set, other], &step);

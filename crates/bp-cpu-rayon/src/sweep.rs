@@ -2,22 +2,22 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use bp_core::{BAND_ROWS, Error, Plan, Side, memory};
+use bp_core::{BAND_ROWS, Error, Plan, Schedule, Side, memory};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::{
     edges::{self, Edges, Rows},
-    layout::Layout,
+    layout::{Layout, Shape},
     match_cost::Matching,
     refine::Coarser,
     select_labels::Answer,
-    solver::Grid,
+    solver::{Grid, Way, is_stored},
     update_messages::Sends,
 };
 
-/// What one thread needs to sweep a band: room for its costs and messages, which are used up there. The image's never
-/// leave the cache.
+/// What one thread needs to sweep a band: room for its costs and messages, which are used up there. Those of the image
+/// are never stored as a whole.
 pub(crate) struct Window {
     /// Costs of the rows of a band, where those of the grid are not stored.
     pub(crate) costs: Vec<u8>,
@@ -25,33 +25,36 @@ pub(crate) struct Window {
     edges: Vec<u8>,
 }
 
-/// A window for every thread.
+/// Windows for the threads that may sweep at once.
 pub(crate) struct Windows {
     windows: Vec<Mutex<Window>>,
 }
 
-/// How many windows are held: one for each thread that may work at once, none where nothing is swept.
-pub(crate) fn windows(plan: &Plan) -> usize {
+/// How many windows are held: one for each thread of the pool, but no more than there are bands, and none where nothing
+/// is swept.
+fn windows(plan: &Plan) -> usize {
     let bands = plan.image_size().height.div_ceil(BAND_ROWS);
-    if plan.settings().schedule == bp_core::Schedule::Sweep { rayon::current_num_threads().min(bands) } else { 0 }
+    if plan.settings().schedule == Schedule::Sweep { rayon::current_num_threads().min(bands) } else { 0 }
 }
 
 /// Bytes of costs and of edges of a window.
-fn window_bytes(layout: &Layout) -> [usize; 2] {
-    let rows = BAND_ROWS.min(layout.size.height).max(2);
-    [rows.saturating_mul(layout.row()), (rows + 1).saturating_mul(edges::row_bytes(layout))]
+fn window_bytes(plan: &Plan) -> [usize; 2] {
+    let shape = Shape::new(plan, 0);
+    let rows = BAND_ROWS.min(shape.size.height);
+    let costs = if is_stored(plan, 0) { 0 } else { rows.saturating_mul(shape.row()) };
+    [costs, (rows + 1).saturating_mul(edges::row_bytes(&shape))]
 }
 
 /// Bytes that [`Windows`] hold, predicted.
 pub(crate) fn bytes(plan: &Plan) -> u64 {
-    let [costs, edges] = window_bytes(&Layout::new(plan, 0)).map(|bytes| bytes as u64);
+    let [costs, edges] = window_bytes(plan).map(|bytes| bytes as u64);
     (windows(plan) as u64).saturating_mul(costs.saturating_add(edges))
 }
 
 impl Windows {
     /// Room for the threads of the pool that this is called in.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
-        let [costs, edges] = window_bytes(&Layout::new(plan, 0));
+        let [costs, edges] = window_bytes(plan);
         let window = |_| {
             let (costs, edges) = (memory::filled("data cost", costs, 0)?, memory::filled("messages", edges, 0)?);
             Ok(Mutex::new(Window { costs, edges }))
@@ -59,11 +62,14 @@ impl Windows {
         Ok(Self { windows: (0..windows(plan)).map(window).collect::<Result<_, Error>>()? })
     }
 
-    /// Works in a window of this thread's. Should there be more threads than windows, some wait.
+    /// Works in a free window. Only in a larger pool than the plan was prepared in can there be none, and a thread waits.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
-        let index = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
+        let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
+        let (before, after) = self.windows.split_at(own);
+        let free = after.iter().chain(before).find_map(|window| window.try_lock().ok());
         // A window holds nothing that outlives a band, so that a panic in another band did it no harm.
-        work(&mut self.windows[index].lock().unwrap_or_else(PoisonError::into_inner))
+        let mut window = free.unwrap_or_else(|| self.windows[own].lock().unwrap_or_else(PoisonError::into_inner));
+        work(&mut window)
     }
 
     /// Bytes held.
@@ -160,7 +166,7 @@ impl Band<'_> {
     fn pass(&self, first_loop: bool, rows: &mut [u8]) {
         let row_bytes = edges::row_bytes(self.grid.layout);
         for plane in 0..2 {
-            edges::slots(self.grid.layout, rows, plane).slots[2].fill(0);
+            edges::slots(self.grid.layout, rows, plane)[2].fill(0);
         }
         for y in self.first..=self.last {
             self.forward(y, first_loop, &mut rows[(y - self.first) * row_bytes..]);
@@ -179,18 +185,18 @@ impl Band<'_> {
                 self.grid.refine((odd, y), &[Side::Down], rows);
             }
         }
-        self.grid.send((even, y), if last { Sends::Sides } else { Sends::SidesAndDown }, rows);
+        self.grid.send(Way::Down, (even, y), if last { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !last {
-            self.grid.send((odd, y), Sends::Down, rows);
+            self.grid.send(Way::Down, (odd, y), Sends::On, rows);
         }
     }
 
     /// Odd nodes send to both sides and up, then even ones up; the first row sends nothing up.
     fn backward(&self, y: usize, rows: &mut [u8]) {
         let (even, odd, first) = (y % 2, 1 - y % 2, y == self.first);
-        self.grid.send_up((odd, y), if first { Sends::Sides } else { Sends::SidesAndDown }, rows);
+        self.grid.send(Way::Up, (odd, y), if first { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !first {
-            self.grid.send_up((even, y), Sends::Down, rows);
+            self.grid.send(Way::Up, (even, y), Sends::On, rows);
         }
     }
 }

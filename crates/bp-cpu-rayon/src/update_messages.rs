@@ -9,10 +9,10 @@ pub(crate) enum Sends {
     All,
     /// Those to both sides.
     Sides,
-    /// Those to both sides and down.
-    SidesAndDown,
-    /// The one down.
-    Down,
+    /// Those to both sides and the one on, the way that a pass goes.
+    SidesAndOn,
+    /// The one on.
+    On,
 }
 
 /// What nodes send from.
@@ -37,39 +37,35 @@ impl Nodes<'_> {
     }
 }
 
-/// Sends messages, in place: each takes the place of the one that came over the same edge. To send up, exchange the last
-/// two slots.
+/// Sends messages, in place: each takes the place of the one that came over the same edge. The last slot is the one on;
+/// for a pass upwards the last two are exchanged.
 pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     match sends {
         Sends::All => dispatch!(level, simd => row::<_, true, true, true>(simd, nodes, slots)),
         Sends::Sides => dispatch!(level, simd => row::<_, true, false, false>(simd, nodes, slots)),
-        Sends::SidesAndDown => dispatch!(level, simd => row::<_, true, false, true>(simd, nodes, slots)),
-        Sends::Down => dispatch!(level, simd => row::<_, false, false, true>(simd, nodes, slots)),
+        Sends::SidesAndOn => dispatch!(level, simd => row::<_, true, false, true>(simd, nodes, slots)),
+        Sends::On => dispatch!(level, simd => row::<_, false, false, true>(simd, nodes, slots)),
     }
 }
 
 /// Two vectors at a time as long as there are nodes for them, then one, then narrow ones.
 #[inline(always)]
-fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    slots: [&mut [u8]; 4],
-) {
+fn row<S: Simd, const SIDES: bool, const UP: bool, const ON: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     let [same, next, up, down] = slots;
     // One length for all, known before the loops, spares a check at every access.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
     while at + 2 * S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 2, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 2, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += 2 * S::u8s::LEN;
     }
     while at + S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 1, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 1, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += S::u8s::LEN;
     }
     while at < nodes.nodes {
-        vectors::<S, u8x16<S>, 1, SIDES, UP, DOWN>(simd, nodes, &mut slots, at);
+        vectors::<S, u8x16<S>, 1, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += u8x16::<S>::LEN;
     }
 }
@@ -77,7 +73,7 @@ fn row<S: Simd, const SIDES: bool, const UP: bool, const DOWN: bool>(
 /// `W` vectors of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
 /// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
 #[inline(always)]
-fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const DOWN: bool>(
+fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const ON: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
@@ -86,7 +82,7 @@ fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const DOWN: 
     S: Simd,
     V: SimdInt<S, Element = u8>,
 {
-    let sent = [SIDES, SIDES, UP, DOWN];
+    let sent = [SIDES, SIDES, UP, ON];
     let least = pass_up::<S, V, W>(simd, nodes, sent, slots, at);
     pass_down::<S, V, W>(simd, nodes, sent, slots, at, least);
 }

@@ -3,14 +3,14 @@
 use std::ops::Range;
 
 /// Bytes of rows that one thread keeps in reach: more steps at a time need more rows.
-const WINDOW: usize = 6 << 20;
+const REACH: usize = 6 << 20;
 
 /// Most steps at a time; more than that save nothing.
 const MOST_STEPS: usize = 16;
 
 /// How many steps to run at a time over rows of so many bytes: each step holds one row more.
 pub(crate) fn fused_steps(row_bytes: usize) -> usize {
-    (WINDOW / row_bytes.max(1)).clamp(1, MOST_STEPS)
+    (REACH / row_bytes.max(1)).clamp(1, MOST_STEPS)
 }
 
 /// The rows of a grid, for steps that read and write row y and the one after it, and that need both neighbours of row y
@@ -27,44 +27,44 @@ impl Wavefront {
     /// Calls `step(rows, y, t)` for every row y and step t, with the rows of each buffer from row y on. Buffers hold one
     /// row more than the grid has.
     ///
-    /// Rows are split into bands. First each band makes those steps that need no other band: a row less at each seam
-    /// with every step. Then the gaps at the seams are filled. What is computed does not depend on how many bands there
+    /// Rows are split into slabs. First each slab makes those steps that need no other slab: a row less at each gap
+    /// with every step. Then the gaps between slabs are filled. What is computed does not depend on how many slabs there
     /// are.
     pub(crate) fn run<const N: usize>(
         self,
-        buffers: [Chunk<'_>; N],
+        buffers: [Part<'_>; N],
         step: &(impl Fn([&mut [u8]; N], usize, usize) + Sync),
     ) {
-        let band = self.band();
-        let last = (self.height - 1) / band;
+        let slab = self.slab();
+        let last = (self.height - 1) / slab;
         let mut buffers = buffers;
-        let bands = buffers.each_mut().map(Chunk::reborrow);
-        each_band(bands, 0..last + 1, band, &|rows, index| {
-            let (first, end) = (index * band, (index + 1) * band);
+        let slabs = buffers.each_mut().map(Part::reborrow);
+        each_slab(slabs, 0..last + 1, slab, &|rows, index| {
+            let (first, end) = (index * slab, (index + 1) * slab);
             let range = |t| {
                 let from = if index == 0 { 0 } else { first + t };
                 from..if index == last { self.height } else { end - 1 - t }
             };
             self.skewed(rows, first, range, step);
         });
-        let seams = buffers.map(|buffer| buffer.split_at(band / 2).1);
-        each_band(seams, 0..last, band, &|rows, index| {
-            let seam = (index + 1) * band;
-            self.skewed(rows, index * band + band / 2, |t| seam - 1 - t..(seam + t).min(self.height), step);
+        let gaps = buffers.map(|buffer| buffer.split_at(slab / 2).1);
+        each_slab(gaps, 0..last, slab, &|rows, index| {
+            let gap = (index + 1) * slab;
+            self.skewed(rows, index * slab + slab / 2, |t| gap - 1 - t..(gap + t).min(self.height), step);
         });
     }
 
-    /// Rows of a band: enough for the gaps at two seams, else as few as give each thread two bands.
-    fn band(self) -> usize {
+    /// Rows of a slab: enough for the gaps at two gaps, else as few as give each thread two slabs.
+    fn slab(self) -> usize {
         let threads = rayon::current_num_threads();
-        let bands = if threads == 1 { 1 } else { 2 * threads };
-        self.height.div_ceil(bands).max(2 * self.steps)
+        let slabs = if threads == 1 { 1 } else { 2 * threads };
+        self.height.div_ceil(slabs).max(2 * self.steps)
     }
 
     /// Makes the steps on `range(t)` of the rows: step t follows step t - 1 one row behind. `rows` start at row `first`.
     fn skewed<const N: usize>(
         self,
-        mut rows: [Chunk<'_>; N],
+        mut rows: [Part<'_>; N],
         first: usize,
         range: impl Fn(usize) -> Range<usize>,
         step: &impl Fn([&mut [u8]; N], usize, usize),
@@ -80,16 +80,16 @@ impl Wavefront {
 }
 
 /// Some rows of a buffer.
-pub(crate) struct Chunk<'a> {
+pub(crate) struct Part<'a> {
     /// The rows.
     pub(crate) rows: &'a mut [u8],
     /// Bytes of one.
     pub(crate) row_bytes: usize,
 }
 
-impl<'a> Chunk<'a> {
-    fn reborrow(&mut self) -> Chunk<'_> {
-        Chunk { rows: self.rows, row_bytes: self.row_bytes }
+impl<'a> Part<'a> {
+    fn reborrow(&mut self) -> Part<'_> {
+        Part { rows: self.rows, row_bytes: self.row_bytes }
     }
 
     fn starting_at(&mut self, row: usize) -> &mut [u8] {
@@ -104,29 +104,29 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// Calls `f(rows, index)` for every band of `band` rows, on several threads; the last one has all rows that are left.
-pub(crate) fn each_band<const N: usize>(
-    buffers: [Chunk<'_>; N],
-    bands: Range<usize>,
-    band: usize,
-    f: &(impl Fn([Chunk<'_>; N], usize) + Sync),
+/// Calls `f(rows, index)` for every slab of `slab` rows, on several threads; the last one has all rows that are left.
+pub(crate) fn each_slab<const N: usize>(
+    buffers: [Part<'_>; N],
+    slabs: Range<usize>,
+    slab: usize,
+    f: &(impl Fn([Part<'_>; N], usize) + Sync),
 ) {
-    match bands.len() {
+    match slabs.len() {
         0 => {}
-        1 => f(buffers, bands.start),
+        1 => f(buffers, slabs.start),
         several => {
-            let middle = bands.start + several / 2;
+            let middle = slabs.start + several / 2;
             let mut second = [const { None }; N];
             let mut index = 0;
             let first = buffers.map(|buffer| {
-                let (first, rest) = buffer.split_at(several / 2 * band);
+                let (first, rest) = buffer.split_at(several / 2 * slab);
                 second[index] = Some(rest);
                 index += 1;
                 first
             });
-            let second = second.map(|rest| rest.unwrap_or(Chunk { rows: &mut [], row_bytes: 0 }));
-            let halves = (bands.start..middle, middle..bands.end);
-            rayon::join(|| each_band(first, halves.0, band, f), || each_band(second, halves.1, band, f));
+            let second = second.map(|rest| rest.unwrap_or(Part { rows: &mut [], row_bytes: 0 }));
+            let halves = (slabs.start..middle, middle..slabs.end);
+            rayon::join(|| each_slab(first, halves.0, slab, f), || each_slab(second, halves.1, slab, f));
         }
     }
 }

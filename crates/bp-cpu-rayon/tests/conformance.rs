@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, Cut, MessageStart, Model, Plan, Profile, Schedule, Settings,
+    Algorithm, Backend, Cut, MAX_GRIDS, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings,
     conformance::{Answer, Case, assert_conforms, assert_same, noise_pair, solve},
 };
 use bp_cpu_rayon::Rayon;
@@ -29,9 +29,10 @@ fn every_instruction_set_conforms() {
 }
 
 fn any_model() -> impl Strategy<Value = Model> {
-    let labels = prop_oneof![1..40_usize, Just(127), Just(129), Just(300), Just(512)];
+    let labels = prop_oneof![1..40_usize, Just(127), Just(129), Just(300), Just(512), Just(1024)];
     let smoothness = prop::option::of((any::<u8>(), prop_oneof![0..=63_u8, Just(63)]));
-    (prop::sample::select(Profile::ALL.to_vec()), labels, smoothness, -40..60_i32).prop_map(
+    let min = prop_oneof![8 => -40..60_i32, 1 => Just(1 << 24), 1 => Just(-(1 << 24))];
+    (prop::sample::select(Profile::ALL.to_vec()), labels, smoothness, min).prop_map(
         |(profile, labels, smoothness, min)| {
             let model = Model::new(profile, labels).unwrap().with_min_disparity(min).unwrap();
             smoothness.map_or(model, |(slope, truncation)| model.with_smoothness(slope, truncation).unwrap())
@@ -43,7 +44,8 @@ fn any_settings(width: usize, height: usize) -> impl Strategy<Value = Settings> 
     let schedule = prop::sample::select(Schedule::ALL.to_vec());
     let start = prop::sample::select(MessageStart::ALL.to_vec());
     let cut = prop::option::weighted(0.3, (0..width, 0..height, any::<bool>()));
-    (1..6_usize, 1..25_u32, schedule, start, cut, any::<bool>()).prop_map(
+    let grids = prop_oneof![8 => 1..6_usize, 1 => Just(13), 1 => Just(MAX_GRIDS)];
+    (grids, 1..25_u32, schedule, start, cut, any::<bool>()).prop_map(
         |(grids, steps, schedule, start, cut, coarse_clip)| {
             let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
             let sweep = schedule == Schedule::Sweep;
@@ -94,6 +96,22 @@ fn a_large_image_is_the_same_on_any_number_of_threads() {
         for (device, pool) in (0..Rayon.devices().len()).flat_map(|device| (0..4).map(move |pool| (device, pool))) {
             assert!(solve_on(device, pool, &case) == expected, "{device} {pool} {:?}", case.plan.settings());
         }
+    }
+}
+
+/// What was prepared for one thread is swept by eight, and the other way round.
+#[test]
+fn a_matcher_may_move_to_another_pool() {
+    let pair = noise_pair(90, 200, 4);
+    let model = Model::new(Profile::Thesis, 9).unwrap();
+    let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+    let case = Case { plan: Plan::new(pair.size(), model, settings).unwrap(), pair };
+    let expected = solve(&Scalar, &case).unwrap().labels;
+    let device = Rayon.open(0).unwrap();
+    for (prepared, used) in [(0, 3), (3, 0)] {
+        let mut matcher = POOLS[prepared].install(|| Matcher::new(device.as_ref(), case.plan.clone())).unwrap();
+        POOLS[used].install(|| matcher.solve(&case.pair)).unwrap();
+        assert_eq!(matcher.labels(), expected);
     }
 }
 

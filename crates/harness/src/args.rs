@@ -99,7 +99,7 @@ pub(crate) struct PlanArgs {
     /// Backend; NAME:INDEX for another than its first device.
     #[arg(long, default_value = backends::DEFAULT, value_name = "NAME")]
     pub(crate) backend: String,
-    /// Threads of the backend rayon. [default: one a core]
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
     /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
@@ -212,7 +212,7 @@ pub(crate) struct ReproduceArgs {
     /// Backends, separated by commas; NAME:INDEX for another than a backend's first device.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
-    /// Threads of the backend rayon. [default: one a core]
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
     /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]

@@ -1,4 +1,5 @@
-//! Ctrl-C and progress: a run is stopped between two steps, so that nothing is left half done.
+//! Ctrl-C and progress: a run is stopped between two steps (all loops of a grid that is swept are one), so that nothing
+//! is left half done.
 
 use std::{
     ops::ControlFlow,

@@ -2,7 +2,8 @@
 
 use crate::{backends::Opened, failure::Failure};
 
-/// Runs `work` on a worker of a pool of so many threads, by default one a core. The rayon backend works in the pool
+/// Runs `work` on a worker of a pool of so many threads, by default as many as RAYON_NUM_THREADS
+/// says, else one a processor. The rayon backend works in the pool
 /// that it is called in; called from one of its workers, it need not hand every kernel over to another thread.
 pub(crate) fn run_on<T: Send>(
     threads: Option<u16>,
