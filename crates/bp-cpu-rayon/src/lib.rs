@@ -6,10 +6,10 @@
 //! for every thread, so that the pool in which a plan is prepared says how many can sweep at once, and the one in which
 //! memory is predicted for how many.
 //!
-//! [`layout`] says how values lie in memory, [`edges`] why one message an edge is enough, [`wavefront`] how several
-//! steps pass over the image at once, [`sweep`] how a band is swept by itself, [`features`] what is compared. One file a
-//! kernel: [`match_cost`], [`coarsen`], [`refine`], [`update_messages`],
-//! [`select_labels`].
+//! `layout` says how values lie in memory, `edges` why one message an edge is enough, `wavefront` how several
+//! steps pass over the image at once, `sweep` how a band is swept by itself, `features` what is compared. One file a
+//! kernel: `match_cost`, `coarsen`, `refine`, `update_messages`,
+//! `select_labels`.
 
 mod coarsen;
 mod costs;
