@@ -50,12 +50,12 @@ pub(crate) fn slot(side: Side, plane: usize) -> usize {
 /// Where fine nodes take their first messages from: those of lane i from lane i div 2 of `planes[i % 2]`.
 struct Source<'a> {
     lanes: usize,
-    planes: [Received<'a>; 2],
+    planes: [Parents<'a>; 2],
 }
 
-/// What a plane of a coarse row received.
-struct Received<'a> {
-    /// `[label][lane]`.
+/// The nodes of a coarse row and plane that messages are taken from.
+struct Parents<'a> {
+    /// What they received, `[label][lane]`.
     values: &'a [u8],
     /// 255 where a lane has a neighbour that sends, else 0, from a block before the first lane on.
     mask: Option<&'a [u8]>,
@@ -79,7 +79,7 @@ fn source<'a>(plan: &Plan, coarser: Coarser<'a>, (plane, y): (usize, usize), sid
         if plan.settings().schedule == Schedule::Sweep { swept(side, y)? } else { columns(side, plane, by_sender) };
     let received = |(plane, moved): (usize, isize)| {
         let mask = matches!(side, Side::Left | Side::Right).then(|| layout.padded_masks(plane)[slot(side, plane)]);
-        Some(Received { values: coarser.received[(plane + y) % 2].towards(side, plane, y)?, mask, moved })
+        Some(Parents { values: coarser.received[(plane + y) % 2].towards(side, plane, y)?, mask, moved })
     };
     let [even, odd] = columns.map(received);
     Some(Source { lanes: layout.lanes, planes: [even?, odd?] })
@@ -130,7 +130,7 @@ fn expand<S: Simd>(simd: S, layout: &Layout, source: &Source<'_>, plane: usize, 
     );
 }
 
-impl Received<'_> {
+impl Parents<'_> {
     /// The messages of a vector of lanes of the label that starts at `from`; zeros where a lane has no sender.
     #[inline(always)]
     fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> S::u8s {

@@ -112,7 +112,7 @@ impl<'a> Answer<'a> {
         known: impl Fn(((usize, usize), isize), &[u16]) -> [Known<'b>; K],
         row: &mut [u16],
     ) {
-        let nodes = Nodes { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
+        let nodes = Undecided { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
         for strip in self.layout.strips(plane) {
             let column = 2 * strip.0 + plane;
             let known = known((strip, column as isize), row);
@@ -143,13 +143,13 @@ struct Known<'a> {
 }
 
 /// The nodes of one plane in one row.
-struct Nodes<'a> {
+struct Undecided<'a> {
     layout: &'a Layout,
     model: &'a Model,
     costs: &'a [u8],
 }
 
-impl Nodes<'_> {
+impl Undecided<'_> {
     /// Decides a strip of nodes, chunk by chunk of labels, since what is compared has 8 bits.
     #[inline(always)]
     fn strip<S: Simd, const M: usize, const K: usize>(

@@ -58,8 +58,7 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         let (labels, width) = (model.labels(), pair.size().width);
         tell(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
     }
-    let matches_any =
-        |label| (0..pair.size().width).any(|x| model.matching_column(x, label, pair.size().width).is_some());
+    let matches_any = |label| (model.disparity(label).unsigned_abs() as usize) < pair.size().width;
     if !(0..model.labels() as u16).any(matches_any) {
         tell("warning: with this --min-disparity no label matches anything inside the right image");
     }
