@@ -71,7 +71,16 @@ impl Grids<'_> {
     fn rows<F: Sum + Widen<C>, C: Kept>(&self, fine: &[F], coarse: &mut Costs) {
         let Costs { stored, sums } = coarse;
         costs::rows(self.layouts[1], stored, C::of(sums), |y, stored, keep| {
-            dispatch!(self.level, simd => self.row(simd, self.children(fine, y), stored, keep));
+            let (fine_layout, children) = (self.layouts[0], self.children(fine, y));
+            dispatch!(self.level, simd => costs::store(
+                simd,
+                self.layouts[1],
+                self.clip,
+                #[inline(always)]
+                |place, label| sum_children(fine_layout, children, place, label),
+                stored,
+                keep,
+            ));
         });
     }
 
@@ -148,37 +157,6 @@ impl Grids<'_> {
         }
         least
     }
-
-    /// One row of the coarse grid from its two of the fine one; the second may be missing.
-    #[inline(always)]
-    fn row<S: Simd, F: Sum + Widen<C>, C: Sum>(
-        &self,
-        simd: S,
-        children: [&[F]; 2],
-        stored: &mut [u8],
-        mut keep: Option<&mut [C]>,
-    ) {
-        let [fine, layout] = self.layouts;
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                for (plane, stored) in stored.chunks_exact_mut(layout.plane()).enumerate() {
-                    let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
-                    for at in (0..layout.nodes(plane)).step_by(BLOCK) {
-                        costs::store(
-                            layout,
-                            self.clip,
-                            at,
-                            #[inline(always)]
-                            |label| sum_children(fine, children, plane, at, label),
-                            stored,
-                            keep.as_deref_mut(),
-                        );
-                    }
-                }
-            },
-        );
-    }
 }
 
 /// Sums of fine lanes over planes and rows; nothing where there are no such lanes.
@@ -199,8 +177,7 @@ fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::
 fn sum_children<F: Sum + Widen<C>, C: Sum>(
     fine: &Layout,
     children: [&[F]; 2],
-    plane: usize,
-    at: usize,
+    (plane, at): (usize, usize),
     label: usize,
 ) -> [C; BLOCK] {
     let mut sums = [C::default(); 2 * BLOCK];

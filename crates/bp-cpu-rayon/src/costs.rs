@@ -125,12 +125,44 @@ macro_rules! widen {
     )* };
 }
 
-widen!(u8 => u8, u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
+widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
-/// Stores a block of nodes: `raw(label)` gives their unclipped costs, `keep` takes those in as well. Called twice for
-/// every label, since what to take off is not known before all have been seen.
+/// Stores a row, block by block: `raw((plane, lane), label)` gives the unclipped costs of a block, `keep` takes those in
+/// as well.
 #[inline(always)]
-pub(crate) fn store<T: Sum>(
+pub(crate) fn store<S: Simd, T: Sum>(
+    simd: S,
+    shape: &Shape,
+    clip: u8,
+    raw: impl Fn((usize, usize), usize) -> [T; BLOCK],
+    stored: &mut [u8],
+    mut keep: Option<&mut [T]>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (plane, stored) in stored.chunks_exact_mut(shape.plane()).enumerate() {
+                let mut keep = keep.as_mut().map(|keep| &mut keep[plane * shape.plane()..][..shape.plane()]);
+                for at in (0..shape.nodes(plane)).step_by(BLOCK) {
+                    let keep = keep.as_deref_mut();
+                    store_block(
+                        shape,
+                        clip,
+                        at,
+                        #[inline(always)]
+                        |label| raw((plane, at), label),
+                        stored,
+                        keep,
+                    );
+                }
+            }
+        },
+    );
+}
+
+/// `raw` is called twice for every label, since what to take off is not known before all have been seen.
+#[inline(always)]
+fn store_block<T: Sum>(
     shape: &Shape,
     clip: u8,
     at: usize,

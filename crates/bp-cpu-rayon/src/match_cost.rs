@@ -4,7 +4,7 @@ use bp_core::{Plan, Profile, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
 use crate::{
-    costs::{self, Costs, Sum, Sums},
+    costs::{self, Costs, Sums},
     features::Features,
     layout::{BLOCK, Layout, STRIP},
 };
@@ -63,9 +63,16 @@ impl Matching<'_> {
 
     fn wide_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u16]>) {
         let row = Row { matching: self, y };
-        dispatch!(self.level, simd => planes(simd, &row, stored, sums, |row, place, label| {
-            row.sum_of_differences(place, label)
-        }));
+        let row = &row;
+        dispatch!(self.level, simd => costs::store(
+            simd,
+            self.layout,
+            self.plan.clip(0),
+            #[inline(always)]
+            |place, label| row.sum_of_differences(place, label),
+            stored,
+            sums,
+        ));
         self.fix(y, stored);
     }
 
@@ -88,38 +95,6 @@ impl Matching<'_> {
 struct Row<'a> {
     matching: &'a Matching<'a>,
     y: usize,
-}
-
-/// Stores the costs of both planes of a row.
-#[inline(always)]
-fn planes<S: Simd, T: Sum>(
-    simd: S,
-    row: &Row<'_>,
-    stored: &mut [u8],
-    mut keep: Option<&mut [T]>,
-    cost: impl Fn(&Row<'_>, (usize, usize), usize) -> [T; BLOCK],
-) {
-    let (layout, clip) = (row.matching.layout, row.matching.plan.clip(0));
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            for (plane, stored) in stored.chunks_exact_mut(layout.plane()).enumerate() {
-                let mut keep = keep.as_mut().map(|keep| &mut keep[plane * layout.plane()..][..layout.plane()]);
-                for at in (0..layout.nodes(plane)).step_by(BLOCK) {
-                    let keep = keep.as_deref_mut();
-                    costs::store(
-                        layout,
-                        clip,
-                        at,
-                        #[inline(always)]
-                        |label| cost(row, (plane, at), label),
-                        stored,
-                        keep,
-                    );
-                }
-            }
-        },
-    );
 }
 
 impl Row<'_> {
