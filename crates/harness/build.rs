@@ -4,7 +4,7 @@ use std::process::Command;
 
 fn main() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-    let sources = ["Cargo.toml", "Cargo.lock", "crates", "bench-data"];
+    let sources = ["Cargo.toml", "Cargo.lock", "crates", "shaders", "bench-data"];
     for source in sources {
         println!("cargo::rerun-if-changed={root}/{source}");
     }

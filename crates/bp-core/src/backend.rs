@@ -13,7 +13,8 @@ pub trait Backend: Sync {
     /// The name used in options and records.
     fn name(&self) -> &'static str;
 
-    /// The devices there are; never fails, and is empty where there is none.
+    /// The devices there are, those expected to be fastest first (see [`DeviceKind`]); never fails, and is empty where
+    /// there is none: [`Backend::open`] then says why.
     fn devices(&self) -> Vec<DeviceInfo>;
 
     /// Opens a device by its index in [`Backend::devices`].
@@ -28,14 +29,60 @@ pub trait Backend: Sync {
 pub struct DeviceInfo {
     /// Name of the device.
     pub name: String,
+    /// What it is.
+    pub kind: DeviceKind,
     /// The interface that reaches it and its version, where there is one.
     pub api: Option<String>,
     /// Its driver and the driver's version, where there is one.
     pub driver: Option<String>,
-    /// Whether a CPU pretends to be a GPU there; its times are never a GPU's.
-    pub software_rasteriser: bool,
+    /// Memory of its own in bytes, where it has some; a processor shares the machine's.
+    pub memory_bytes: Option<u64>,
+    /// The universally unique identifier that its driver gives it, in lower-case hexadecimal with hyphens.
+    pub uuid: Option<String>,
     /// How many threads work at once; 1 for a device that is asked as one.
     pub workers: usize,
+}
+
+/// What a device is, in the order in which devices of a backend are listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum DeviceKind {
+    /// The machine's own processor, asked without detours.
+    Processor,
+    /// A GPU with memory of its own.
+    DiscreteGpu,
+    /// A GPU that shares the machine's memory.
+    IntegratedGpu,
+    /// A GPU lent by a virtual machine.
+    VirtualGpu,
+    /// Something else that computes.
+    Other,
+    /// A processor that pretends to be a GPU; its times are never a GPU's.
+    SoftwareRasteriser,
+}
+
+impl DeviceKind {
+    /// All kinds, in order.
+    pub const ALL: [Self; 6] = [
+        Self::Processor,
+        Self::DiscreteGpu,
+        Self::IntegratedGpu,
+        Self::VirtualGpu,
+        Self::Other,
+        Self::SoftwareRasteriser,
+    ];
+
+    /// The name used in lists and records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Processor => "processor",
+            Self::DiscreteGpu => "discrete GPU",
+            Self::IntegratedGpu => "integrated GPU",
+            Self::VirtualGpu => "virtual GPU",
+            Self::Other => "other device",
+            Self::SoftwareRasteriser => "software rasteriser",
+        }
+    }
 }
 
 /// An open device.
@@ -43,13 +90,23 @@ pub trait Device: Send + Sync {
     /// Allocates everything that solving `plan` needs.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`] and [`Error::Unsupported`], both before anything is allocated where that can be told, and
+    /// those of the device.
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
 
     /// Bytes that [`Device::prepare`] will allocate: by default [`Plan::bytes`]. A device may pad
     /// buffers, or do without some of them.
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         plan.bytes()
+    }
+
+    /// Bytes a second that the device reads and writes, together, while it copies its own memory: what its kernels are
+    /// measured by. `None` where that says nothing.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn copy_rate(&self) -> Result<Option<f64>, Error> {
+        Ok(None)
     }
 }
 
@@ -106,6 +163,17 @@ pub trait Solver: Send {
     /// Time of each stage since the last [`Solver::match_cost`] by the device's own clock, in the order of
     /// [`Stage::ALL`]; `None` where the device has none.
     fn device_times(&mut self) -> Option<[Duration; Stage::ALL.len()]> {
+        None
+    }
+
+    /// Bytes that each stage has to read and write at least since the last [`Solver::match_cost`], each value of a step
+    /// counted once, in the order of [`Stage::ALL`]; `None` where the device does not count.
+    fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        None
+    }
+
+    /// Time that compiling kernels took within [`Device::prepare`], where the device compiles any.
+    fn compile_time(&self) -> Option<Duration> {
         None
     }
 

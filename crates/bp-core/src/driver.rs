@@ -92,6 +92,12 @@ impl Matcher {
         self.solver.allocated_bytes() + memory::bytes(&self.labels)
     }
 
+    /// Time that compiling kernels took within [`Matcher::new`], where the device compiles any.
+    #[must_use]
+    pub fn compile_time(&self) -> Option<Duration> {
+        self.solver.compile_time()
+    }
+
     /// Matches a pair; [`Matcher::labels`] and [`Matcher::disparities`] hold the answer until the next.
     ///
     /// # Errors

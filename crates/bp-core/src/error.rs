@@ -66,12 +66,14 @@ pub enum Error {
     #[error("{0}")]
     Plan(&'static str),
     /// More memory needed than there is.
-    #[error("out of memory: {needed} bytes are needed for {what}")]
+    #[error("out of memory: {needed} bytes are needed for {what}{}", available.map_or_else(String::new, |bytes| format!(" and {bytes} are available")))]
     OutOfMemory {
         /// What the memory was for.
         what: &'static str,
         /// Bytes needed.
         needed: u64,
+        /// Bytes that there are, where that is known.
+        available: Option<u64>,
     },
     /// A device that is not there.
     #[error("backend {backend} has no device {device}: {reason}")]
@@ -81,6 +83,38 @@ pub enum Error {
         /// Index of the device.
         device: usize,
         /// Why.
+        reason: String,
+    },
+    /// A plan beyond what a device is made for, though memory would do.
+    #[error("{device} cannot run this plan: {reason}")]
+    Unsupported {
+        /// Name of the device.
+        device: String,
+        /// Which limit, and what would pass it.
+        reason: String,
+    },
+    /// A device that went away or was reset while it worked; what was prepared on it is lost.
+    #[error("{device} was lost: {reason}")]
+    DeviceLost {
+        /// Name of the device.
+        device: String,
+        /// What its driver says.
+        reason: String,
+    },
+    /// A device that did not answer in time; what was prepared on it is lost.
+    #[error("{device} did not answer within {seconds} s")]
+    Timeout {
+        /// Name of the device.
+        device: String,
+        /// How long it was given.
+        seconds: u64,
+    },
+    /// Any other failure of a device or its driver.
+    #[error("{device}: {reason}")]
+    Device {
+        /// Name of the device.
+        device: String,
+        /// What failed.
         reason: String,
     },
     /// The observer asked to stop.

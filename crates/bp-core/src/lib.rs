@@ -46,7 +46,7 @@ mod settings;
 pub mod synthetic;
 pub mod worked_example;
 
-pub use backend::{Backend, Device, DeviceInfo, Side, Solver};
+pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Side, Solver};
 pub use cost::{DataCost, Seed};
 pub use driver::{Matcher, Observer, Progress, Stage, Times};
 pub use energy::{Energy, cheapest_labels};

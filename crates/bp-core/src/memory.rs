@@ -9,7 +9,7 @@ use crate::Error;
 pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
     let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
-    values.try_reserve_exact(len).map_err(|_| Error::OutOfMemory { what, needed })?;
+    values.try_reserve_exact(len).map_err(|_| Error::OutOfMemory { what, needed, available: None })?;
     values.resize(len, value);
     Ok(values)
 }

@@ -24,7 +24,7 @@ mod sweep;
 mod update_messages;
 mod wavefront;
 
-use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver};
 use fearless_simd::Level;
 
 /// The backend.
@@ -58,9 +58,11 @@ impl Backend for Rayon {
         let threads = if workers == 1 { "1 thread".to_owned() } else { format!("{workers} threads") };
         let info = |(_, name)| DeviceInfo {
             name: format!("CPU, {name}, {threads}"),
+            kind: DeviceKind::Processor,
             api: None,
             driver: None,
-            software_rasteriser: false,
+            memory_bytes: None,
+            uuid: None,
             workers,
         };
         levels().into_iter().map(info).collect()

@@ -16,7 +16,7 @@ mod sums;
 mod sweep;
 mod update_messages;
 
-use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Schedule, Solver};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver};
 
 /// The backend, and its one device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,7 +29,8 @@ impl Backend for Scalar {
 
     fn devices(&self) -> Vec<DeviceInfo> {
         let name = "CPU, 1 thread".to_owned();
-        vec![DeviceInfo { name, api: None, driver: None, software_rasteriser: false, workers: 1 }]
+        let kind = DeviceKind::Processor;
+        vec![DeviceInfo { name, kind, api: None, driver: None, memory_bytes: None, uuid: None, workers: 1 }]
     }
 
     fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {

@@ -26,6 +26,7 @@ Examples:
   bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
   bp evaluate map.png truth.png --scale 2
   bp reproduce --quick
+  bp doctor
 
 Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable, 6 out of memory, 130 interrupted.";
 
@@ -42,6 +43,12 @@ pub(crate) enum Command {
     Report(ReportArgs),
     /// List the scenes and check the files of a data folder.
     Scenes(ScenesArgs),
+    /// List every device of every backend, by the names that --backend takes.
+    Devices(DevicesArgs),
+    /// Check what this machine has, and tell what is missing and which package brings it.
+    Doctor(DoctorArgs),
+    /// Check that backends give the reference's labels and messages, to the bit.
+    Conform(ConformArgs),
 }
 
 /// `bp match`.
@@ -96,9 +103,13 @@ pub(crate) struct PlanArgs {
     /// Data cost, with the smoothness that goes with it.
     #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
     pub(crate) profile: Profile,
-    /// Backend; NAME:INDEX for another than its first device.
+    /// Backend; NAME:DEVICE for another than its first device.
     #[arg(long, default_value = backends::DEFAULT, value_name = "NAME")]
     pub(crate) backend: String,
+    /// Device of the backend, as `bp devices` lists them: its index, a part of its name or the beginning of its UUID.
+    /// [default: its first]
+    #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new())]
+    pub(crate) device: Option<String>,
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
@@ -209,7 +220,8 @@ pub(crate) struct ReproduceArgs {
     /// Small images and few loops: within a minute on two cores. Says so in the output.
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Backends, separated by commas; NAME:INDEX for another than a backend's first device.
+    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device, by its index, a part of
+    /// its name or the beginning of its UUID.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
@@ -242,6 +254,33 @@ pub(crate) struct ScenesArgs {
     /// Which scenes.
     #[command(flatten)]
     pub(crate) data: DataArgs,
+}
+
+/// `bp devices`.
+#[derive(Debug, Args)]
+pub(crate) struct DevicesArgs {
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `bp doctor`.
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Folder of the public data sets.
+    #[arg(long, env = "BP_DATA", value_name = "DIR", value_parser = OsStringValueParser::new().map(PathBuf::from))]
+    pub(crate) data: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `bp conform`.
+#[derive(Debug, Args)]
+pub(crate) struct ConformArgs {
+    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device.
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
 }
 
 fn threads() -> impl TypedValueParser<Value = u16> {

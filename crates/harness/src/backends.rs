@@ -1,40 +1,176 @@
-//! The one list of backends.
+//! The one list of backends, and how options name their devices.
 
-use bp_core::{Backend, Device, DeviceInfo};
+use bp_core::{Backend, Device, DeviceInfo, Error};
 
 use crate::failure::Failure;
 
 /// All backends of this build; the first is the reference.
-const ALL: [&dyn Backend; 2] = [&bp_cpu_scalar::Scalar, &bp_cpu_rayon::Rayon];
+pub(crate) const ALL: &[&dyn Backend] = &[
+    &bp_cpu_scalar::Scalar,
+    &bp_cpu_rayon::Rayon,
+    #[cfg(feature = "vulkan")]
+    &bp_vulkan::Vulkan,
+    #[cfg(feature = "wgpu")]
+    &bp_wgpu::Wgpu,
+];
+
+/// Those that a build may leave out, each by the cargo feature of its name.
+const OPTIONAL: [&str; 2] = ["vulkan", "wgpu"];
 
 /// The backend of commands that name none.
 pub(crate) const DEFAULT: &str = "rayon";
 
 /// An open device.
 pub(crate) struct Opened {
-    /// Its name in options and records: the backend's, with the device's index unless that is 0.
+    /// Its name in options and records, see [`device_name`].
     pub(crate) name: String,
     pub(crate) info: DeviceInfo,
     pub(crate) device: Box<dyn Device>,
 }
 
-/// Opens the device that `name` or `name:index` means.
-pub(crate) fn open(name: &str) -> Result<Opened, Failure> {
-    let failed = |reason: String| Failure::unavailable(format!("--backend {name}: {reason}"));
-    let (backend, index) = match name.split_once(':') {
-        Some((backend, index)) => (backend, index.parse().map_err(|_| failed("the index is no number".to_owned()))?),
-        None => (name, 0),
+/// A backend and one of its devices, not opened yet.
+pub(crate) struct Chosen {
+    /// As for [`Opened`]; what the option says where the backend has no devices.
+    pub(crate) name: String,
+    backend: &'static dyn Backend,
+    index: usize,
+    info: Option<DeviceInfo>,
+}
+
+impl Chosen {
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// Those of [`Backend::open`].
+    pub(crate) fn open(self) -> Result<Opened, Error> {
+        let Self { name, backend, index, info } = self;
+        let device = backend.open(index)?;
+        let unlisted =
+            || Error::Unavailable { backend: backend.name(), device: index, reason: "not listed".to_owned() };
+        Ok(Opened { name, info: info.ok_or_else(unlisted)?, device })
+    }
+}
+
+/// The name of a device in options and records: its backend's, with the device's index unless that is 0.
+pub(crate) fn device_name(backend: &dyn Backend, index: usize) -> String {
+    if index == 0 { backend.name().to_owned() } else { format!("{}:{index}", backend.name()) }
+}
+
+/// The device that `--backend NAME`, `--backend NAME:DEVICE` or `--backend NAME --device DEVICE` means.
+pub(crate) fn choose(option: &str, device: Option<&str>) -> Result<Chosen, Failure> {
+    let (name, after_colon) = option.split_once(':').map_or((option, None), |(name, device)| (name, Some(device)));
+    if let (Some(_), Some(device)) = (after_colon, device) {
+        return Err(Failure::usage(format!(
+            "--backend {option} names a device and --device {device} too: give one of them"
+        )));
+    }
+    let backend = ALL.iter().copied().find(|backend| backend.name() == name).ok_or_else(|| no_backend(name))?;
+    let mut devices = backend.devices();
+    let index = match device.or(after_colon) {
+        // Opening tells why there are none.
+        Some(_) if devices.is_empty() => return Ok(Chosen { name: option.to_owned(), backend, index: 0, info: None }),
+        Some(wanted) => match find(&devices, wanted)[..] {
+            [index] => index,
+            ref found => return Err(not_one(backend, &devices, wanted, found.len())),
+        },
+        None => 0,
     };
-    let known = || ALL.map(Backend::name).join(", ");
-    let backend = ALL.into_iter().find(|known| known.name() == backend);
-    let backend = backend.ok_or_else(|| failed(format!("this build has {}", known())))?;
-    let device = backend.open(index)?;
-    let info = backend.devices().into_iter().nth(index).ok_or_else(|| failed("no such device".to_owned()))?;
-    let name = if index == 0 { backend.name().to_owned() } else { format!("{}:{index}", backend.name()) };
-    Ok(Opened { name, info, device })
+    let info = (index < devices.len()).then(|| devices.swap_remove(index));
+    Ok(Chosen { name: device_name(backend, index), backend, index, info })
+}
+
+/// Opens the device that these options mean.
+pub(crate) fn open(option: &str, device: Option<&str>) -> Result<Opened, Failure> {
+    choose(option, device)?.open().map_err(|error| Failure::unavailable(error.to_string()))
 }
 
 /// The reference backend.
 pub(crate) fn reference() -> Result<Opened, Failure> {
-    open(ALL[0].name())
+    open(ALL[0].name(), None)
+}
+
+/// Why a device could not be opened, where its backend has been named already.
+pub(crate) fn reason(error: Error) -> String {
+    match error {
+        Error::Unavailable { reason, .. } => reason,
+        other => other.to_string(),
+    }
+}
+
+/// The indices of the devices that are meant by their index, their name or a part of it, or the beginning of their UUID.
+fn find(devices: &[DeviceInfo], wanted: &str) -> Vec<usize> {
+    if let Ok(index) = wanted.parse() {
+        return Vec::from_iter((index < devices.len()).then_some(index));
+    }
+    let wanted = wanted.to_lowercase();
+    let all = |is_it: &dyn Fn(&DeviceInfo) -> bool| -> Vec<usize> {
+        (0..devices.len()).filter(|&index| !wanted.is_empty() && is_it(&devices[index])).collect()
+    };
+    // A whole name may be a part of another device's.
+    let named = all(&|device| device.name.to_lowercase() == wanted);
+    let like = |device: &DeviceInfo| {
+        let uuid = device.uuid.as_ref().is_some_and(|uuid| uuid.starts_with(&wanted));
+        uuid || device.name.to_lowercase().contains(&wanted)
+    };
+    if named.is_empty() { all(&like) } else { named }
+}
+
+fn no_backend(name: &str) -> Failure {
+    let known: Vec<_> = ALL.iter().map(|backend| backend.name()).collect();
+    let left_out = OPTIONAL.contains(&name);
+    let advice = if left_out { format!("; build with --features {name}") } else { String::new() };
+    Failure::unavailable(format!("--backend {name}: this build has {}{advice}", known.join(", ")))
+}
+
+/// The failure to find one device, with a list of what there is.
+fn not_one(backend: &dyn Backend, devices: &[DeviceInfo], wanted: &str, found: usize) -> Failure {
+    let line =
+        |(index, device): (usize, &DeviceInfo)| format!("\n  {:<12}{}", device_name(backend, index), device.name);
+    let lines: String = devices.iter().enumerate().map(line).collect();
+    let what =
+        if found == 0 { format!("no device \"{wanted}\"") } else { format!("{found} devices like \"{wanted}\"") };
+    Failure::unavailable(format!("backend {} has {what}; there are:{lines}", backend.name()))
+}
+
+#[cfg(test)]
+mod tests {
+    use bp_core::DeviceKind;
+
+    use super::*;
+
+    fn device(name: &str, uuid: Option<&str>) -> DeviceInfo {
+        DeviceInfo {
+            name: name.to_owned(),
+            kind: DeviceKind::DiscreteGpu,
+            api: None,
+            driver: None,
+            memory_bytes: None,
+            uuid: uuid.map(str::to_owned),
+            workers: 1,
+        }
+    }
+
+    #[test]
+    fn devices_are_found_by_index_name_and_uuid() {
+        let devices = [
+            device("RTX 4090", Some("12ab34cd-0000-4000-8000-000000000000")),
+            device("RTX 4090 D", Some("12ac0000-0000-4000-8000-000000000000")),
+            device("llvmpipe", None),
+        ];
+        for (wanted, found) in [
+            ("1", vec![1]),
+            ("3", vec![]),
+            ("LLVM", vec![2]),
+            ("rtx 4090", vec![0]),
+            ("4090 d", vec![1]),
+            ("rtx", vec![0, 1]),
+            ("12AB", vec![0]),
+            ("12ac0000-0", vec![1]),
+            ("12a", vec![0, 1]),
+            ("", vec![]),
+            ("radeon", vec![]),
+        ] {
+            assert_eq!(find(&devices, wanted), found, "{wanted}");
+        }
+    }
 }

@@ -1,10 +1,48 @@
 //! One file a command, and `plan`, which `bp match` runs.
 
+mod conform;
+mod devices;
+mod doctor;
 pub(crate) mod evaluate;
 pub(crate) mod match_pair;
 mod plan;
 pub(crate) mod scenes;
 
+use std::io::Write;
+
+pub(crate) use conform::conform;
+pub(crate) use devices::devices;
+pub(crate) use doctor::doctor;
 pub(crate) use evaluate::evaluate;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
+
+use crate::failure::Failure;
+
+/// Prints what `--json` asks for.
+fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    serde_json::to_writer_pretty(&mut out, report).map_err(std::io::Error::from)?;
+    Ok(writeln!(out)?)
+}
+
+/// Columns of text for people.
+const COLUMNS: usize = 110;
+
+/// Words in lines, all but the first of which begin with so many spaces.
+fn indented(text: &str, indent: usize) -> String {
+    let (mut lines, mut column) = (String::new(), indent);
+    for word in text.split_whitespace() {
+        let room = column + word.chars().count() < COLUMNS;
+        let gap = if lines.is_empty() {
+            String::new()
+        } else if room {
+            " ".to_owned()
+        } else {
+            format!("\n{:indent$}", "")
+        };
+        column = if room { column } else { indent } + word.chars().count() + 1;
+        lines += &(gap + word);
+    }
+    lines
+}

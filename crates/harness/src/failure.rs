@@ -12,13 +12,14 @@ pub(crate) struct Failure {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    ReaderGone = 0,
-    Other = 1,
-    Usage = 2,
-    Input = 3,
-    Unavailable = 5,
-    OutOfMemory = 6,
-    Interrupted = 130,
+    ReaderGone,
+    Other,
+    Usage,
+    Input,
+    Unavailable,
+    Unsupported,
+    OutOfMemory,
+    Interrupted,
 }
 
 impl Failure {
@@ -61,6 +62,11 @@ impl Failure {
         Self::new(Kind::Unavailable, message)
     }
 
+    /// The same, told of something.
+    pub(crate) fn of(self, what: &str) -> Self {
+        Self { message: format!("{what}: {}", self.message), ..self }
+    }
+
     /// Stopped by the user.
     pub(crate) fn interrupted() -> Self {
         Self::new(Kind::Interrupted, "interrupted")
@@ -69,7 +75,20 @@ impl Failure {
     /// The exit code.
     #[must_use]
     pub(crate) fn code(&self) -> u8 {
-        self.kind as u8
+        match self.kind {
+            Kind::ReaderGone => 0,
+            Kind::Other => 1,
+            Kind::Usage => 2,
+            Kind::Input => 3,
+            Kind::Unavailable | Kind::Unsupported => 5,
+            Kind::OutOfMemory => 6,
+            Kind::Interrupted => 130,
+        }
+    }
+
+    /// Whether the device is there, but the plan is more than it can run.
+    pub(crate) fn is_beyond_device(&self) -> bool {
+        matches!(self.kind, Kind::Unsupported | Kind::OutOfMemory)
     }
 
     /// Whether the user stopped the program.
@@ -83,7 +102,10 @@ impl From<bp_core::Error> for Failure {
         let kind = match &error {
             bp_core::Error::Stopped => Kind::Interrupted,
             bp_core::Error::OutOfMemory { .. } => Kind::OutOfMemory,
-            bp_core::Error::Unavailable { .. } => Kind::Unavailable,
+            bp_core::Error::Unsupported { .. } => Kind::Unsupported,
+            bp_core::Error::Unavailable { .. } | bp_core::Error::DeviceLost { .. } | bp_core::Error::Timeout { .. } => {
+                Kind::Unavailable
+            }
             bp_core::Error::Plan(_)
             | bp_core::Error::Labels { .. }
             | bp_core::Error::Truncation { .. }

@@ -44,6 +44,9 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Reproduce(args) => reproduce::reproduce(args),
         Command::Report(args) => report::command(args),
         Command::Scenes(args) => command::scenes(args),
+        Command::Devices(args) => command::devices(args),
+        Command::Doctor(args) => command::doctor(args),
+        Command::Conform(args) => command::conform(args),
     }
 }
 

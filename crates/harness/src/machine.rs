@@ -2,6 +2,7 @@
 
 use std::{fs, io};
 
+use bp_core::DeviceKind;
 use bytesize::ByteSize;
 use sha2::{Digest, Sha256};
 use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
@@ -14,32 +15,50 @@ use crate::{
 
 /// The machine; `name` replaces the one made from the processor's.
 pub(crate) fn machine(name: Option<&str>) -> Machine {
-    let what = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing()).with_memory(MemoryRefreshKind::everything());
+    let what = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
     // Where the system does not tell, the record says so rather than the run failing.
     let system = System::new_with_specifics(what).ok();
-    let cpu = system.as_ref().and_then(|system| Some(system.cpus().first()?.brand().trim().to_owned()));
+    let cpu = system.and_then(|system| Some(system.cpus().first()?.brand().trim().to_owned()));
     let cpu = cpu.unwrap_or_else(|| "unknown processor".to_owned());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let name = name.map_or_else(|| slug(&format!("{cpu} {cores} cores")), slug);
     let system_name = System::long_os_version().unwrap_or_else(|_| std::env::consts::OS.to_owned());
-    let memory_bytes = system.map_or(0, |system| system.total_memory());
+    let memory_bytes = memory().map_or(0, |memory| memory.total);
     Machine { name, cpu, cores, memory_bytes, system: system_name }
 }
 
-/// Refuses what would not fit into the memory that is allowed, or that is available now, before anything is allocated.
-/// Where the system does not tell how much that is, allocating will.
-pub(crate) fn check_memory(needed: u64, allowed: Option<ByteSize>, advice: &str) -> Result<(), Failure> {
+/// Refuses what would not fit into the memory that is allowed, or that this machine has available now, before anything
+/// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has memory
+/// of its own.
+pub(crate) fn check_memory(
+    kind: DeviceKind,
+    needed: u64,
+    allowed: Option<ByteSize>,
+    advice: &str,
+) -> Result<(), Failure> {
     if let Some(ByteSize(allowed)) = allowed.filter(|allowed| needed > allowed.as_u64()) {
         let what = format!("{needed} bytes are needed and --max-memory allows {allowed}; {advice}");
         return Err(Failure::out_of_memory(what));
     }
-    let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
-    let Ok(system) = System::new_with_specifics(what) else { return Ok(()) };
-    let available = system.available_memory();
+    let Some(Memory { available, .. }) = memory().filter(|_| kind != DeviceKind::DiscreteGpu) else { return Ok(()) };
     if needed <= available {
         return Ok(());
     }
     Err(Failure::out_of_memory(format!("{needed} bytes are needed and {available} available; {advice}")))
+}
+
+/// Main memory in bytes.
+pub(crate) struct Memory {
+    pub(crate) total: u64,
+    /// What can be had now.
+    pub(crate) available: u64,
+}
+
+/// This machine's memory, where the system tells.
+pub(crate) fn memory() -> Option<Memory> {
+    let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
+    let system = System::new_with_specifics(what).ok()?;
+    Some(Memory { total: system.total_memory(), available: system.available_memory() })
 }
 
 /// The running program.

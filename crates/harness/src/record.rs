@@ -130,8 +130,8 @@ pub struct Cell {
     pub plan: String,
     /// Name of the backend, with the device's index unless that is 0.
     pub backend: String,
-    /// The device.
-    pub device: Device,
+    /// The device; none where the backend could not open it.
+    pub device: Option<Device>,
     /// What was run.
     pub settings: Settings,
     /// What came of it.
@@ -144,10 +144,20 @@ pub struct Cell {
 pub struct Device {
     /// Its name.
     pub name: String,
+    /// What it is: "processor", "discrete GPU", "integrated GPU", "virtual GPU", "other device" or "software
+    /// rasteriser"; records from before there were GPU backends lack it.
+    #[serde(default)]
+    pub kind: Option<String>,
     /// The interface that reaches it and its version, where there is one.
     pub api: Option<String>,
     /// Its driver and the driver's version, where there is one.
     pub driver: Option<String>,
+    /// Memory of its own in bytes, where it has some.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
+    /// The universally unique identifier that its driver gives it.
+    #[serde(default)]
+    pub uuid: Option<String>,
     /// Whether it is a CPU that pretends to be a GPU.
     pub software_rasteriser: bool,
     /// How many threads work at once.
@@ -189,7 +199,7 @@ pub struct Settings {
     pub cut: Option<Cut>,
     /// Message entries that the plan predicts to compute.
     pub message_updates: u64,
-    /// Bytes that the plan predicts on this device.
+    /// Bytes that the plan predicts on this device, or in general where there is none.
     pub planned_bytes: u64,
 }
 
@@ -213,8 +223,10 @@ pub enum Outcome {
     Pending,
     /// It ran.
     Measured(Box<Measurement>),
-    /// It could not run.
+    /// It failed.
     Error(String),
+    /// This machine lacks the backend's device, or the device is too small for the plan; no fault of the run.
+    Unavailable(String),
 }
 
 /// What was measured.
@@ -245,6 +257,9 @@ pub struct Sample {
     pub round: u32,
     /// Milliseconds to allocate by the wall clock, apart from the total.
     pub prepare_ms: f64,
+    /// Milliseconds of these that compiling kernels took, where the device compiles any.
+    #[serde(default)]
+    pub compile_ms: Option<f64>,
     /// Milliseconds from images to labels by the wall clock.
     pub total_ms: f64,
     /// Milliseconds of each stage, by the wall clock first.
@@ -347,7 +362,7 @@ impl Cell {
     pub fn measured(&self) -> Option<&Measurement> {
         match &self.outcome {
             Outcome::Measured(measurement) => Some(measurement),
-            Outcome::Pending | Outcome::Error(_) => None,
+            Outcome::Pending | Outcome::Error(_) | Outcome::Unavailable(_) => None,
         }
     }
 }

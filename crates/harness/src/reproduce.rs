@@ -1,5 +1,6 @@
 //! `bp reproduce`: the thesis's experiments, run and recorded.
 
+mod devices;
 mod energies;
 mod plans;
 mod run;
@@ -45,15 +46,16 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
 /// Runs what is asked for and writes its report.
 fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     let source = Source::new(&args.data, args.quick)?;
-    let devices = run::open_devices(&args.backend)?;
-    threads::check(args.threads, &devices)?;
+    let devices = devices::open(&args.backend)?;
+    let opened: Vec<_> = devices.iter().filter_map(|asked| asked.device.as_ref().ok()).collect();
+    threads::check(args.threads, &opened)?;
     let settings = Run {
         data: source.set.name.to_owned(),
         quick: args.quick,
         labels: source.set.labels,
         k: if args.quick { QUICK_LOOPS } else { source.set.labels as u32 },
         samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
-        backends: devices.iter().map(|device| device.name.clone()).collect(),
+        backends: devices.iter().map(|asked| asked.name.clone()).collect(),
         threads: Some(rayon::current_num_threads()),
     };
     tell(&format!("scenes: {}", source.set.described));
@@ -67,13 +69,28 @@ fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     outcome?;
     report::write(storage.folder(), storage.record())?;
     tell(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
-    failed_cells(storage.record())
+    check_cells(storage.record())
 }
 
-/// Fails where a cell has no numbers.
-fn failed_cells(record: &Record) -> Result<(), Failure> {
-    let failed: Vec<_> = record.cells.iter().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).collect();
-    let Some(Cell { scene, plan, backend, outcome: Outcome::Error(error), .. }) = failed.first() else { return Ok(()) };
-    let count = failed.len();
-    Err(Failure::other(format!("{count} cells could not be run, such as {scene}, {plan} on {backend}: {error}")))
+/// Fails where a cell failed, or where none could be run at all.
+fn check_cells(record: &Record) -> Result<(), Failure> {
+    let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
+    let mut failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
+        Outcome::Error(error) => Some(format!("{}: {error}", such_as(cell))),
+        _ => None,
+    });
+    if let Some(first) = failed.next() {
+        let count = 1 + failed.count();
+        return Err(Failure::other(format!("{count} cells could not be run, such as {first}")));
+    }
+    let mut unavailable = record.cells.iter().filter_map(|cell| match &cell.outcome {
+        Outcome::Unavailable(reason) => Some(format!("{}: {reason}", such_as(cell))),
+        _ => None,
+    });
+    match unavailable.next() {
+        Some(first) if record.cells.iter().all(|cell| cell.measured().is_none()) => {
+            Err(Failure::unavailable(format!("no cell could be run; {first}")))
+        }
+        _ => Ok(()),
+    }
 }

@@ -15,7 +15,7 @@ pub(crate) fn run_on<T: Send>(
 }
 
 /// Refuses a number of threads that no device works with.
-pub(crate) fn check(threads: Option<u16>, devices: &[Opened]) -> Result<(), Failure> {
+pub(crate) fn check(threads: Option<u16>, devices: &[&Opened]) -> Result<(), Failure> {
     match threads.map(usize::from) {
         Some(threads) if devices.iter().all(|device| device.info.workers != threads) => {
             let names = devices.iter().map(|device| device.name.as_str()).collect::<Vec<_>>().join(",");

@@ -5,6 +5,7 @@ use std::{fmt::Write as _, io::Write as _, path::Path};
 use bp_core::{Errors, GroundTruth, THRESHOLDS};
 use serde::Serialize;
 
+use super::print_json;
 use crate::{
     args::{EvaluateArgs, TruthArgs},
     failure::Failure,
@@ -46,16 +47,11 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
         Failure::input(format!("{map} has {map_size} pixels and its ground truth {truth} {truth_size}"))
     })?;
     let errors = ErrorReport::from(errors);
-    let mut out = std::io::stdout().lock();
     if args.json {
         let size = map.size();
-        let report = Report { width: size.width, height: size.height, errors };
-        serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
-        writeln!(out)?;
-    } else {
-        write!(out, "{}", error_table(&errors))?;
+        return print_json(&Report { width: size.width, height: size.height, errors });
     }
-    Ok(())
+    Ok(write!(std::io::stdout(), "{}", error_table(&errors))?)
 }
 
 /// Reads ground truth, and what tells which of its pixels are visible.

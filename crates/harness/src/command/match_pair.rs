@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     evaluate::{self, ErrorReport},
-    plan,
+    plan, print_json,
 };
 use crate::{
     args::MatchArgs,
@@ -65,14 +65,7 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
     let report = threads::run_on(args.plan.threads, || solve(args, &pair, plan, truth.as_ref()))?;
-    let mut out = std::io::stdout().lock();
-    if args.json {
-        serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
-        writeln!(out)?;
-    } else {
-        write!(out, "{}", text(&report))?;
-    }
-    Ok(())
+    if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", text(&report))?) }
 }
 
 fn check_paths(args: &MatchArgs) -> Result<(), Failure> {
@@ -111,9 +104,9 @@ fn read_truth(args: &MatchArgs, path: &Path, size: Size, limit: PixelLimit) -> R
 
 /// Matches the pair and writes its map.
 fn solve(args: &MatchArgs, pair: &StereoPair, plan: Plan, truth: Option<&GroundTruth>) -> Result<Report, Failure> {
-    let opened = backends::open(&args.plan.backend)?;
-    threads::check(args.plan.threads, std::slice::from_ref(&opened))?;
-    let plan = plan::fitting(args, plan, opened.device.as_ref())?;
+    let opened = backends::open(&args.plan.backend, args.plan.device.as_deref())?;
+    threads::check(args.plan.threads, &[&opened])?;
+    let plan = plan::fitting(args, plan, &opened)?;
     let settings = plan::recorded_settings(&args.plan, &plan, &opened);
     let mut matcher = Matcher::new(opened.device.as_ref(), plan)?;
     let samples = take_samples(&mut matcher, pair, args.repeat)?;
@@ -191,7 +184,8 @@ fn text(report: &Report) -> String {
     let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
     let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
     let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
-    let _ = writeln!(text, "{:<10}{plan}, on {}: {}", "plan", report.backend, report.device.name);
+    let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
+    let _ = writeln!(text, "{:<10}{plan}, on {}: {}{software}", "plan", report.backend, report.device.name);
     let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
     for record::Clocked { clock, stages } in &report.clocks {
         let _ = writeln!(text, "{:<12}{clock:?} clock", "");

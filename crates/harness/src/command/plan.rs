@@ -1,6 +1,6 @@
 //! What the options of `bp match` ask to run.
 
-use bp_core::{Algorithm, Cut, Device, MAX_LABELS, Model, Plan, Schedule, Settings, Size};
+use bp_core::{Algorithm, Cut, MAX_LABELS, Model, Plan, Schedule, Settings, Size};
 
 use crate::{
     args::{MatchArgs, PlanArgs},
@@ -105,12 +105,12 @@ pub(super) fn recorded_settings(args: &PlanArgs, plan: &Plan, opened: &Opened) -
     let own = counts_on_each_grid(args);
     let k = (!own).then(|| loops(args, plan.model().labels()));
     let z = (!own && args.algorithm().divides_loops()).then(|| args.z.unwrap_or(2));
-    record::Settings::new(plan, opened.device.as_ref(), args.algorithm(), (k, z))
+    record::Settings::new(plan, Some(opened.device.as_ref()), args.algorithm(), (k, z))
 }
 
 /// The plan, if it fits into the memory that there is and that `--max-memory` allows. In place of the default plan, the
 /// first smaller one that is allowed runs, and standard error tells so.
-pub(super) fn fitting(args: &MatchArgs, plan: Plan, device: &dyn Device) -> Result<Plan, Failure> {
+pub(super) fn fitting(args: &MatchArgs, plan: Plan, opened: &Opened) -> Result<Plan, Failure> {
     let mut plans = vec![plan];
     if !is_shaped(&args.plan) {
         let smaller =
@@ -118,14 +118,14 @@ pub(super) fn fitting(args: &MatchArgs, plan: Plan, device: &dyn Device) -> Resu
         let smaller = SMALLER.iter().map(smaller).collect::<Result<Vec<_>, _>>()?;
         plans.extend(smaller);
     }
-    let bytes: Vec<u64> = plans.iter().map(|plan| device.planned_bytes(plan)).collect();
+    let bytes: Vec<u64> = plans.iter().map(|plan| opened.device.planned_bytes(plan)).collect();
     let fits = |&needed: &u64| args.max_memory.is_none_or(|allowed| needed <= allowed.as_u64());
     let chosen = bytes.iter().position(fits).unwrap_or(plans.len() - 1);
     let advice = match plans[chosen].settings().schedule {
         Schedule::Sweep => "fewer --labels or smaller images need less",
         _ => "fewer --labels, smaller images or --algorithm sweep need less",
     };
-    machine::check_memory(bytes[chosen], args.max_memory, advice)?;
+    machine::check_memory(opened.info.kind, bytes[chosen], args.max_memory, advice)?;
     if chosen > 0 {
         let (needed, takes, option) = (bytes[0], bytes[chosen], SMALLER[chosen - 1].0);
         let instead = format!("matching with {option}, which takes {takes} and is less accurate");

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use bp_core::{Image, Size, image::narrow};
+use bp_core::{DeviceKind, Image, Size, image::narrow};
 use image::{
     DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader,
     codecs::{png::PngDecoder, pnm::PnmDecoder},
@@ -140,7 +140,7 @@ fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, 
     limit.check(path, width.into(), height.into())?;
     // The decoded image, and two copies as colours of 8 bits while it is converted.
     let needed = decoder.total_bytes().saturating_add(6 * u64::from(width) * u64::from(height));
-    machine::check_memory(needed, None, &format!("{} is too large", path.display()))?;
+    machine::check_memory(DeviceKind::Processor, needed, None, &format!("{} is too large", path.display()))?;
     DynamicImage::from_decoder(decoder).map_err(|error| match error {
         ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
         error => failed(&error),

@@ -19,16 +19,17 @@ impl From<bp_core::MapErrors> for Errors {
 
 impl From<&bp_core::DeviceInfo> for Device {
     fn from(device: &bp_core::DeviceInfo) -> Self {
-        let bp_core::DeviceInfo { name, api, driver, software_rasteriser, workers } = device.clone();
-        Self { name, api, driver, software_rasteriser, workers }
+        let bp_core::DeviceInfo { name, kind, api, driver, memory_bytes, uuid, workers } = device.clone();
+        let software_rasteriser = kind == bp_core::DeviceKind::SoftwareRasteriser;
+        Self { name, kind: Some(kind.name().to_owned()), api, driver, memory_bytes, uuid, software_rasteriser, workers }
     }
 }
 
 impl Settings {
-    /// What is known of a plan on a device before it runs.
+    /// What is known of a plan before it runs; `device` tells how many bytes it will take there.
     pub(crate) fn new(
         plan: &bp_core::Plan,
-        device: &dyn bp_core::Device,
+        device: Option<&dyn bp_core::Device>,
         algorithm: bp_core::Algorithm,
         (k, z): (Option<u32>, Option<u32>),
     ) -> Self {
@@ -49,7 +50,7 @@ impl Settings {
             coarse_clip: settings.coarse_clip,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
             message_updates: plan.message_updates(),
-            planned_bytes: device.planned_bytes(plan),
+            planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),
         }
     }
 }

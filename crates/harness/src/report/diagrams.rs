@@ -7,7 +7,10 @@ use super::{
     results::{Part, Results, Row},
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family},
 };
-use crate::{failure::Failure, record::Measurement};
+use crate::{
+    failure::Failure,
+    record::{Device, Measurement},
+};
 
 /// Number of a diagram, and of the table that it belongs to.
 type Numbers = (&'static str, &'static str);
@@ -24,6 +27,9 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
     drawings.push(speed_ups(results, ("4.12", "3.29"), "All algorithms against BP", &four, &[Part::Total])?);
     drawings.push(memories(results, ("4.13", "3.30"), "All algorithms", &five)?);
     drawings.push(errors(results, ("4.14", "3.31"), "All algorithms", &five)?);
+    for (drawing, why) in drawings.iter_mut().flat_map(|drawing| Some((drawing, results.unavailable()?))) {
+        drawing.caption += &format!(" {why}");
+    }
     Ok(drawings)
 }
 
@@ -63,7 +69,7 @@ fn speed_ups(
         }
     }
     // Where each plan has one series, its printed one looks alike; else those are told apart among themselves.
-    let first_style = if parts.len() == 1 { 0 } else { series.len() };
+    let first_style = if series.len() == plans.len() { 0 } else { series.len() };
     series.extend(printed(results, plans, first_style));
     let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", series, Some(1.0));
     let ours = if parts.len() == 1 { "ours are in all too" } else { "ours are apart for message passing and in all" };
@@ -109,7 +115,7 @@ fn errors(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) 
 /// A series a backend of one value of each plan's measurement.
 fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<Series> {
     let of = |(i, plan): (usize, &Named)| {
-        ours(results, plan.title, i * results.backends().count(), |row| {
+        ours(results, plan.title, i * results.devices().len(), |row| {
             let value = value(row.measured(plan.plan)?);
             Some(Spread { median: value, low: value, high: value, count: 1 })
         })
@@ -117,18 +123,20 @@ fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement)
     plans.iter().enumerate().flat_map(of).collect()
 }
 
-/// A series a backend, named after it where there are several; their styles are numbered from `style` on.
+/// A series a backend that has a device, named after it where there are several or it only seems a GPU; their styles are
+/// numbered from `style` on.
 fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<Series> {
-    let several = results.backends().count() > 1;
-    let series = |(i, backend): (usize, &str)| Series {
-        name: if several { format!("{name}, {backend}") } else { name.to_owned() },
+    let devices = results.devices();
+    let named = |device: &Device| results.backends().count() > 1 || device.software_rasteriser;
+    let series = |(i, &(backend, device)): (usize, &(&str, &Device))| Series {
+        name: if named(device) { format!("{name}, {}", results.label(backend)) } else { name.to_owned() },
         printed: false,
         style: style + i,
         points: (results.rows().filter(|row| row.backend == backend))
             .map(|row| value(&row).map(|Spread { median, low, high, .. }| Point { value: median, low, high }))
             .collect(),
     };
-    results.backends().enumerate().map(series).collect()
+    devices.iter().enumerate().map(series).collect()
 }
 
 fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series>, reference: Option<f64>) -> Chart {

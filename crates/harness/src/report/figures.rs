@@ -7,7 +7,7 @@ use bp_core::{DisparityMap, Size};
 
 use super::{
     Drawing,
-    results::{Results, Row},
+    results::Results,
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, ours::CENSUS},
 };
 use crate::{
@@ -30,14 +30,12 @@ pub(super) fn all(folder: &Path, results: &Results<'_>) -> Result<Vec<Drawing>, 
 }
 
 fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> Result<Drawing, Failure> {
-    // All backends give the same labels, so one map a scene is enough.
-    let first = results.backends().next();
-    let rows: Vec<Row<'_>> = results.rows().filter(|row| Some(row.backend) == first).collect();
-    let maps = rows.iter().map(|row| {
-        let map = row.measured(plan.plan).map(|measured| {
-            read_map(&folder.join(&measured.map), None, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))
-        });
-        Ok((row.scene.name.as_str(), map.transpose()?.map(halved)))
+    let maps = results.scenes().map(|(index, scene)| {
+        // All backends give the same labels, so one map a scene is enough.
+        let measured = results.rows().filter(|row| row.index == index).find_map(|row| row.measured(plan.plan));
+        let limit = PixelLimit::megapixels(PixelLimit::MEGAPIXELS);
+        let map = measured.map(|measured| read_map(&folder.join(&measured.map), None, limit));
+        Ok((scene.name.as_str(), map.transpose()?.map(halved)))
     });
     let maps = maps.collect::<Result<Vec<_>, Failure>>()?;
     let labels = results.record.run.labels;

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
     Drawing, Report,
-    markdown::{facts, heading, notes, title},
+    markdown::{beneath, facts, heading, notes, title},
     tables::Table,
 };
 
@@ -76,6 +76,7 @@ fn section(report: &Report<'_>, table: &Table) -> Markup {
             h3 { (heading(table)) }
             p { (notes(report, table)) }
             (grid(table))
+            @if let Some(beneath) = beneath(report, table) { p { (beneath) } }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Drawing, Report, tables::Table};
+use super::{Drawing, Report, results::UNAVAILABLE, tables::Table};
 use crate::record::Device;
 
 /// The whole page.
@@ -50,6 +50,7 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
             .to_owned(),
     ];
     facts.extend(report.results.devices().into_iter().map(|(backend, device)| device_fact(backend, device)));
+    facts.extend(report.results.unavailable());
     if run.quick {
         let k = run.k;
         facts.push(format!(
@@ -65,10 +66,14 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
 fn device_fact(backend: &str, device: &Device) -> String {
     let through =
         [&device.api, &device.driver].into_iter().flatten().map(|name| format!(", {name}")).collect::<String>();
-    let software = "; a CPU that pretends to be a GPU: its times are not a GPU's";
+    let software = "; a software rasteriser, a CPU that pretends to be a GPU: its times are not a GPU's";
     let software = if device.software_rasteriser { software } else { "" };
-    let workers = if device.workers == 1 { "1 worker".to_owned() } else { format!("{} workers", device.workers) };
-    format!("Backend {backend}: {}{through}, {workers}{software}.", device.name)
+    let workers = match device.workers {
+        _ if device.api.is_some() => String::new(),
+        1 => ", 1 worker".to_owned(),
+        workers => format!(", {workers} workers"),
+    };
+    format!("Backend {backend}: {}{through}{workers}{software}.", device.name)
 }
 
 /// What stands under a table's heading: its data, and what a reader must know.
@@ -82,8 +87,14 @@ pub(super) fn heading(table: &Table) -> String {
     format!("Table {}: {}", table.number, table.title)
 }
 
+/// What stands beneath a table: why numbers are missing in it.
+pub(super) fn beneath(report: &Report<'_>, table: &Table) -> Option<String> {
+    report.results.unavailable().filter(|_| table.rows.iter().flatten().any(|cell| cell == UNAVAILABLE))
+}
+
 fn section(report: &Report<'_>, table: &Table) -> String {
-    format!("### {}\n\n{}\n\n{}\n", heading(table), notes(report, table), grid(table))
+    let beneath = beneath(report, table).map_or(String::new(), |beneath| format!("{beneath}\n\n"));
+    format!("### {}\n\n{}\n\n{}\n{beneath}", heading(table), notes(report, table), grid(table))
 }
 
 /// The lines of a table.

@@ -11,6 +11,7 @@ use super::{
         ours::{all_plans, means},
     },
 };
+use crate::record::Device;
 
 /// Marks where the part begins.
 pub(super) const BEGIN: &str = "<!-- results: begin -->";
@@ -32,7 +33,8 @@ pub(super) fn part(run: &Path, results: &Results<'_>) -> String {
     let run = run.trim_end_matches('/');
     let (machine, settings) = (&record.machine, &record.run);
     let devices: Vec<_> = (results.devices().iter())
-        .map(|(backend, device)| format!("{backend} on {} (workers: {})", device.name, device.workers))
+        .map(|(backend, device)| format!("{} on {}{}", results.label(backend), device.name, workers(device)))
+        .chain(results.unavailable().map(|why| why.trim_end_matches('.').to_owned()))
         .collect();
     let note = format!(
         "Means over {}, L = {}, k = {}; {}, {} cores; {}. Printed: the thesis's GTX 750 Ti. Speed-ups over BP in percent, \
@@ -49,6 +51,11 @@ pub(super) fn part(run: &Path, results: &Results<'_>) -> String {
     format!("{chart}\n\n{}\n{note}\n", grid(&table(results)))
 }
 
+/// How many threads share the work, where a device is not asked as one.
+fn workers(device: &Device) -> String {
+    if device.api.is_some() { String::new() } else { format!(" (workers: {})", device.workers) }
+}
+
 fn table(results: &Results<'_>) -> Table {
     let columns = [
         "backend",
@@ -63,7 +70,8 @@ fn table(results: &Results<'_>) -> Table {
         "RMSE, px",
     ];
     let plans = all_plans(results);
-    let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
+    let devices = results.devices().into_iter();
+    let rows = devices.flat_map(|(backend, _)| plans.iter().map(move |plan| (backend, plan)));
     Table::new("", "", &columns).rows(rows.map(|(backend, plan)| row(results, backend, plan)).collect::<Vec<_>>())
 }
 
@@ -77,9 +85,10 @@ fn row(results: &Results<'_>, backend: &str, plan: &Named) -> Vec<String> {
         move |row: &Row<'_>| Some((row.speed_up(plan.plan, part)?.median - 1.0) * 100.0).filter(|_| plan.plan != "bp")
     };
     let printed = |row: &Row<'_>| results.thesis.speed_up_percent(plan.printed?, row.index);
-    let [visible, all, rmse, _, total] = means(results, backend, plan).map(|mean| or(mean.map(|m| number(m, 1)), "-"));
+    let none = results.missing_mean(backend, plan.plan, "-");
+    let [visible, all, rmse, _, total] = means(results, backend, plan).map(|mean| or(mean.map(|m| number(m, 1)), none));
     vec![
-        backend.to_owned(),
+        results.label(backend),
         plan.title.to_owned(),
         mean(&printed, 1),
         mean(&percent(Part::MessagePassing), 1),

@@ -62,8 +62,32 @@ impl<'a> Results<'a> {
 
     /// The devices that were used, each with its backend's name.
     pub(super) fn devices(&self) -> Vec<(&'a str, &'a Device)> {
-        let first = |backend| self.record.cells.iter().find(|cell: &&Cell| cell.backend == backend);
-        self.backends().filter_map(|backend| Some((backend, &first(backend)?.device))).collect()
+        self.backends().filter_map(|backend| Some((backend, device(self.record, backend)?))).collect()
+    }
+
+    /// A backend as tables and charts name it.
+    pub(super) fn label(&self, backend: &str) -> String {
+        label(self.record, backend)
+    }
+
+    /// What stands in place of a plan's means over the scenes.
+    pub(super) fn missing_mean(&self, backend: &str, plan: &str, otherwise: &'static str) -> &'static str {
+        let mut rows = self.rows().filter(|row| row.backend == backend);
+        if rows.any(|row| row.missing(plan) == UNAVAILABLE) { UNAVAILABLE } else { otherwise }
+    }
+
+    /// Why cells are unavailable, in a sentence; none where none is.
+    pub(super) fn unavailable(&self) -> Option<String> {
+        let mut reasons = Vec::new();
+        for cell in &self.record.cells {
+            let Outcome::Unavailable(reason) = &cell.outcome else { continue };
+            let plan = cell.device.as_ref().map_or(String::new(), |_| format!(", {}", cell.plan));
+            let line = format!("{}{plan}: {reason}", cell.backend);
+            if !reasons.contains(&line) {
+                reasons.push(line);
+            }
+        }
+        (!reasons.is_empty()).then(|| format!("Unavailable: {}.", reasons.join("; ")))
     }
 
     /// Images, labels and loops, for every table and chart.
@@ -79,6 +103,20 @@ impl<'a> Results<'a> {
     }
 }
 
+/// What tables show for a plan that the machine cannot run.
+pub(super) const UNAVAILABLE: &str = "unavailable";
+
+/// A backend's device; none where it could not be opened.
+fn device<'a>(record: &'a Record, backend: &str) -> Option<&'a Device> {
+    record.cells.iter().find(|cell| cell.backend == backend)?.device.as_ref()
+}
+
+/// A backend's name; what is no GPU says so wherever its times may stand.
+fn label(record: &Record, backend: &str) -> String {
+    let software = device(record, backend).is_some_and(|device| device.software_rasteriser);
+    format!("{backend}{}", if software { " (software rasteriser)" } else { "" })
+}
+
 /// A scene on a backend.
 #[derive(Clone, Copy)]
 pub(super) struct Row<'a> {
@@ -90,6 +128,11 @@ pub(super) struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
+    /// The backend as tables name it.
+    pub(super) fn label(&self) -> String {
+        label(self.record, self.backend)
+    }
+
     /// A plan's cell.
     pub(super) fn cell(&self, plan: &str) -> Option<&'a Cell> {
         self.record.cell(&self.scene.name, plan, self.backend)
@@ -104,6 +147,7 @@ impl<'a> Row<'a> {
     pub(super) fn missing(&self, plan: &str) -> &'a str {
         match self.cell(plan).map(|cell| &cell.outcome) {
             Some(Outcome::Error(error)) => error,
+            Some(Outcome::Unavailable(_)) => UNAVAILABLE,
             _ => "not run",
         }
     }

@@ -2,16 +2,17 @@
 
 use std::{ops::ControlFlow, time::Instant};
 
-use bp_core::{Energy, Matcher, Plan, Times};
+use bp_core::{Energy, Matcher, Times};
 use sha2::{Digest, Sha256};
 
 use super::{
+    devices::Asked,
     energies,
     plans::{self, Planned},
     storage::{MAPS_FOLDER, Storage},
 };
 use crate::{
-    backends::{self, Opened},
+    backends::Opened,
     failure::Failure,
     files::{hex, write_map},
     interrupt::ProgressBar,
@@ -28,7 +29,7 @@ pub const ONE_SAMPLE_ABOVE_MS: f64 = 5000.0;
 const GUESSED_NS: f64 = 2.5;
 
 /// Runs all cells that the record does not hold yet, on these devices.
-pub(crate) fn run(source: &Source, devices: &[Opened], storage: &mut Storage) -> Result<(), Failure> {
+pub(crate) fn run(source: &Source, devices: &[Asked], storage: &mut Storage) -> Result<(), Failure> {
     let bar = ProgressBar::new(1);
     for index in 0..crate::scenes::THESIS_SCENES.len() {
         bar.message(format!("scene {} of 6", index + 1));
@@ -38,7 +39,7 @@ pub(crate) fn run(source: &Source, devices: &[Opened], storage: &mut Storage) ->
         bar.resume_at(done(storage.record()));
         for round in 0..storage.record().run.samples {
             for planned in plans::all() {
-                for device in devices {
+                for device in devices.iter().filter_map(|asked| asked.device.as_ref().ok()) {
                     sample_cell(&scene, &planned, device, round, storage, &bar)?;
                 }
             }
@@ -55,36 +56,48 @@ pub(crate) fn run(source: &Source, devices: &[Opened], storage: &mut Storage) ->
     storage.save()
 }
 
-/// Adds a scene and its cells to the record, or checks that the record's scene is this one.
-fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Opened]) -> Result<(), Failure> {
-    let run = storage.record().run.clone();
-    if let Some(known) = storage.record().scenes.iter().find(|known| known.name == scene.record.name) {
-        if *known == scene.record {
-            return Ok(());
-        }
-        let folder = storage.folder().display();
-        return Err(Failure::input(format!("{folder} was begun with another {}; begin anew elsewhere", known.name)));
-    }
-    let mut cells = Vec::new();
-    for planned in plans::all() {
-        let plan = planned.plan(scene.pair.size(), &run)?;
-        cells.extend(devices.iter().map(|device| Cell {
-            scene: scene.record.name.clone(),
-            plan: planned.name.to_owned(),
-            backend: device.name.clone(),
-            device: (&device.info).into(),
-            settings: settings(&planned, &plan, device, &run),
-            outcome: Outcome::Pending,
-        }));
-    }
+/// Adds a scene and its cells to the record, or checks that the record's scene is this one and goes on with its cells.
+fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Asked]) -> Result<(), Failure> {
+    let (folder, run) = (storage.folder().display().to_string(), storage.record().run.clone());
+    let other = |what: &str| Failure::input(format!("{folder} was begun with another {what}; begin anew elsewhere"));
+    let cells = planned_cells(scene, devices, &run)?;
     let record = storage.record_mut();
-    record.scenes.push(scene.record.clone());
-    record.cells.extend(cells);
+    match record.scenes.iter().find(|known| known.name == scene.record.name) {
+        None => record.scenes.push(scene.record.clone()),
+        Some(known) if *known != scene.record => return Err(other(&known.name)),
+        Some(_) => {}
+    }
+    for cell in cells {
+        let is_it = |old: &&mut Cell| (&old.scene, &old.plan, &old.backend) == (&cell.scene, &cell.plan, &cell.backend);
+        match record.cells.iter_mut().find(is_it) {
+            None => record.cells.push(cell),
+            Some(old) if old.measured().is_none() => *old = cell,
+            Some(old) if old.device != cell.device => return Err(other(&format!("device as {}", cell.backend))),
+            Some(_) => {}
+        }
+    }
     storage.save()
 }
 
-fn settings(planned: &Planned, plan: &Plan, device: &Opened, run: &record::Run) -> Settings {
-    Settings::new(plan, device.device.as_ref(), planned.algorithm, (planned.k(run), planned.z))
+/// The cells of a scene before they are run.
+fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<Vec<Cell>, Failure> {
+    let mut cells = Vec::new();
+    for planned in plans::all() {
+        let plan = planned.plan(scene.pair.size(), run)?;
+        cells.extend(devices.iter().map(|Asked { name, device }| {
+            let opened = device.as_ref().ok();
+            let device_of_plan = opened.map(|opened| opened.device.as_ref());
+            Cell {
+                scene: scene.record.name.clone(),
+                plan: planned.name.to_owned(),
+                backend: name.clone(),
+                device: opened.map(|opened| (&opened.info).into()),
+                settings: Settings::new(&plan, device_of_plan, planned.algorithm, (planned.k(run), planned.z)),
+                outcome: device.as_ref().map_or_else(|e| Outcome::Unavailable(e.clone()), |_| Outcome::Pending),
+            }
+        }));
+    }
+    Ok(cells)
 }
 
 /// Takes the sample of one round, where the cell still wants it.
@@ -112,7 +125,11 @@ fn sample_cell(
             measured(&record.cells[index], round, scene, solved, storage)?
         }
         Err(failure) if failure.is_interrupted() => return Err(failure),
-        Err(failure) => Outcome::Error(failure.to_string()),
+        Err(failure) => {
+            bar.line(&format!("{name:<11}{plan:<10}{:<8} {failure}", device.name));
+            let beyond = failure.is_beyond_device();
+            if beyond { Outcome::Unavailable(failure.to_string()) } else { Outcome::Error(failure.to_string()) }
+        }
     };
     storage.record_mut().cells[index].outcome = outcome;
     storage.save()
@@ -121,7 +138,7 @@ fn sample_cell(
 fn wants_sample(cell: &Cell, round: u32) -> bool {
     match &cell.outcome {
         Outcome::Pending => round == 0,
-        Outcome::Error(_) => false,
+        Outcome::Error(_) | Outcome::Unavailable(_) => false,
         Outcome::Measured(measurement) => {
             let taken = measurement.samples.len() as u32;
             taken == round && measurement.samples.iter().all(|sample| sample.total_ms <= ONE_SAMPLE_ABOVE_MS)
@@ -133,6 +150,7 @@ fn wants_sample(cell: &Cell, round: u32) -> bool {
 struct Solved {
     matcher: Matcher,
     prepare_ms: f64,
+    compile_ms: Option<f64>,
     times: Times,
 }
 
@@ -144,12 +162,13 @@ fn solve(
     update: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Solved, Failure> {
     let plan = planned.plan(scene.pair.size(), run)?;
-    machine::check_memory(device.device.planned_bytes(&plan), None, "--quick needs less")?;
+    machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), None, "--quick needs less")?;
     let start = Instant::now();
     let mut matcher = Matcher::new(device.device.as_ref(), plan)?;
     let prepare_ms = 1000.0 * start.elapsed().as_secs_f64();
+    let compile_ms = matcher.compile_time().map(|time| 1000.0 * time.as_secs_f64());
     let times = matcher.solve_observed(&scene.pair, &mut |progress| update(progress.done))?;
-    Ok(Solved { matcher, prepare_ms, times })
+    Ok(Solved { matcher, prepare_ms, compile_ms, times })
 }
 
 /// Adds a sample to a cell's measurement. The first one brings the answer's quality and map; all samples on all devices
@@ -166,6 +185,7 @@ fn measured(cell: &Cell, round: u32, scene: &Scene, solved: Solved, storage: &St
     let sample = Sample {
         round,
         prepare_ms: solved.prepare_ms,
+        compile_ms: solved.compile_ms,
         total_ms: 1000.0 * solved.times.total.as_secs_f64(),
         clocks: record::clocks(&solved.times),
     };
@@ -214,21 +234,12 @@ fn work(record: &Record, index: usize) -> u64 {
         let first = cell.measured().and_then(|measurement| measurement.samples.first());
         let guess = cell.settings.message_updates as f64 * GUESSED_NS / 1e6;
         let total_ms = first.map_or(guess, |sample| sample.total_ms);
-        if total_ms > ONE_SAMPLE_ABOVE_MS { 1 } else { u64::from(record.run.samples) }
+        match cell.outcome {
+            Outcome::Error(_) | Outcome::Unavailable(_) => 0,
+            _ if total_ms > ONE_SAMPLE_ABOVE_MS => 1,
+            _ => u64::from(record.run.samples),
+        }
     };
     let known: u64 = record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum();
     known * 6 / (index as u64 + 1)
-}
-
-/// The devices that a run asks for, each once.
-pub(crate) fn open_devices(names: &[String]) -> Result<Vec<Opened>, Failure> {
-    let mut devices: Vec<Opened> = Vec::new();
-    for name in names {
-        let device = backends::open(name)?;
-        if devices.iter().any(|other| other.name == device.name) {
-            return Err(Failure::usage(format!("--backend names {} twice", device.name)));
-        }
-        devices.push(device);
-    }
-    Ok(devices)
 }

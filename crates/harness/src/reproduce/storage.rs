@@ -11,7 +11,7 @@ use crate::{
     failure::Failure,
     files::{create_folder, write_text},
     machine,
-    record::{Machine, Outcome, Program, Record, Run, SCHEMA_VERSION},
+    record::{Machine, Program, Record, Run, SCHEMA_VERSION},
     report::PAGE_FILE,
     tell,
 };
@@ -44,11 +44,8 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
     for folder in runs(results).into_iter().filter(|folder| interrupted(folder).is_some()) {
         let Some(lock) = lock(&folder)? else { continue };
         // Judged again under the lock: until then another process may have been at work on it.
-        let Some(mut record) = interrupted(&folder) else { continue };
+        let Some(record) = interrupted(&folder) else { continue };
         tell(&format!("going on with the interrupted run in {}", folder.display()));
-        record.cells.iter_mut().filter(|cell| matches!(cell.outcome, Outcome::Error(_))).for_each(|cell| {
-            cell.outcome = Outcome::Pending;
-        });
         return Ok(Storage { folder, record, _lock: lock });
     }
     begin(results, program, machine, run)

@@ -33,14 +33,14 @@ impl Folder {
         self.0.path().join(name)
     }
 
+    pub(crate) fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bp"));
+        command.args(arguments.split_whitespace()).current_dir(self.0.path()).env_remove("BP_DATA");
+        command
+    }
+
     pub(crate) fn run(&self, arguments: &str) -> Output {
-        let words = arguments.split_whitespace();
-        Command::new(env!("CARGO_BIN_EXE_bp"))
-            .args(words)
-            .current_dir(self.0.path())
-            .env_remove("BP_DATA")
-            .output()
-            .unwrap()
+        self.command(arguments).output().unwrap()
     }
 
     pub(crate) fn json(&self, arguments: &str) -> Value {
@@ -51,8 +51,13 @@ impl Folder {
 
     /// Asserts an exit code and that the message has all of `words`; that no panic and no file is left.
     pub(crate) fn fails(&self, arguments: &str, code: i32, words: &[&str]) {
+        self.command_fails(&mut self.command(arguments), code, words);
+    }
+
+    pub(crate) fn command_fails(&self, command: &mut Command, code: i32, words: &[&str]) {
         let before = listing(self.0.path());
-        let output = self.run(arguments);
+        let output = command.output().unwrap();
+        let arguments = format!("{command:?}");
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{arguments}: {message}");
         assert!(words.iter().all(|word| message.contains(word)), "{arguments}: {message}");

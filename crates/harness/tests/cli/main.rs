@@ -1,6 +1,7 @@
 //! The program as its users meet it: options, files, messages, exit codes.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+mod devices;
 mod folder;
 mod running;
 
@@ -135,8 +136,12 @@ fn contradictory_options_are_usage_errors_that_name_them() {
     folder.fails("match left.png right.png --output ./left.png", 2, &["left.png", "twice"]);
     folder.fails("reproduce --quick --synthetic --backend scalar,scalar:0", 2, &["--backend", "twice"]);
     folder.fails("reproduce --quick --synthetic --backend scalar --threads 2", 2, &["--threads 2", "rayon"]);
-    folder.fails("match left.png right.png --output a.png --backend scalar:1", 5, &["scalar", "device 1"]);
-    folder.fails("match left.png right.png --output a.png --backend rayon:9", 5, &["rayon", "device 9"]);
+    folder.fails(
+        "match left.png right.png --output a.png --backend scalar:1",
+        5,
+        &["scalar", "device \"1\"", "1 thread"],
+    );
+    folder.fails("match left.png right.png --output a.png --backend rayon:9", 5, &["rayon", "device \"9\"", "threads"]);
     folder.fails("match left.png right.png --output a.png --backend magic", 5, &["--backend", "magic", "scalar"]);
 }
 

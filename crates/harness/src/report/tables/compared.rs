@@ -177,7 +177,7 @@ pub(super) fn all_memory(results: &Results<'_>) -> Table {
     let rows = results.rows().map(|row| {
         let bytes = |plan: &Named| row.measured(plan.plan).map(|measured| mebibytes(measured.allocated_bytes));
         let cells = plans.iter().map(|plan| or(bytes(plan).map(|mib| number(mib, 1)), row.missing(plan.plan)));
-        let which = [(row.index + 1).to_string(), row.scene.name.clone(), row.backend.to_owned()];
+        let which = [(row.index + 1).to_string(), row.scene.name.clone(), row.label()];
         which.into_iter().chain(cells).collect()
     });
     Table::new("3.30", "All algorithms: required memory, MiB (ours: the thesis has no such table)", &columns)

@@ -16,7 +16,7 @@ const WHICH: [&str; 4] = ["#", "scene", "backend", "plan"];
 
 /// The cells under [`WHICH`].
 pub(super) fn which(row: &Row<'_>, plan: &Named) -> Vec<String> {
-    vec![(row.index + 1).to_string(), row.scene.name.clone(), row.backend.to_owned(), plan.title.to_owned()]
+    vec![(row.index + 1).to_string(), row.scene.name.clone(), row.label(), plan.title.to_owned()]
 }
 
 /// A table with a row for every scene, backend and plan.
@@ -55,7 +55,7 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
 
 /// How the parts of a cut image share the workers.
 fn parts_note(results: &Results<'_>) -> &'static str {
-    if results.devices().iter().all(|(_, device)| device.workers == 1) {
+    if results.devices().iter().all(|(_, device)| device.workers == 1 && device.api.is_none()) {
         " Parts run one after another; running them side by side needs a backend with several workers, and this run has \
          none."
     } else {

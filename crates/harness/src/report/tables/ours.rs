@@ -36,9 +36,10 @@ pub(super) fn profiles(results: &Results<'_>) -> Table {
     let plans = all_plans(results);
     let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
     let rows = rows.map(|(backend, plan)| {
-        let cells = means(results, backend, plan).map(|mean| or(mean.map(|mean| number(mean, 2)), "not run"));
-        let energy = or(mean_energy(results, backend, plan).map(|energy| number(energy / 1000.0, 0)), "not run");
-        [vec![backend.to_owned(), plan.title.to_owned()], cells.to_vec(), vec![energy]].concat()
+        let none = results.missing_mean(backend, plan.plan, "not run");
+        let cells = means(results, backend, plan).map(|mean| or(mean.map(|mean| number(mean, 2)), none));
+        let energy = or(mean_energy(results, backend, plan).map(|energy| number(energy / 1000.0, 0)), none);
+        [vec![results.label(backend), plan.title.to_owned()], cells.to_vec(), vec![energy]].concat()
     });
     let note = "Means over the scenes, of medians where there are several samples. The thesis's plans use its grey \
                 difference; ours use the 3x3 census transform that CTBP computes for one pixel as the data cost of all. \

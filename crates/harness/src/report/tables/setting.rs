@@ -9,9 +9,7 @@ use crate::report::{
 /// Table 3.1.
 pub(super) fn computer(results: &Results<'_>) -> Table {
     let (machine, program) = (&results.record.machine, &results.record.program);
-    let gpus: Vec<_> = results.devices().into_iter().filter(|(_, device)| device.api.is_some()).collect();
-    let gpus = gpus.iter().map(|(_, device)| device.name.as_str()).collect::<Vec<_>>().join(", ");
-    let gpus = if gpus.is_empty() { "none used".to_owned() } else { gpus };
+    let gpus = gpus(results);
     let ours = |what: &str| match what {
         "Processor" => format!("{}, {} cores usable", machine.cpu, machine.cores),
         "Memory" => format!("{} MiB", number(mebibytes(machine.memory_bytes), 0)),
@@ -22,6 +20,19 @@ pub(super) fn computer(results: &Results<'_>) -> Table {
     let rows = results.thesis.computer.iter();
     Table::new("3.1", "The computer", &["", "thesis (printed)", "ours"])
         .rows(rows.map(|(what, printed)| vec![what.clone(), printed.clone(), ours(what)]))
+}
+
+/// The GPUs that were used; what only seems one is named, and that it is none.
+fn gpus(results: &Results<'_>) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for (_, device) in results.devices().into_iter().filter(|(_, device)| device.api.is_some()) {
+        let software = if device.software_rasteriser { " (no GPU: a software rasteriser)" } else { "" };
+        let name = format!("{}{software}", device.name);
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    if names.is_empty() { "none used".to_owned() } else { names.join(", ") }
 }
 
 /// Table 3.2.

@@ -1,0 +1,74 @@
+//! GPU backend through Vulkan, by raw ash: allocates, compiles, records and submits what `bp_shaders` asks for.
+//!
+//! `instance` lists devices and `device` opens them. A prepared program is a `queue` of work over its `resources`:
+//! `buffers`, bind groups and `pipelines`, which naga translates in `spirv`. `commands` records, `timeline` submits
+//! and waits, `timer` reads the device's clock. Everything that Vulkan makes is an `object` with one owner.
+#![deny(clippy::undocumented_unsafe_blocks)]
+
+mod buffers;
+mod commands;
+mod device;
+mod error;
+mod instance;
+mod limits;
+mod object;
+mod pipelines;
+mod queue;
+mod resources;
+mod spirv;
+mod timeline;
+mod timer;
+pub mod validation;
+
+pub use device::VulkanDevice;
+
+use bp_core::{Backend, Device, DeviceInfo, Error};
+use bp_shaders::Limits;
+
+use instance::{Adapter, Instance};
+
+/// The backend.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Vulkan;
+
+impl Vulkan {
+    /// Opens a device by its index in [`Backend::devices`], with changed limits: a test may lower them, so that small
+    /// plans are cut up like large ones.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] with the reason.
+    pub fn open_with(&self, device: usize, change: impl FnOnce(&mut Limits)) -> Result<VulkanDevice, Error> {
+        let unavailable = |reason| Error::Unavailable { backend: self.name(), device, reason };
+        let instance = Instance::new().map_err(unavailable)?;
+        let adapter = pick(instance.adapters().map_err(unavailable)?, device).map_err(unavailable)?;
+        VulkanDevice::open(instance, adapter, change).map_err(unavailable)
+    }
+}
+
+impl Backend for Vulkan {
+    fn name(&self) -> &'static str {
+        "vulkan"
+    }
+
+    fn devices(&self) -> Vec<DeviceInfo> {
+        let adapters = Instance::new().and_then(|instance| instance.adapters());
+        adapters.unwrap_or_default().into_iter().map(|adapter| adapter.info).collect()
+    }
+
+    fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {
+        let opened = self.open_with(device, |_| {})?;
+        let works = bp_shaders::check(&opened);
+        works.map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })?;
+        Ok(Box::new(opened))
+    }
+}
+
+fn pick(mut adapters: Vec<Adapter>, device: usize) -> Result<Adapter, String> {
+    let count = adapters.len();
+    if device < count {
+        return Ok(adapters.swap_remove(device));
+    }
+    let devices =
+        if count == 1 { "1 device, number 0".to_owned() } else { format!("{count} devices, numbered from 0") };
+    Err(format!("Vulkan offers {devices}"))
+}

@@ -1,0 +1,68 @@
+//! Vulkan objects that are destroyed with their owners, so that an error anywhere leaves nothing behind.
+#![expect(unsafe_code, reason = "Vulkan is a C interface")]
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::device::Gpu;
+
+/// An object of a device, which it keeps open.
+pub(crate) struct Owned<T: Destroy> {
+    /// Its handle.
+    pub(crate) raw: T,
+    gpu: Arc<Gpu>,
+}
+
+impl<T: Destroy> Owned<T> {
+    /// Takes over an object that was just made by this device.
+    pub(crate) fn new(gpu: &Arc<Gpu>, raw: T) -> Self {
+        Self { raw, gpu: Arc::clone(gpu) }
+    }
+}
+
+impl<T: Destroy> Drop for Owned<T> {
+    fn drop(&mut self) {
+        // A device that was lost or does not answer may still use the object, and waiting for it could take for ever:
+        // the object stays until the process ends.
+        if !self.gpu.is_abandoned() {
+            // SAFETY: the device made the object and is open; the handle has no other owner; and who submits work waits
+            // for it before dropping what it uses, or abandons the device.
+            unsafe { self.raw.destroy(self.gpu.raw()) }
+        }
+    }
+}
+
+/// A handle of an object that can be destroyed.
+pub(crate) trait Destroy: Copy {
+    /// Destroys the object.
+    ///
+    /// # Safety
+    /// The device made it, nothing uses it any more, and it is destroyed once.
+    unsafe fn destroy(self, device: &ash::Device);
+}
+
+macro_rules! destroyed_by {
+    ($($handle:ty: $function:ident,)*) => {$(
+        impl Destroy for $handle {
+            unsafe fn destroy(self, device: &ash::Device) {
+                // SAFETY: the caller promises what the function demands.
+                unsafe { device.$function(self, None) }
+            }
+        }
+    )*};
+}
+
+destroyed_by! {
+    vk::Buffer: destroy_buffer,
+    vk::CommandPool: destroy_command_pool,
+    vk::DescriptorPool: destroy_descriptor_pool,
+    vk::DescriptorSetLayout: destroy_descriptor_set_layout,
+    vk::DeviceMemory: free_memory,
+    vk::Pipeline: destroy_pipeline,
+    vk::PipelineCache: destroy_pipeline_cache,
+    vk::PipelineLayout: destroy_pipeline_layout,
+    vk::QueryPool: destroy_query_pool,
+    vk::Semaphore: destroy_semaphore,
+    vk::ShaderModule: destroy_shader_module,
+}

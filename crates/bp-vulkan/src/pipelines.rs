@@ -1,0 +1,159 @@
+//! Compiled kernels, kept as long as their device, and between runs where the driver can take them back.
+#![expect(unsafe_code, reason = "Vulkan is a C interface")]
+
+use std::{
+    collections::HashMap,
+    ffi::CString,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use ash::vk;
+use bp_core::Error;
+use bp_shaders::{Kernel, Pipeline, cache};
+
+use crate::{device::Gpu, object::Owned, spirv};
+
+/// What a kernel is given: the shape of its bind groups.
+pub(crate) struct Layout {
+    /// Of the one set of buffers.
+    pub(crate) set: Owned<vk::DescriptorSetLayout>,
+    /// Of all that is bound.
+    pub(crate) pipeline: Owned<vk::PipelineLayout>,
+}
+
+/// A compiled kernel.
+pub(crate) struct Compiled {
+    /// The pipeline.
+    pub(crate) raw: Owned<vk::Pipeline>,
+    /// What it is given.
+    pub(crate) layout: Arc<Layout>,
+    warm: AtomicBool,
+}
+
+impl Compiled {
+    /// Whether it has run: some drivers compile a kernel only then.
+    pub(crate) fn is_warm(&self) -> bool {
+        self.warm.load(Ordering::Relaxed)
+    }
+
+    /// Notes that it has run.
+    pub(crate) fn set_warm(&self) {
+        self.warm.store(true, Ordering::Relaxed);
+    }
+}
+
+/// The kernels compiled for a device.
+pub(crate) struct Pipelines {
+    gpu: Arc<Gpu>,
+    cache: Owned<vk::PipelineCache>,
+    layouts: HashMap<Kernel, Arc<Layout>>,
+    compiled: HashMap<Pipeline, Arc<Compiled>>,
+}
+
+impl Pipelines {
+    /// None yet, but what the driver stored in an earlier run.
+    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
+        let stored = cache::load(&cache_key(gpu)).unwrap_or_default();
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(&stored);
+        // SAFETY: the data is empty or what this driver once stored for this device, whole.
+        let cache = gpu.checked("making a pipeline cache", unsafe { gpu.raw().create_pipeline_cache(&info, None) })?;
+        let cache = Owned::new(gpu, cache);
+        Ok(Self { gpu: Arc::clone(gpu), cache, layouts: HashMap::new(), compiled: HashMap::new() })
+    }
+
+    /// These kernels, and how long compiling those took that had not been.
+    pub(crate) fn get(&mut self, wanted: &[Pipeline]) -> Result<(Vec<Arc<Compiled>>, Duration), Error> {
+        let start = Instant::now();
+        let before = self.compiled.len();
+        let compiled = wanted.iter().map(|pipeline| self.get_one(pipeline)).collect::<Result<_, _>>()?;
+        let is_new = self.compiled.len() > before;
+        Ok((compiled, if is_new { start.elapsed() } else { Duration::ZERO }))
+    }
+
+    fn get_one(&mut self, wanted: &Pipeline) -> Result<Arc<Compiled>, Error> {
+        if let Some(compiled) = self.compiled.get(wanted) {
+            return Ok(Arc::clone(compiled));
+        }
+        let layout = self.layout(wanted.kernel)?;
+        let raw = compile(&self.gpu, self.cache.raw, layout.pipeline.raw, wanted)?;
+        let compiled = Arc::new(Compiled { raw, layout, warm: AtomicBool::new(false) });
+        self.compiled.insert(wanted.clone(), Arc::clone(&compiled));
+        Ok(compiled)
+    }
+
+    /// What a kernel is given.
+    pub(crate) fn layout(&mut self, kernel: Kernel) -> Result<Arc<Layout>, Error> {
+        if let Some(layout) = self.layouts.get(&kernel) {
+            return Ok(Arc::clone(layout));
+        }
+        let layout = Arc::new(lay_out(&self.gpu, kernel)?);
+        self.layouts.insert(kernel, Arc::clone(&layout));
+        Ok(layout)
+    }
+
+    /// Stores what the driver wants to keep for the next run.
+    pub(crate) fn store(&self) {
+        // SAFETY: the cache is alive, and whoever compiles has it alone.
+        if let Ok(data) = unsafe { self.gpu.raw().get_pipeline_cache_data(self.cache.raw) } {
+            cache::store(&cache_key(&self.gpu), &data);
+        }
+    }
+}
+
+/// Names the driver and the device for which stored pipelines are good.
+fn cache_key(gpu: &Gpu) -> String {
+    let vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, pipeline_cache_uuid, .. } =
+        gpu.adapter.properties;
+    let uuid = pipeline_cache_uuid.map(|byte| format!("{byte:02x}")).concat();
+    format!("vulkan-{vendor_id:x}-{device_id:x}-{driver_version:x}-{uuid}")
+}
+
+fn lay_out(gpu: &Arc<Gpu>, kernel: Kernel) -> Result<Layout, Error> {
+    let binding = |(binding, kind)| {
+        vk::DescriptorSetLayoutBinding::default()
+            .binding(binding)
+            .descriptor_type(kind)
+            .descriptor_count(1)
+            .stage_flags(vk::ShaderStageFlags::COMPUTE)
+    };
+    let buffers = kernel.bindings().iter().map(|_| vk::DescriptorType::STORAGE_BUFFER);
+    let all = std::iter::once(vk::DescriptorType::STORAGE_BUFFER_DYNAMIC).chain(buffers);
+    let bindings: Vec<_> = (0_u32..).zip(all).map(binding).collect();
+    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+    // SAFETY: the device is open; the program keeps to its number of bindings.
+    let set = unsafe { gpu.raw().create_descriptor_set_layout(&info, None) };
+    let set = Owned::new(gpu, gpu.checked("making a descriptor set layout", set)?);
+    let info = vk::PipelineLayoutCreateInfo::default().set_layouts(std::slice::from_ref(&set.raw));
+    // SAFETY: the set layout is the device's and alive.
+    let pipeline = unsafe { gpu.raw().create_pipeline_layout(&info, None) };
+    let pipeline = Owned::new(gpu, gpu.checked("making a pipeline layout", pipeline)?);
+    Ok(Layout { set, pipeline })
+}
+
+fn compile(
+    gpu: &Arc<Gpu>,
+    cache: vk::PipelineCache,
+    layout: vk::PipelineLayout,
+    wanted: &Pipeline,
+) -> Result<Owned<vk::Pipeline>, Error> {
+    let device = || gpu.name().to_owned();
+    let words = spirv::translate(wanted).map_err(|reason| Error::Device { device: device(), reason })?;
+    let info = vk::ShaderModuleCreateInfo::default().code(&words);
+    // SAFETY: the words are a module that naga validated.
+    let module = unsafe { gpu.raw().create_shader_module(&info, None) };
+    let module = Owned::new(gpu, gpu.checked("loading a kernel", module)?);
+    let name = CString::new(wanted.kernel.name()).unwrap_or_default();
+    let stage = vk::PipelineShaderStageCreateInfo::default();
+    let stage = stage.stage(vk::ShaderStageFlags::COMPUTE).module(module.raw).name(&name);
+    let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+    // SAFETY: the layout has what the module declares, both are the device's and alive, and whoever compiles has the
+    // cache alone.
+    let made = unsafe { gpu.raw().create_compute_pipelines(cache, &[info], None) };
+    let made = made.map_err(|(_, result)| result);
+    let pipelines = gpu.checked("compiling a kernel", made)?;
+    Ok(Owned::new(gpu, pipelines[0]))
+}

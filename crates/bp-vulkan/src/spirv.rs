@@ -1,0 +1,87 @@
+//! WGSL to SPIR-V, by naga.
+
+use std::fmt;
+
+use bp_shaders::{Kernel, Pipeline};
+use naga::{
+    ShaderStage,
+    back::{
+        PipelineConstants,
+        pipeline_constants::process_overrides,
+        spv::{self, Capability, ZeroInitializeWorkgroupMemoryMode},
+    },
+    proc::{BoundsCheckPolicies, BoundsCheckPolicy},
+    valid::{Capabilities, ValidationFlags, Validator},
+};
+
+/// The SPIR-V of a kernel with these constants; else what naga says.
+pub(crate) fn translate(pipeline: &Pipeline) -> Result<Vec<u32>, String> {
+    let Pipeline { kernel, constants } = pipeline;
+    translate_text(&kernel.source(), *kernel, constants).map_err(|error| format!("kernel {pipeline}: {error}"))
+}
+
+fn translate_text(text: &str, kernel: Kernel, constants: &[(&str, u32)]) -> Result<Vec<u32>, String> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|error| error.emit_to_string(text))?;
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let info = validator.validate(&module).map_err(|error| error.emit_to_string(text))?;
+    let constants: PipelineConstants =
+        constants.iter().map(|&(name, value)| (name.to_owned(), f64::from(value))).collect();
+    let entry_point = (ShaderStage::Compute, kernel.name());
+    let (module, info) = process_overrides(&module, &info, Some(entry_point), &constants).map_err(describe)?;
+    let entry_point = spv::PipelineOptions { shader_stage: entry_point.0, entry_point: entry_point.1.to_owned() };
+    spv::write_vec(&module, &info, &options(), Some(&entry_point)).map_err(describe)
+}
+
+fn describe(error: impl fmt::Display) -> String {
+    error.to_string()
+}
+
+/// Plain code, without checks that the kernels do not need: their loops end, their indices are within their buffers,
+/// and none relies on workgroup memory being zeros. Private variables begin as zeros, on which some rely.
+fn options() -> spv::Options<'static> {
+    let unchecked = BoundsCheckPolicy::Unchecked;
+    spv::Options {
+        lang_version: (1, 3),
+        flags: spv::WriterFlags::empty(),
+        // What every device can do: naga spells out what it would else use special instructions for.
+        capabilities: Some([Capability::Shader].into_iter().collect()),
+        bounds_check_policies: BoundsCheckPolicies {
+            index: unchecked,
+            buffer: unchecked,
+            image_load: unchecked,
+            binding_array: unchecked,
+        },
+        zero_initialize_workgroup_memory: ZeroInitializeWorkgroupMemoryMode::None,
+        force_loop_bounding: false,
+        ..spv::Options::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "
+        override N: u32;
+        @group(0) @binding(0) var<storage, read_write> values: array<u32>;
+        @compute @workgroup_size(64) fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
+            values[id.x] += N;
+        }";
+
+    #[test]
+    fn a_kernel_becomes_spirv_1_3() {
+        let words = translate_text(TEXT, Kernel::Refine, &[("N", 3)]).unwrap();
+        assert_eq!(words[..2], [0x0723_0203, 0x0001_0300]);
+    }
+
+    #[test]
+    fn errors_name_what_is_wrong() {
+        let unknown = translate_text(TEXT, Kernel::Refine, &[("M", 3)]).unwrap_err();
+        assert!(unknown.contains('M'), "{unknown}");
+        let missing = translate_text(TEXT, Kernel::Refine, &[]).unwrap_err();
+        assert!(missing.contains('N'), "{missing}");
+        let absent = translate_text(TEXT, Kernel::Coarsen, &[("N", 3)]).unwrap_err();
+        assert!(absent.contains("entry point"), "{absent}");
+        assert!(translate_text("fn", Kernel::Refine, &[]).is_err());
+    }
+}

@@ -1,0 +1,76 @@
+//! What was handed to the device, and waiting for it.
+#![expect(unsafe_code, reason = "Vulkan is a C interface")]
+
+use std::sync::Arc;
+
+use ash::vk;
+use bp_core::Error;
+
+use crate::{device::Gpu, error::PATIENCE, object::Owned, validation};
+
+/// Counts pieces of work, submitted and done.
+pub(crate) struct Timeline {
+    semaphore: Owned<vk::Semaphore>,
+    gpu: Arc<Gpu>,
+    submitted: u64,
+}
+
+impl Timeline {
+    /// Nothing submitted yet.
+    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the device was opened with timeline semaphores.
+        let semaphore = gpu.checked("making a semaphore", unsafe { gpu.raw().create_semaphore(&info, None) })?;
+        Ok(Self { semaphore: Owned::new(gpu, semaphore), gpu: Arc::clone(gpu), submitted: 0 })
+    }
+
+    /// How many pieces were submitted so far.
+    pub(crate) fn submitted(&self) -> u64 {
+        self.submitted
+    }
+
+    /// Hands a piece of work to the device: command buffers that run in this order.
+    pub(crate) fn submit(&mut self, commands: &[vk::CommandBuffer]) -> Result<(), Error> {
+        let value = [self.submitted + 1];
+        let mut values = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&value);
+        let work = vk::SubmitInfo::default()
+            .command_buffers(commands)
+            .signal_semaphores(std::slice::from_ref(&self.semaphore.raw))
+            .push_next(&mut values);
+        self.gpu.submit(&work)?;
+        self.submitted += 1;
+        Ok(())
+    }
+
+    /// Waits until so many pieces are done, in vain for a device that was given up.
+    pub(crate) fn wait(&self, done: u64) -> Result<(), Error> {
+        self.gpu.check()?;
+        let info = vk::SemaphoreWaitInfo::default();
+        let (semaphores, values) = ([self.semaphore.raw], [done]);
+        let info = info.semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore is the device's and alive.
+        let waited = unsafe { self.gpu.raw().wait_semaphores(&info, PATIENCE.as_nanos() as u64) };
+        if waited.is_err() {
+            // Whatever the reason, the work may still be under way.
+            self.gpu.abandon();
+        }
+        self.gpu.checked("waiting for its work", waited)?;
+        match validation::messages().first {
+            Some(reason) => Err(Error::Device { device: self.gpu.name().to_owned(), reason }),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until all of it is done.
+    pub(crate) fn wait_for_all(&self) -> Result<(), Error> {
+        self.wait(self.submitted)
+    }
+}
+
+impl Drop for Timeline {
+    fn drop(&mut self) {
+        // What the work uses is destroyed next. If waiting fails, the device is given up and nothing is destroyed.
+        _ = self.wait_for_all();
+    }
+}

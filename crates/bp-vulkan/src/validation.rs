@@ -1,0 +1,90 @@
+//! The Khronos validation layer, for tests: whether every call and every access is as Vulkan demands.
+//!
+//! `BP_VULKAN_VALIDATION=1` in the environment, or [`turn_on`], loads it with whatever is opened from then on. What it
+//! complains of is counted, and fails the call that next waits for the device.
+#![expect(unsafe_code, reason = "the layer calls back through a C interface")]
+
+use std::{
+    ffi::{CStr, c_void},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use ash::{Entry, ext, vk};
+
+/// Name of the layer; Debian's package is vulkan-validationlayers.
+pub(crate) const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// The extensions that it is used through: the first tells what it finds, the second says what it looks for.
+pub(crate) const EXTENSIONS: [&CStr; 2] = [ext::debug_utils::NAME, ext::validation_features::NAME];
+
+/// What it looks for besides its defaults.
+pub(crate) const EXTRAS: [vk::ValidationFeatureEnableEXT; 1] =
+    [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+
+static WANTED: AtomicBool = AtomicBool::new(false);
+
+static MESSAGES: Mutex<Messages> = Mutex::new(Messages { count: 0, first: None });
+
+/// What the layer complained of in this process.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Messages {
+    /// How many warnings and errors there were.
+    pub count: usize,
+    /// The first of them.
+    pub first: Option<String>,
+}
+
+/// Validates what is opened from now on, if the layer is installed.
+pub fn turn_on() {
+    WANTED.store(true, Ordering::Relaxed);
+}
+
+/// Whether the layer is installed.
+#[must_use]
+pub fn is_installed() -> bool {
+    crate::instance::entry().is_ok_and(has_layer)
+}
+
+/// What the layer complained of so far.
+#[must_use]
+pub fn messages() -> Messages {
+    MESSAGES.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// Whether an instance that is made now has the layer.
+pub(crate) fn is_on(entry: &Entry) -> bool {
+    let wanted = WANTED.load(Ordering::Relaxed) || std::env::var_os("BP_VULKAN_VALIDATION").is_some_and(|on| on == "1");
+    wanted && has_layer(entry)
+}
+
+fn has_layer(entry: &Entry) -> bool {
+    // SAFETY: the loader allows the call at any time.
+    let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+    layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER))
+}
+
+/// What an instance, and whoever listens to the layer, is made with to be told of complaints.
+pub(crate) fn listener() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+        .pfn_user_callback(Some(keep))
+}
+
+/// Keeps a message.
+unsafe extern "system" fn keep(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    _user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes a valid structure, whose message is null or ends in a zero.
+    let message = unsafe { data.as_ref().and_then(|data| data.message_as_c_str()) };
+    let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
+    messages.count += 1;
+    messages.first.get_or_insert_with(|| message.unwrap_or_default().to_string_lossy().into_owned());
+    vk::FALSE
+}

@@ -1,0 +1,108 @@
+//! An open adapter.
+
+use std::sync::Arc;
+
+use bp_core::{Device, Error, Plan, Solver};
+use bp_shaders::{GpuSolver, Limits, Program};
+use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
+
+use crate::{clock::Clock, error::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue};
+
+/// An open adapter.
+pub(crate) struct WgpuDevice {
+    gpu: Arc<Gpu>,
+    limits: Limits,
+    pipelines: Pipelines,
+}
+
+impl WgpuDevice {
+    /// Opens an adapter with all that it allows, but for what `change` lowers; the error says why that failed.
+    pub(crate) fn open(adapter: &Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
+        let descriptor = DeviceDescriptor {
+            label: None,
+            required_features: adapter.features() & (Clock::FEATURES | Features::PIPELINE_CACHE),
+            required_limits: adapter.limits(),
+            // A few large buffers: blocks to take small ones from would only be memory unused.
+            memory_hints: MemoryHints::MemoryUsage,
+            ..DeviceDescriptor::default()
+        };
+        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) = opened.map_err(|error| error.to_string())?;
+        let mut limits = limits(adapter);
+        change(&mut limits);
+        let gpu = Arc::new(Gpu::new(limits.device.clone(), device, queue));
+        let pipelines = Pipelines::new(&gpu).map_err(|error| error.to_string())?;
+        Ok(Self { gpu, limits, pipelines })
+    }
+}
+
+fn limits(adapter: &Adapter) -> Limits {
+    let limits = adapter.limits();
+    Limits {
+        device: adapter.get_info().name,
+        binding_bytes: limits.max_storage_buffer_binding_size,
+        buffer_bytes: limits.max_buffer_size,
+        bindings: limits.max_storage_buffers_per_shader_stage,
+        workgroups: limits.max_compute_workgroups_per_dimension,
+        memory_bytes: None,
+        dispatch_entries: Limits::dispatch_entries(instance::kind(adapter)),
+    }
+}
+
+impl Device for WgpuDevice {
+    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+        let program = Program::new(plan, &self.limits)?;
+        let queue = WgpuQueue::new(&self.gpu, &self.pipelines, &program)?;
+        Ok(Box::new(GpuSolver::new(plan, program, Box::new(queue))?))
+    }
+
+    fn planned_bytes(&self, plan: &Plan) -> u64 {
+        // What is uploaded lies in host memory once more, see `WgpuQueue`.
+        let upload = Program::new(plan, &self.limits).map_or(0, |program| program.buffers[Program::UPLOAD].bytes);
+        Program::planned_bytes(plan, &self.limits).saturating_add(upload)
+    }
+
+    fn copy_rate(&self) -> Result<Option<f64>, Error> {
+        let rate = bp_shaders::copy_rate(&self.limits, |program| {
+            Ok(Box::new(WgpuQueue::new(&self.gpu, &self.pipelines, program)?))
+        });
+        rate.map(Some)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bp_core::{Algorithm, Matcher, Model, Profile, Schedule, conformance::noise_pair};
+
+    use super::*;
+
+    /// The first device, if there is one.
+    fn device() -> Option<WgpuDevice> {
+        WgpuDevice::open(instance::adapters().first()?, |_| ()).ok()
+    }
+
+    #[test]
+    fn a_lost_device_is_an_error() -> Result<(), Error> {
+        let Some(device) = device() else { return Ok(()) };
+        let pair = noise_pair(9, 7, 1);
+        let settings = Algorithm::Cfbp.settings(pair.size(), 5, 2, Schedule::Checkerboard);
+        let plan = Plan::new(pair.size(), Model::new(Profile::Mrf, 8)?, settings)?;
+        let mut matcher = Matcher::new(&device, plan.clone())?;
+        matcher.solve(&pair)?;
+        device.gpu.device.destroy();
+        assert!(matches!(matcher.solve(&pair), Err(Error::DeviceLost { .. })));
+        assert!(matches!(Matcher::new(&device, plan).err(), Some(Error::DeviceLost { .. })));
+        Ok(())
+    }
+
+    #[test]
+    fn what_wgpu_refuses_is_an_error() {
+        let Some(device) = device() else { return };
+        let refused =
+            device.gpu.guard(0, || Ok(crate::buffers::buffer(&device.gpu, "", 4, wgpu::BufferUsages::empty())));
+        assert!(matches!(refused, Err(Error::Device { .. })));
+        let panicked = device.gpu.guard(0, || -> Result<(), Error> { panic!("as wgpu does") });
+        assert!(matches!(panicked, Err(Error::Device { reason, .. }) if reason == "as wgpu does"));
+        assert_eq!(device.gpu.guard(0, || Ok(())), Ok(()));
+    }
+}

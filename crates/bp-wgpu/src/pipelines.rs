@@ -1,0 +1,111 @@
+//! The pipelines of a device: each is compiled once, whichever plans need it.
+
+use std::{
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+};
+
+use bp_core::Error;
+use bp_shaders::{Access, Kernel, Pipeline, cache};
+use wgpu::{
+    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ComputePipeline,
+    ComputePipelineDescriptor, Features, PipelineCache, PipelineCacheDescriptor, PipelineCompilationOptions,
+    PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+};
+
+use crate::{buffers::PARAMETER_BYTES, error::Gpu};
+
+/// All pipelines made so far.
+pub(crate) struct Pipelines {
+    made: Mutex<HashMap<Pipeline, ComputePipeline>>,
+    cache: Option<Cache>,
+}
+
+/// The driver's own form of pipelines, kept between runs.
+struct Cache {
+    key: String,
+    pipelines: PipelineCache,
+}
+
+impl Pipelines {
+    /// No pipelines, but what earlier runs left of theirs.
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Ok(Self { made: Mutex::default(), cache: gpu.guard(0, || Ok(load(gpu)))? })
+    }
+
+    /// The pipeline, and whether it was made just now.
+    pub(crate) fn get(&self, gpu: &Gpu, pipeline: &Pipeline) -> Result<(ComputePipeline, bool), Error> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = made.get(pipeline) {
+            return Ok((known.clone(), false));
+        }
+        let cache = self.cache.as_ref().map(|cache| &cache.pipelines);
+        let new = gpu.guard(0, || Ok(compile(gpu, pipeline, cache)))?;
+        made.insert(pipeline.clone(), new.clone());
+        Ok((new, true))
+    }
+
+    /// Leaves what was compiled for later runs.
+    pub(crate) fn store(&self) {
+        if let Some(cache) = &self.cache
+            && let Some(data) = cache.pipelines.get_data()
+        {
+            cache::store(&cache.key, &data);
+        }
+    }
+}
+
+fn load(gpu: &Gpu) -> Option<Cache> {
+    if !gpu.device.features().contains(Features::PIPELINE_CACHE) {
+        return None;
+    }
+    let key = wgpu::util::pipeline_cache_key(&gpu.device.adapter_info())?;
+    let data = cache::load(&key);
+    let descriptor = PipelineCacheDescriptor { label: None, data: data.as_deref(), fallback: true };
+    #[expect(unsafe_code, reason = "wgpu cannot check what a driver wrote")]
+    // SAFETY: `Pipelines::store` alone stores data under this key, all of which `PipelineCache::get_data` returned, and
+    // `cache::load` found it to be the same by its SHA-256 sum. wgpu itself drops data of another device or driver.
+    let pipelines = unsafe { gpu.device.create_pipeline_cache(&descriptor) };
+    Some(Cache { key, pipelines })
+}
+
+fn compile(gpu: &Gpu, pipeline: &Pipeline, cache: Option<&PipelineCache>) -> ComputePipeline {
+    let label = pipeline.to_string();
+    let source = ShaderSource::Wgsl(pipeline.kernel.source().into());
+    let module = gpu.device.create_shader_module(ShaderModuleDescriptor { label: Some(&label), source });
+    let layout = gpu.device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some(&label),
+        bind_group_layouts: &[Some(&layout(gpu, pipeline.kernel))],
+        immediate_size: 0,
+    });
+    let constants: Vec<_> = pipeline.constants.iter().map(|&(name, value)| (name, f64::from(value))).collect();
+    gpu.device.create_compute_pipeline(&ComputePipelineDescriptor {
+        label: Some(&label),
+        layout: Some(&layout),
+        module: &module,
+        entry_point: Some(pipeline.kernel.name()),
+        // Kernels write workgroup memory before they read it, and some drivers take minutes to compile the zeroing.
+        compilation_options: PipelineCompilationOptions {
+            constants: &constants,
+            zero_initialize_workgroup_memory: false,
+        },
+        cache,
+    })
+}
+
+/// How a kernel's buffers are bound; wgpu takes equal layouts for one.
+pub(crate) fn layout(gpu: &Gpu, kernel: Kernel) -> BindGroupLayout {
+    let parameters = BindingType::Buffer {
+        ty: BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: true,
+        min_binding_size: PARAMETER_BYTES,
+    };
+    let own = kernel.bindings().iter().map(|&access| BindingType::Buffer {
+        ty: BufferBindingType::Storage { read_only: access == Access::Read },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    });
+    let entry = |(binding, ty)| BindGroupLayoutEntry { binding, visibility: ShaderStages::COMPUTE, ty, count: None };
+    let entries: Vec<_> = (0..).zip(std::iter::once(parameters).chain(own)).map(entry).collect();
+    gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(kernel.name()), entries: &entries })
+}

@@ -1,0 +1,51 @@
+//! `bp conform`: whether backends answer as the reference does, to the bit.
+
+use std::{
+    any::Any,
+    io::Write,
+    panic::{self, AssertUnwindSafe},
+    time::Instant,
+};
+
+use bp_core::conformance;
+
+use crate::{args::ConformArgs, backends, failure::Failure, tell};
+
+/// Runs the command: all backends, though one may fail.
+pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
+    let chosen: Vec<_> = args.backend.iter().map(|name| backends::choose(name, None)).collect::<Result<_, _>>()?;
+    let mut failures = Vec::new();
+    for chosen in chosen {
+        let name = chosen.name.clone();
+        let opened = chosen.open().map_err(|error| Failure::unavailable(backends::reason(error)));
+        let outcome = opened.and_then(|opened| check(&opened));
+        failures.extend(outcome.err().map(|failure| (name, failure)));
+    }
+    let Some((name, failure)) = failures.pop() else { return Ok(()) };
+    failures.iter().for_each(|(name, failure)| tell(&format!("bp: {name}: {failure}")));
+    Err(failure.of(&name))
+}
+
+/// Runs the suite on a device.
+fn check(opened: &backends::Opened) -> Result<(), Failure> {
+    let reference = backends::reference()?;
+    let start = Instant::now();
+    // The suite is made for tests and panics on a difference, which here is an answer like any other. Its words go into
+    // the failure, not through the hook; what it leaves behind is not used again.
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| ()));
+    let run = || conformance::assert_conforms(reference.device.as_ref(), opened.device.as_ref());
+    let outcome = panic::catch_unwind(AssertUnwindSafe(run));
+    panic::set_hook(hook);
+    outcome.map_err(|payload| Failure::other(words(payload.as_ref())))?;
+    let (cases, seconds) = (conformance::cases().count(), start.elapsed().as_secs_f64());
+    let what = format!("{cases} cases as {} to the bit, and what comes after another pair", reference.name);
+    writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
+    Ok(())
+}
+
+/// What a panic said.
+fn words(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref().copied()).unwrap_or("it panicked").to_owned()
+}

@@ -1,0 +1,86 @@
+//! Backends and devices: how they are listed, checked and chosen, and what happens where there is none.
+
+use crate::folder::{Folder, MATCH, text};
+
+#[test]
+fn every_backend_is_listed_with_its_devices_or_why_it_has_none() {
+    let folder = Folder::new();
+    let report = folder.json("devices --json");
+    let backends = report.as_array().unwrap();
+    let names: Vec<_> = backends.iter().map(|backend| backend["backend"].as_str().unwrap()).collect();
+    assert_eq!(names[..2], ["scalar", "rayon"]);
+    assert_eq!(names.contains(&"vulkan"), cfg!(feature = "vulkan"));
+    assert_eq!(names.contains(&"wgpu"), cfg!(feature = "wgpu"));
+    let listed = text(&folder.run("devices").stdout);
+    for backend in backends {
+        let devices = backend["devices"].as_array().unwrap();
+        assert_eq!(devices.is_empty(), backend["unavailable"].is_string(), "{backend}");
+        for device in devices {
+            let software = device["kind"] == "software rasteriser";
+            assert_eq!(device["software_rasteriser"], software, "{device}");
+            assert!(["option", "name", "kind"].iter().all(|key| listed.contains(device[key].as_str().unwrap())));
+        }
+    }
+}
+
+#[test]
+fn doctor_tells_what_there_is() {
+    let folder = Folder::new();
+    let output = folder.run("doctor");
+    let told = text(&output.stdout);
+    assert!(output.status.success(), "{told}");
+    let words = ["processor", "memory", "scalar", "rayon", "GPU", "data", "scripts/fetch-middlebury"];
+    assert!(words.iter().all(|word| told.contains(word)), "{told}");
+    let checks = folder.json("doctor --json --data nowhere");
+    let data = checks.as_array().unwrap().iter().find(|check| check["what"] == "data").unwrap();
+    assert!(data["state"] == "note" && data["found"].as_str().unwrap().contains("nowhere"), "{data}");
+}
+
+#[test]
+fn a_device_is_chosen_by_index_or_name() {
+    let folder = Folder::new();
+    let devices = folder.json("devices --json")[1]["devices"].clone();
+    let last = devices.as_array().unwrap().last().unwrap();
+    let set = last["name"].as_str().unwrap().split(", ").nth(1).unwrap().to_lowercase();
+    let index = devices.as_array().unwrap().len() - 1;
+    for chosen in [format!("--backend rayon:{set}"), format!("--device {set}"), format!("--device {index}")] {
+        let report = folder.json(&format!("{MATCH} a.pfm --json {chosen}"));
+        assert_eq!((&report["device"]["name"], &report["backend"]), (&last["name"], &last["option"]), "{chosen}");
+    }
+    folder.fails(&format!("{MATCH} b.pfm --device 99"), 5, &["rayon", "\"99\"", &set.to_uppercase()]);
+    folder.fails(&format!("{MATCH} b.pfm --device magic"), 5, &["\"magic\"", "threads"]);
+    folder.fails(&format!("{MATCH} b.pfm --backend scalar:0 --device 0"), 2, &["--backend scalar:0", "--device 0"]);
+    folder.fails("reproduce --quick --synthetic --backend rayon,rayon:magic", 5, &["rayon", "\"magic\""]);
+}
+
+#[test]
+fn conform_holds_a_backend_against_the_reference() {
+    let told = text(&Folder::new().run("conform --backend rayon").stdout);
+    assert!(told.starts_with("rayon: ") && told.contains("cases as scalar to the bit"), "{told}");
+}
+
+/// No driver is found, whatever this machine has.
+#[cfg(all(feature = "vulkan", feature = "wgpu"))]
+#[test]
+fn without_a_driver_the_gpu_backends_say_so_and_the_others_work() {
+    let folder = Folder::new();
+    let without = |arguments: &str| {
+        let mut command = folder.command(arguments);
+        command.env("VK_DRIVER_FILES", "/nonexistent").env_remove("VK_ICD_FILENAMES");
+        command
+    };
+    for backend in ["vulkan", "wgpu", "vulkan:1", "wgpu:llvmpipe"] {
+        let name = backend.split(':').next().unwrap();
+        let words = [name, "driver", "mesa-vulkan-drivers", "/nonexistent"];
+        folder.command_fails(&mut without(&format!("{MATCH} a.pfm --backend {backend}")), 5, &words);
+        folder.command_fails(&mut without(&format!("conform --backend {backend}")), 5, &words);
+    }
+    let words = ["vulkan: unavailable", "wgpu: unavailable", "none is available"];
+    folder.command_fails(&mut without("reproduce --quick --synthetic --backend vulkan,wgpu"), 5, &words);
+    assert!(without(&format!("{MATCH} a.pfm --backend rayon")).output().unwrap().status.success());
+    let doctor = without("doctor").output().unwrap();
+    let told = text(&doctor.stdout);
+    assert!(doctor.status.success() && told.contains("mesa-vulkan-drivers"), "{told}");
+    let listed = text(&without("devices").output().unwrap().stdout);
+    assert_eq!(listed.matches("unavailable").count(), 2, "{listed}");
+}

@@ -1,0 +1,90 @@
+// Data costs of the image, for the nodes of one colour.
+
+const THESIS: u32 = 0;
+const CENSUS: u32 = 1;
+const MRF: u32 = 2;
+override PROFILE: u32 = THESIS;
+
+// A known match: the point where the cuts cross, its label, and whether there is one.
+struct Seed {
+    x: u32,
+    y: u32,
+    label: u32,
+    exists: u32,
+}
+
+// What the profile compares, of every pixel of both images.
+@group(0) @binding(3) var<storage, read> left: array<u32>;
+@group(0) @binding(4) var<storage, read> right: array<u32>;
+@group(0) @binding(5) var<storage, read> seed: Seed;
+
+fn largest_cost() -> u32 {
+    return select(select(765u, 6u, PROFILE == CENSUS), 11u, PROFILE == THESIS);
+}
+
+fn out_of_range_cost() -> u32 {
+    return select(largest_cost(), 3u, PROFILE == CENSUS);
+}
+
+fn difference(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    return max(a, b) - min(a, b);
+}
+
+// The cost of matching two pixels, for four pairs.
+fn compare(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    switch PROFILE {
+        case THESIS: {
+            return (7 * min(difference(a, b), vec4(15u)) + 5) / 10;
+        }
+        case CENSUS: {
+            return min(countOneBits(a ^ b), vec4(6u));
+        }
+        default: {
+            let byte = vec4(0xffu);
+            let green = difference((a >> vec4(8u)) & byte, (b >> vec4(8u)) & byte);
+            return difference(a & byte, b & byte) + green + difference(a >> vec4(16u), b >> vec4(16u));
+        }
+    }
+}
+
+// Whether these nodes touch the seed's point.
+fn touches_seed(nodes: Nodes) -> vec4<bool> {
+    let x = column(nodes) + APART;
+    let row = seed.exists != 0 && (nodes.y == seed.y || nodes.y + 1 == seed.y);
+    return vec4(row) & ((x == vec4(seed.x)) | (x + 1 == vec4(seed.x)));
+}
+
+// The costs of one label at four nodes; 0 beyond the border.
+fn costs(nodes: Nodes, at_left: vec4<u32>, seeded: vec4<bool>, label: u32) -> vec4<u32> {
+    let x = column(nodes) + APART;
+    let match_x = vec4<i32>(x) - (parameters.min_disparity + i32(label));
+    let inside = (match_x >= vec4(0)) & (match_x < vec4(i32(parameters.width)));
+    let safe = select(vec4(0u), vec4<u32>(match_x), inside) + nodes.y * parameters.width;
+    let at_right = vec4(right[safe.x], right[safe.y], right[safe.z], right[safe.w]);
+    var cost = select(vec4(out_of_range_cost()), compare(at_left, at_right), inside);
+    let seed_cost = select(largest_cost(), 0u, max(label, seed.label) - min(label, seed.label) <= 1);
+    cost = select(cost, vec4(seed_cost), seeded);
+    return select(vec4(0u), cost, x < vec4(parameters.width));
+}
+
+@compute @workgroup_size(64)
+fn match_cost(@builtin(global_invocation_id) id: vec3<u32>) {
+    let nodes = nodes(id.x);
+    if !nodes.exist {
+        return;
+    }
+    let x = min(column(nodes) + APART, vec4(parameters.width - 1)) + nodes.y * parameters.width;
+    let at_left = vec4(left[x.x], left[x.y], left[x.z], left[x.w]);
+    let seeded = touches_seed(nodes);
+    var least = vec4(0xffffffffu);
+    for (var label = 0u; label < parameters.labels; label++) {
+        least = min(least, costs(nodes, at_left, seeded, label));
+    }
+    for (var quad = 0u; quad < parameters.quads; quad++) {
+        var unclipped: array<vec4<u32>, 4>;
+        for (var i = 0u; i < 4; i++) {
+            unclipped[i] = costs(nodes, at_left, seeded, 4 * quad + i);
+        }
+        store(nodes, quad, unclipped, least);
+    }
+}

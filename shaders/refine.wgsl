@@ -1,0 +1,117 @@
+// First messages of a grid: what the nodes of one colour sent to one side, as the next coarser grid has it.
+//
+// A node receives at first what its parent received last, or, with another start, sends at first what its parent sent
+// last. Messages are kept with their senders, so that the coarse sender is looked for: under the first rule it is the
+// neighbour of the receiver's parent.
+
+@group(0) @binding(1) var<storage, read_write> fine: array<vec4<u32>>;
+// The coarser grid's messages to that side, of colour 0 and 1.
+@group(0) @binding(2) var<storage, read> even: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read> odd: array<vec4<u32>>;
+
+const RECEIVER: u32 = 0;
+const SENDER: u32 = 1;
+// Under the schedule `sweep` coarse messages to left and right hold only where the sender is odd.
+const SWEEP: u32 = 2;
+override START: u32 = RECEIVER;
+
+// Row of the coarse sender.
+fn coarse_y(y: u32) -> i32 {
+    if START == SENDER || parameters.side == LEFT || parameters.side == RIGHT {
+        return i32(y / 2);
+    }
+    return select(i32((y + 1) / 2), i32((y + 1) / 2) - 1, parameters.side == DOWN);
+}
+
+// Its column.
+fn coarse_x(x: u32, y: i32) -> i32 {
+    if START == SENDER || parameters.side == UP || parameters.side == DOWN {
+        return i32(x / 2);
+    }
+    // The sender to the right is left of the receiver's parent, and the other way round.
+    let inward = select(1, -1, parameters.side == RIGHT);
+    var sender = i32(x + 1) / 2 + select(0, -1, parameters.side == RIGHT);
+    if START == SWEEP && ((sender + y) & 1) == 0 {
+        sender += inward;
+    }
+    return sender;
+}
+
+// Four consecutive nodes of a coarse row and colour, for a quad of labels. Beyond the borders lie zeros.
+fn coarse_nodes(colour: i32, row: u32, first: i32, quad: u32) -> vec4<u32> {
+    // Rounds down also left of the border.
+    let word = first >> 2;
+    let aside = u32(first & 3);
+    if aside == 0 {
+        return coarse_quad(colour, row, word, quad);
+    }
+    let behind = coarse_quad(colour, row, word + 1, quad) << vec4(32 - 8 * aside);
+    return (coarse_quad(colour, row, word, quad) >> vec4(8 * aside)) | behind;
+}
+
+// Two bytes of each word, the first ones of two pairs.
+fn apart(bytes: vec4<u32>) -> vec4<u32> {
+    return (bytes & vec4(0xffu)) | ((bytes & vec4(0xff00u)) << vec4(8u));
+}
+
+fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
+    if word < 0 || word >= i32(parameters.other_words) {
+        return vec4(0u);
+    }
+    let index = (row * parameters.quads + quad) * parameters.other_words + u32(word);
+    if colour == 0 {
+        return even[index];
+    }
+    return odd[index];
+}
+
+// Which nodes of a word in the row send anything at first.
+fn starting(word: u32, nodes: Nodes) -> u32 {
+    let x = 8 * word + nodes.parity + vec4(0u, 2u, 4u, 6u);
+    var start = x < vec4(parameters.width);
+    switch parameters.side {
+        case LEFT: {
+            start &= x > vec4(0u);
+        }
+        case RIGHT: {
+            start &= x + 1 < vec4(parameters.width);
+        }
+        case UP: {
+            start &= vec4(nodes.y > 0);
+        }
+        default: {
+            start &= vec4(nodes.y + 1 < parameters.height);
+        }
+    }
+    return bytes_where(start);
+}
+
+// Two words of the finer row.
+@compute @workgroup_size(64)
+fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
+    let row_pairs = (parameters.words + 1) / 2;
+    let line = id.x / row_pairs;
+    let nodes = nodes_at(line, 2 * (id.x - line * row_pairs));
+    if !nodes.exist {
+        return;
+    }
+    let first = plane_index(nodes.row, nodes.word);
+    let is_pair = nodes.word + 1 < parameters.words;
+    let y = coarse_y(nodes.y);
+    let row = u32(y + 1 - i32(parameters.other_first_row));
+    // The senders of every second node are neighbours in their row and colour.
+    let a = coarse_x(column(nodes), y);
+    let b = coarse_x(column(nodes) + 2, y);
+    let mask = vec4(starting(nodes.word, nodes));
+    let next_mask = vec4(starting(nodes.word + 1, nodes));
+    for (var quad = 0u; quad < parameters.quads; quad++) {
+        let even_nodes = coarse_nodes((a + y) & 1, row, a >> 1, quad);
+        let odd_nodes = coarse_nodes((b + y) & 1, row, b >> 1, quad);
+        let index = first + quad * parameters.words;
+        fine[index] = (apart(even_nodes) | (apart(odd_nodes) << vec4(8u))) & mask;
+        if is_pair {
+            let half = vec4(16u);
+            fine[index + 1] = (apart(even_nodes >> half) | (apart(odd_nodes >> half) << vec4(8u))) & next_mask;
+        }
+    }
+}

@@ -1,0 +1,125 @@
+// Labels of the nodes of one colour: those of least belief or, under the schedule `sweep`, decided one after another.
+
+// [colour][row of the grid][word], two bytes for each of the four nodes.
+@group(0) @binding(1) var<storage, read_write> labels: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> cost: array<vec4<u32>>;
+// What all nodes of the other colour sent to their left, right, upper and lower neighbours.
+@group(0) @binding(3) var<storage, read> sent_left: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read> sent_right: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read> sent_up: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read> sent_down: array<vec4<u32>>;
+
+// Enough for 1024 labels and those that fill the last quad.
+const LABEL_BITS: u32 = 11;
+
+override SWEEP: bool = false;
+override BAND_ROWS: u32 = 32;
+
+fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
+    if nodes.parity == 1 {
+        return sent_right[index];
+    }
+    var before = vec4(0u);
+    if nodes.word > 0 {
+        before = sent_right[index - 1];
+    }
+    return (sent_right[index] << vec4(8u)) | (before >> vec4(24u));
+}
+
+fn from_right(index: u32, nodes: Nodes) -> vec4<u32> {
+    if nodes.parity == 0 {
+        return sent_left[index];
+    }
+    var behind = vec4(0u);
+    if nodes.word + 1 < parameters.words {
+        behind = sent_left[index + 1];
+    }
+    return (sent_left[index] >> vec4(8u)) | (behind << vec4(24u));
+}
+
+// Data cost and the messages that count, for a quad of labels.
+fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
+    let row = parameters.quads * parameters.words;
+    var total = sum(cost[index], sent_up[index + row]);
+    if !SWEEP || parameters.colour == 0 {
+        total = sum(total, sum(from_left(index, nodes), from_right(index, nodes)));
+    }
+    if !SWEEP {
+        total = sum(total, sent_down[index - row]);
+    }
+    return total;
+}
+
+// Labels of four nodes of a row and colour, from node 4 word + shift on, where shift is -1, 0 or 1.
+fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
+    let first = (colour * parameters.height + y) * parameters.words;
+    var found: vec4<u32>;
+    for (var i = 0; i < 4; i++) {
+        let node = clamp(4 * i32(word) + i + shift, 0, 4 * i32(parameters.words) - 1);
+        let pair = labels[first + u32(node) / 4][(u32(node) / 2) % 2];
+        found[i] = (pair >> (16 * (u32(node) % 2))) & 0xffff;
+    }
+    return found;
+}
+
+// The smoothness cost of a label beside these, where there are any.
+fn smoothness(label: u32, beside: vec4<u32>, exist: vec4<bool>) -> vec4<u32> {
+    let apart = max(vec4(label), beside) - min(vec4(label), beside);
+    return select(vec4(0u), min(parameters.slope * apart, vec4(parameters.truncation)), exist);
+}
+
+// Labels of neighbours that are decided already, and which of them there are.
+struct Decided {
+    left: vec4<u32>,
+    right: vec4<u32>,
+    up: vec4<u32>,
+    has_left: vec4<bool>,
+    has_right: vec4<bool>,
+    has_up: vec4<bool>,
+}
+
+fn decided_neighbours(nodes: Nodes) -> Decided {
+    let x = column(nodes) + vec4(0u, 2u, 4u, 6u);
+    let other = 1 - parameters.colour;
+    var known: Decided;
+    known.has_up = vec4(nodes.y % BAND_ROWS != 0 && nodes.y != parameters.cut_y);
+    known.up = decided(other, max(nodes.y, 1) - 1, nodes.word, 0);
+    if parameters.colour == 1 {
+        known.has_left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
+        known.has_right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
+        known.left = decided(other, nodes.y, nodes.word, i32(nodes.parity) - 1);
+        known.right = decided(other, nodes.y, nodes.word, i32(nodes.parity));
+    }
+    return known;
+}
+
+@compute @workgroup_size(64)
+fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
+    let nodes = nodes(id.x);
+    if !nodes.exist {
+        return;
+    }
+    var known: Decided;
+    if SWEEP {
+        known = decided_neighbours(nodes);
+    }
+    let first = plane_index(nodes.row, nodes.word);
+    // The total above the label: the least of these is the least total, and of equal ones the smallest label.
+    var best = vec4(0xffffffffu);
+    for (var quad = 0u; quad < parameters.quads; quad++) {
+        let packed = belief(first + quad * parameters.words, nodes);
+        for (var i = 0u; i < 4; i++) {
+            let label = 4 * quad + i;
+            var total = unpack(packed[i]);
+            if SWEEP {
+                total += smoothness(label, known.left, known.has_left)
+                    + smoothness(label, known.right, known.has_right)
+                    + smoothness(label, known.up, known.has_up);
+            }
+            best = min(best, (total << vec4(LABEL_BITS)) | vec4(label));
+        }
+    }
+    best &= vec4((1u << LABEL_BITS) - 1);
+    let pairs = best.xz | (best.yw << vec2(16u));
+    labels[(parameters.colour * parameters.height + nodes.y) * parameters.words + nodes.word] = pairs;
+}

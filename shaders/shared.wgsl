@@ -1,0 +1,139 @@
+// What all kernels share: the parameters of a dispatch, where values lie, and arithmetic on four bytes at a time.
+//
+// The nodes of a grid are split by colour, x + y even (colour 0) or odd (colour 1): one half-step of the schedule
+// `checkerboard` computes what the nodes of one colour send from what those of the other colour sent. Node i of a row and
+// colour is the one at column x = 2 i + parity, where parity = (y + colour) mod 2.
+//
+// A plane holds a byte for each label of each node of one colour: [row][quad][word] vec4<u32>. A component of a vector is
+// one of four labels in a row (a quad), its four bytes are four nodes in a row (a word). So neighbouring invocations read
+// neighbouring vectors, all four neighbours of a node lie in the plane of the other colour, at most one byte aside, and
+// one operation works on 16 values. The row above the first and the one below the last hold zeros, or the next strip's.
+//
+// Bytes of nodes beyond the image's right border are zero in all planes. Labels beyond the last one, up to a whole quad,
+// have data costs so high that they change no message.
+
+struct Parameters {
+    // The grid: its size in nodes, words in a row of a plane, labels and quads of labels.
+    width: u32,
+    height: u32,
+    words: u32,
+    labels: u32,
+    quads: u32,
+    // The strip: row of the grid that its row 0 is.
+    first_row: u32,
+    // The dispatch: nodes of which colour, in rows row, row + row_step, ... of the strip, so many.
+    colour: u32,
+    row: u32,
+    row_step: u32,
+    rows: u32,
+    // The model: smoothness slope and truncation, the least of both, what data costs are clipped at, and the disparity
+    // of label 0.
+    slope: u32,
+    truncation: u32,
+    step: u32,
+    clip: u32,
+    min_disparity: i32,
+    // What labels beyond the last one cost.
+    padding_cost: u32,
+    // First column and row behind a cut, 0 where there is none.
+    cut_x: u32,
+    cut_y: u32,
+    // update_messages under the schedule `sweep`: which sides to send to, bit 0 left, 1 right, 2 up, 3 down.
+    sends: u32,
+    // refine: the side that the messages are sent to, numbered likewise.
+    side: u32,
+    // coarsen and refine: size, words and strip of the grid that is read.
+    other_width: u32,
+    other_height: u32,
+    other_words: u32,
+    other_first_row: u32,
+}
+
+@group(0) @binding(0) var<storage, read> parameters: Parameters;
+
+const LEFT: u32 = 0;
+const RIGHT: u32 = 1;
+const UP: u32 = 2;
+const DOWN: u32 = 3;
+
+// Four nodes of one colour in a row.
+struct Nodes {
+    // Row in the strip, and in the grid.
+    row: u32,
+    y: u32,
+    // Which word of the row, and which column is 2 i + parity.
+    word: u32,
+    parity: u32,
+    // Whether this invocation has any.
+    exist: bool,
+}
+
+fn nodes(invocation: u32) -> Nodes {
+    let line = invocation / parameters.words;
+    return nodes_at(line, invocation - line * parameters.words);
+}
+
+// Those of a word of one of the dispatch's rows.
+fn nodes_at(line: u32, word: u32) -> Nodes {
+    let row = parameters.row + line * parameters.row_step;
+    let y = parameters.first_row + row;
+    return Nodes(row, y, word, (y + parameters.colour) & 1, line < parameters.rows);
+}
+
+// Column of the first of the four; the others follow at distances of 2.
+fn column(nodes: Nodes) -> u32 {
+    return 8 * nodes.word + nodes.parity;
+}
+
+// Index of a node's first quad in a plane; further quads follow at distances of `words`.
+fn plane_index(row: u32, word: u32) -> u32 {
+    return (row + 1) * parameters.quads * parameters.words + word;
+}
+
+// A mask of whole bytes from four conditions.
+fn bytes_where(condition: vec4<bool>) -> u32 {
+    let bytes = select(vec4(0u), vec4(0xffu, 0xff00u, 0xff0000u, 0xff000000u), condition);
+    return bytes.x | bytes.y | bytes.z | bytes.w;
+}
+
+// The same byte four times.
+fn splat(byte: u32) -> vec4<u32> {
+    return vec4(byte * 0x01010101u);
+}
+
+// The four bytes of a word.
+fn unpack(word: u32) -> vec4<u32> {
+    return (vec4(word) >> vec4(0u, 8u, 16u, 24u)) & vec4(0xffu);
+}
+
+fn pack(bytes: vec4<u32>) -> u32 {
+    return bytes.x | (bytes.y << 8) | (bytes.z << 16) | (bytes.w << 24);
+}
+
+const HIGH = vec4<u32>(0x80808080u);
+
+// The highest bit of each byte, copied to all of its bits.
+fn spread(high: vec4<u32>) -> vec4<u32> {
+    return high | (high - (high >> vec4(7u)));
+}
+
+// The smaller of two bytes, for all 16. Subtracting the low seven bits with the eighth set never borrows from the next
+// byte; the eighth bits decide, and where they are equal, the difference does.
+fn minimum(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    let difference = (a | HIGH) - (b & ~HIGH);
+    let not_less = spread(((a & ~b) | (~(a ^ b) & difference)) & HIGH);
+    return (a & ~not_less) | (b & not_less);
+}
+
+// Whether sums of bytes may pass 255 and have to stay there.
+override SATURATING: bool = true;
+
+// The sum of two bytes, for all 16.
+fn sum(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    if !SATURATING {
+        return a + b;
+    }
+    let low = (a & ~HIGH) + (b & ~HIGH);
+    let over = ((a & b) | ((a | b) & low)) & HIGH;
+    return (low ^ ((a ^ b) & HIGH)) | spread(over);
+}

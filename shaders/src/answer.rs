@@ -1,0 +1,83 @@
+//! What goes up to a device and what comes down: pairs, labels and messages in their layouts there.
+
+use bp_core::{Error, Plan, Schedule, Seed, Side, Size, StereoPair};
+
+use crate::{Program, Queue, layout::colour};
+
+/// Bytes of one image in the upload buffer, up to the next vector.
+pub(crate) fn image_bytes(size: Size) -> u64 {
+    (3 * size.pixels() as u64).next_multiple_of(16)
+}
+
+/// Bytes of the seed behind both images: x, y, label and whether there is one.
+pub(crate) const SEED_BYTES: u64 = 16;
+
+/// Bytes of all labels: two for each node of a row of both colours, up to whole words.
+pub(crate) fn label_bytes(size: Size) -> u64 {
+    2 * size.height as u64 * size.width.div_ceil(8) as u64 * 8
+}
+
+/// Fills the upload buffer.
+pub(crate) fn write_pair(pair: &StereoPair, seed: Option<Seed>, upload: &mut [u8]) {
+    let bytes = image_bytes(pair.size()) as usize;
+    for (view, place) in [pair.left(), pair.right()].into_iter().zip(upload.chunks_mut(bytes)) {
+        let pixels = view.pixels().as_flattened();
+        place[..pixels.len()].copy_from_slice(pixels);
+    }
+    let seed = seed.map_or([0; 4], |seed| [seed.x as u32, seed.y as u32, seed.label.into(), 1]);
+    upload[2 * bytes..][..SEED_BYTES as usize].copy_from_slice(bytemuck::cast_slice(&seed));
+}
+
+/// Reads the labels, `[colour][row][node]` in the download buffer, into `[height][width]`.
+pub(crate) fn read_labels(size: Size, download: &[u8], labels: &mut [u16]) {
+    let row_nodes = size.width.div_ceil(8) * 4;
+    for (y, row) in labels.chunks_exact_mut(size.width).enumerate() {
+        for colour in 0..2 {
+            let stored = &download[2 * (colour * size.height + y) * row_nodes..];
+            let nodes = row.iter_mut().skip((y + colour) % 2).step_by(2);
+            nodes
+                .zip(stored.chunks_exact(2))
+                .for_each(|(label, bytes)| *label = u16::from_le_bytes([bytes[0], bytes[1]]));
+        }
+    }
+}
+
+/// Copies out what every node last received from `side`, see [`bp_core::Solver::read_messages`].
+pub(crate) fn read_messages(
+    plan: &Plan,
+    program: &Program,
+    queue: &mut dyn Queue,
+    side: Side,
+    messages: &mut [u8],
+) -> Result<(), Error> {
+    messages.fill(0);
+    let (size, labels) = (plan.image_size(), plan.model().labels());
+    let grid = &program.grids[0];
+    for (index, &strip) in grid.strips.iter().enumerate() {
+        let buffers = program.last_sent(index, side.opposite());
+        let planes = [queue.read(buffers[0])?, queue.read(buffers[1])?];
+        for node in
+            (0..size.pixels()).map(|i| (i % size.width, i / size.width)).filter(|&node| is_held(plan, node, side))
+        {
+            let Some(sender) = plan.neighbour(0, node, side) else { continue };
+            if sender.1 < strip.first || sender.1 >= strip.first + strip.rows {
+                continue;
+            }
+            let received = &mut messages[(node.1 * size.width + node.0) * labels..][..labels];
+            for (label, message) in received.iter_mut().enumerate() {
+                *message = planes[colour(sender)][grid.byte(strip, sender, label)];
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether the node's edge on `side` holds the message to it: under [`Schedule::Sweep`] an edge holds one of the two.
+fn is_held(plan: &Plan, node: (usize, usize), side: Side) -> bool {
+    plan.settings().schedule != Schedule::Sweep
+        || match side {
+            Side::Down => true,
+            Side::Up => false,
+            Side::Left | Side::Right => colour(node) == 0,
+        }
+}

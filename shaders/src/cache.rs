@@ -1,0 +1,37 @@
+//! Compiled pipelines, kept between runs in the user's cache folder.
+
+use std::{fs, io::Write as _, path::PathBuf};
+
+use sha2::{Digest, Sha256};
+
+/// Length of a SHA-256 sum.
+const SUM_BYTES: usize = 32;
+
+/// The folder, where the system has one for such things: a driver that keeps no cache of its own makes the first
+/// start after a reboot slow without it.
+#[must_use]
+pub fn folder() -> Option<PathBuf> {
+    Some(dirs::cache_dir()?.join("belief-propagation-stereo"))
+}
+
+/// What was stored under this key, if it is still whole: a driver may not survive reading anything else.
+#[must_use]
+pub fn load(key: &str) -> Option<Vec<u8>> {
+    let stored = fs::read(folder()?.join(key)).ok()?;
+    let (sum, data) = stored.split_at_checked(SUM_BYTES)?;
+    (Sha256::digest(data).as_slice() == sum).then(|| data.to_vec())
+}
+
+/// Stores `data` under this key, whole or not at all. A cache that cannot be written is not missed.
+pub fn store(key: &str, data: &[u8]) {
+    let Some(folder) = folder() else { return };
+    let write = || -> std::io::Result<()> {
+        fs::create_dir_all(&folder)?;
+        let mut file = tempfile::NamedTempFile::new_in(&folder)?;
+        file.write_all(&Sha256::digest(data))?;
+        file.write_all(data)?;
+        file.persist(folder.join(key))?;
+        Ok(())
+    };
+    _ = write();
+}

@@ -1,0 +1,31 @@
+//! A tiny problem with a known answer.
+
+use bp_core::{Device, Error, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings, StereoPair};
+
+/// Solves the pair of [`bp_core::worked_example`] on two grids, and compares with the labels told there: a device that
+/// answers otherwise is not to be trusted with anything larger.
+///
+/// # Errors
+/// What went wrong.
+pub fn check(device: &dyn Device) -> Result<(), String> {
+    let labels = solve(device).map_err(|error| format!("a tiny problem failed: {error}"))?;
+    let expected = [0, 1, 1, 0, 1, 1];
+    if labels == expected {
+        return Ok(());
+    }
+    Err(format!(
+        "it answered a tiny problem with the labels {labels:?} in place of {expected:?}: its driver is at fault"
+    ))
+}
+
+fn solve(device: &dyn Device) -> Result<Vec<u16>, Error> {
+    let left = Image::from_grey(3, 2, &[40, 52, 60, 40, 45, 60])?;
+    let right = Image::from_grey(3, 2, &[52, 60, 61, 40, 60, 60])?;
+    let pair = StereoPair::new(left, right)?;
+    let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
+    let settings = Settings { grids: 2, steps: 1, schedule, message_start, cut: None, coarse_clip: false };
+    let plan = Plan::new(pair.size(), Model::new(Profile::Thesis, 3)?, settings)?;
+    let mut matcher = Matcher::new(device, plan)?;
+    matcher.solve(&pair)?;
+    Ok(matcher.labels().to_vec())
+}

@@ -1,0 +1,76 @@
+//! The buffers of a program.
+
+use bp_core::{Plan, Schedule};
+
+use crate::{
+    Buffer, Memory,
+    answer::{SEED_BYTES, image_bytes, label_bytes},
+    layout::Grid,
+};
+
+/// Indices of a strip's buffers, each for colour 0 and 1.
+pub(crate) struct StripBuffers {
+    /// Stored data costs.
+    pub(crate) cost: [usize; 2],
+    /// Unclipped ones.
+    pub(crate) sums: Option<[usize; 2]>,
+    /// What nodes sent, `[set][side][colour]`; two sets under [`Schedule::Sync`], else one.
+    pub(crate) sent: Vec<[[usize; 2]; 4]>,
+}
+
+/// All buffers and their indices.
+pub(crate) struct Buffers {
+    pub(crate) list: Vec<Buffer>,
+    /// Bytes of the left and the right image.
+    pub(crate) images: [usize; 2],
+    /// What the profile compares, of both.
+    pub(crate) features: [usize; 2],
+    pub(crate) seed: usize,
+    pub(crate) labels: usize,
+    /// Stand in for sums that are not kept, where a kernel would read or write them.
+    pub(crate) unused: usize,
+    pub(crate) unused_written: usize,
+    /// `[grid][strip]`.
+    pub(crate) strips: Vec<Vec<StripBuffers>>,
+}
+
+impl Buffers {
+    pub(crate) fn new(plan: &Plan, grids: &[Grid]) -> Self {
+        let size = plan.image_size();
+        let mut list = Vec::new();
+        let mut add = |name, bytes: u64, memory| {
+            list.push(Buffer { name, bytes: bytes.next_multiple_of(16), memory });
+            list.len() - 1
+        };
+        // In the order of Program::PARAMETERS, UPLOAD and DOWNLOAD; the size of the first is not known yet.
+        add("parameters", 0, Memory::Device);
+        add("upload", 2 * image_bytes(size) + SEED_BYTES, Memory::Upload);
+        add("download", label_bytes(size), Memory::Download);
+        let mut device = |name, bytes| add(name, bytes, Memory::Device);
+        let features = 4 * size.pixels() as u64;
+        Self {
+            images: [(); 2].map(|()| device("images", image_bytes(size))),
+            features: [(); 2].map(|()| device("features", features)),
+            seed: device("seed", SEED_BYTES),
+            labels: device("labels", label_bytes(size)),
+            unused: device("unused", 16),
+            unused_written: device("unused", 16),
+            strips: grids.iter().map(|grid| strips(plan, grid, &mut device)).collect(),
+            list,
+        }
+    }
+}
+
+fn strips(plan: &Plan, grid: &Grid, device: &mut impl FnMut(&'static str, u64) -> usize) -> Vec<StripBuffers> {
+    let sets = if plan.settings().schedule == Schedule::Sync { 2 } else { 1 };
+    let strip = |&strip| {
+        let plane = grid.plane_bytes(strip);
+        let mut colours = |name, bytes| [(); 2].map(|()| device(name, bytes));
+        StripBuffers {
+            cost: colours("data cost", plane),
+            sums: (grid.sum_bytes > 0).then(|| colours("data cost sums", grid.sums_bytes(strip))),
+            sent: (0..sets).map(|_| [(); 4].map(|()| colours("messages", plane))).collect(),
+        }
+    };
+    grid.strips.iter().map(strip).collect()
+}

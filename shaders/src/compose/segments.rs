@@ -1,0 +1,229 @@
+//! The commands of every stage.
+
+use bp_core::{MessageStart, Schedule, Side, Stage};
+
+use super::{Composer, Nodes, Rows, Work};
+use crate::{
+    Command, Kernel, Parameters, Pipeline, Program, Segment,
+    answer::{SEED_BYTES, image_bytes, label_bytes},
+    layout::Strip,
+};
+
+impl Composer<'_> {
+    pub(super) fn match_cost(&mut self) -> Segment {
+        let (buffers, size) = (self.buffers, self.plan.image_size());
+        let image = image_bytes(size);
+        let upload =
+            |to, from_offset, bytes| Command::Copy { from: Program::UPLOAD, from_offset, to, to_offset: 0, bytes };
+        let mut commands = vec![
+            upload(buffers.images[0], 0, image),
+            upload(buffers.images[1], image, image),
+            upload(buffers.seed, 2 * image, SEED_BYTES),
+            Command::Barrier,
+        ];
+        let profile = ("PROFILE", self.plan.model().profile() as u32);
+        for side in 0..2 {
+            let parameters =
+                Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
+            let rows = Rows { first: 0, step: 1, count: size.height };
+            let work = Work { parameters, rows, row_invocations: size.width };
+            let pipeline = Pipeline { kernel: Kernel::Features, constants: vec![profile] };
+            self.dispatch(&mut commands, pipeline, vec![buffers.images[side], buffers.features[side]], work);
+        }
+        commands.push(Command::Barrier);
+        for nodes in self.nodes(0) {
+            let constants = vec![profile, ("SUM_BYTES", self.grids[0].sum_bytes as u32)];
+            let pipeline = Pipeline { kernel: Kernel::MatchCost, constants };
+            let [left, right] = buffers.features;
+            let bound = [self.costs_written(nodes).as_slice(), &[left, right, buffers.seed]].concat();
+            self.dispatch(&mut commands, pipeline, bound, self.all_rows(nodes));
+        }
+        self.segment(Stage::MatchCost, commands)
+    }
+
+    /// The buffers that data costs of these nodes are stored to.
+    fn costs_written(&self, nodes: Nodes) -> [usize; 2] {
+        let strip = self.strip(nodes);
+        let sums = strip.sums.map_or(self.buffers.unused_written, |sums| sums[nodes.colour]);
+        [strip.cost[nodes.colour], sums]
+    }
+
+    /// Every strip of the finer grid gives its rows of the coarser one.
+    pub(super) fn coarsen(&mut self, grid: usize) -> Segment {
+        let (fine, coarse) = (&self.grids[grid - 1], &self.grids[grid]);
+        let constants = vec![("SUM_BYTES", coarse.sum_bytes as u32), ("FINE_SUM_BYTES", fine.sum_bytes as u32)];
+        let pipeline = Pipeline { kernel: Kernel::Coarsen, constants };
+        let mut commands = Vec::new();
+        for (read, &from) in fine.strips.iter().enumerate() {
+            let strip = coarse.strip_of(from.first / 2);
+            let first = from.first / 2 - coarse.strips[strip].first;
+            let rows = Rows { first, step: 1, count: from.rows.div_ceil(2) };
+            for nodes in [0, 1].map(|colour| Nodes { grid, strip, colour }) {
+                let work = self.reading(self.work(nodes, rows), grid - 1, from);
+                let children = &self.buffers.strips[grid - 1][read];
+                let sums = children.sums.unwrap_or([self.buffers.unused; 2]);
+                let bound = [self.costs_written(nodes), children.cost, sums].concat();
+                self.dispatch(&mut commands, pipeline.clone(), bound, work);
+            }
+        }
+        self.segment(Stage::Coarsen, commands)
+    }
+
+    /// The same work, reading a strip of another grid.
+    fn reading(&self, work: Work, grid: usize, strip: Strip) -> Work {
+        let other = &self.grids[grid];
+        let parameters = Parameters {
+            other_width: other.size.width as u32,
+            other_height: other.size.height as u32,
+            other_words: other.words as u32,
+            other_first_row: strip.first as u32,
+            ..work.parameters
+        };
+        Work { parameters, ..work }
+    }
+
+    pub(super) fn refine(&mut self, grid: usize) -> Segment {
+        let mut commands = Vec::new();
+        for (nodes, side) in self.nodes(grid).flat_map(|nodes| Side::ALL.map(|side| (nodes, side))) {
+            let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
+            if grid + 1 == self.plan.grids() || !self.starts(nodes, side) {
+                commands.push(Command::Clear { buffer: sent });
+            } else {
+                self.refine_side(&mut commands, nodes, side, sent);
+            }
+        }
+        self.join_strips(&mut commands, grid, 0, &[0, 1]);
+        self.segment(Stage::Refine, commands)
+    }
+
+    /// Whether these nodes take over what was sent to that side, see [`Schedule::Sweep`].
+    fn starts(&self, nodes: Nodes, side: Side) -> bool {
+        self.plan.settings().schedule != Schedule::Sweep
+            || match side {
+                Side::Up => true,
+                Side::Down => false,
+                Side::Left | Side::Right => nodes.colour == 1,
+            }
+    }
+
+    fn refine_side(&mut self, commands: &mut Vec<Command>, nodes: Nodes, side: Side, sent: usize) {
+        let settings = self.plan.settings();
+        let start = match settings.message_start {
+            _ if settings.schedule == Schedule::Sweep => 2,
+            MessageStart::Receiver => 0,
+            MessageStart::Sender => 1,
+        };
+        let coarse = &self.grids[nodes.grid + 1];
+        let from = coarse.strip_of(self.grids[nodes.grid].strips[nodes.strip].first / 2);
+        let planes = &self.buffers.strips[nodes.grid + 1][from].sent[self.set(settings.steps)][side as usize];
+        let mut work = self.reading(self.all_rows(nodes), nodes.grid + 1, coarse.strips[from]);
+        work.parameters.side = side as u32;
+        work.row_invocations = work.row_invocations.div_ceil(2);
+        let pipeline = Pipeline { kernel: Kernel::Refine, constants: vec![("START", start)] };
+        self.dispatch(commands, pipeline, vec![sent, planes[0], planes[1]], work);
+    }
+
+    /// One step that depends on the step before only, or one loop of [`Schedule::Sweep`].
+    pub(super) fn step(&mut self, grid: usize, step: u32) -> Segment {
+        let mut commands = Vec::new();
+        let (read, written) = (self.set(step), self.set(step + 1));
+        match self.plan.settings().schedule {
+            Schedule::Sync => {
+                self.nodes(grid).for_each(|nodes| self.update(&mut commands, nodes, read, written));
+                self.join_strips(&mut commands, grid, written, &[0, 1]);
+            }
+            Schedule::Checkerboard => {
+                let colour = step as usize % 2;
+                let nodes = self.nodes(grid).filter(|nodes| nodes.colour == colour);
+                nodes.for_each(|nodes| self.update(&mut commands, nodes, read, written));
+                self.join_strips(&mut commands, grid, written, &[colour]);
+            }
+            Schedule::Sweep => self.sweep(&mut commands, grid),
+        }
+        self.segment(Stage::UpdateMessages, commands)
+    }
+
+    fn update(&mut self, commands: &mut Vec<Command>, nodes: Nodes, read: usize, written: usize) {
+        let pipeline = self.update_pipeline(false);
+        let bound = self.messages(nodes, read, written);
+        self.dispatch(commands, pipeline, bound, self.all_rows(nodes));
+    }
+
+    pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
+        let constants =
+            vec![("SATURATING", self.saturates(3, self.plan.model().step())), ("SELECTIVE", selective.into())];
+        Pipeline { kernel: Kernel::UpdateMessages, constants }
+    }
+
+    /// Data cost, what the other colour sent, and what these nodes send.
+    pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
+        let strip = self.strip(nodes);
+        let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
+        let sent = strip.sent[written].map(|side| side[nodes.colour]);
+        [&[strip.cost[nodes.colour]], received.as_slice(), &sent].concat()
+    }
+
+    /// Whether a stored data cost plus so many messages plus `more` may pass 255, as 1 or 0.
+    fn saturates(&self, messages: u32, more: u8) -> u32 {
+        let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
+        (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()
+    }
+
+    /// Copies what was sent across the border of two strips to where the other strip looks for it.
+    fn join_strips(&self, commands: &mut Vec<Command>, grid: usize, set: usize, colours: &[usize]) {
+        let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
+        let bytes = layout.row_bytes();
+        for upper in 0..strips.len() - 1 {
+            if upper == 0 {
+                commands.push(Command::Barrier);
+            }
+            let rows = layout.strips[upper].rows as u64;
+            for &colour in colours {
+                let buffer = |strip: usize, side: Side| strips[strip].sent[set][side as usize][colour];
+                let mut copy = |side, (from, from_row), (to, to_row)| {
+                    let (from, to) = (buffer(from, side), buffer(to, side));
+                    commands.push(Command::Copy {
+                        from,
+                        from_offset: from_row * bytes,
+                        to,
+                        to_offset: to_row * bytes,
+                        bytes,
+                    });
+                };
+                // Row 0 of a strip is the second row of its planes.
+                copy(Side::Down, (upper, rows), (upper + 1, 0));
+                copy(Side::Up, (upper + 1, 1), (upper, rows + 1));
+            }
+        }
+    }
+
+    pub(super) fn select_labels(&mut self) -> Segment {
+        let mut commands = Vec::new();
+        if self.plan.settings().schedule == Schedule::Sweep {
+            self.decode(&mut commands);
+        } else {
+            for nodes in self.nodes(0) {
+                self.select(&mut commands, nodes, self.all_rows(nodes));
+            }
+        }
+        let (from, bytes) = (self.buffers.labels, label_bytes(self.plan.image_size()));
+        commands.push(Command::Barrier);
+        commands.push(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
+        self.segment(Stage::SelectLabels, commands)
+    }
+
+    pub(super) fn select(&mut self, commands: &mut Vec<Command>, nodes: Nodes, work: Work) {
+        let sweep = self.plan.settings().schedule == Schedule::Sweep;
+        let constants = vec![
+            ("SATURATING", self.saturates(4, 0)),
+            ("SWEEP", sweep.into()),
+            ("BAND_ROWS", bp_core::BAND_ROWS as u32),
+        ];
+        let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
+        let set = self.set(self.plan.settings().steps);
+        let strip = self.strip(nodes);
+        let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
+        let bound = [&[self.buffers.labels, strip.cost[nodes.colour]], received.as_slice()].concat();
+        self.dispatch(commands, pipeline, bound, work);
+    }
+}

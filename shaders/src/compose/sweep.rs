@@ -1,0 +1,58 @@
+//! The schedule `sweep`: all bands at once, their rows one after another.
+
+use bp_core::{BAND_ROWS, Side};
+
+use super::{Composer, Nodes, Rows};
+use crate::Command;
+
+const EVEN: usize = 0;
+const ODD: usize = 1;
+
+impl Composer<'_> {
+    /// One loop on a grid: forward and backward through every band, see [`bp_core::Schedule::Sweep`].
+    pub(super) fn sweep(&mut self, commands: &mut Vec<Command>, grid: usize) {
+        let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
+        for row in 0..last {
+            self.send(commands, (grid, EVEN, row), &[Side::Left, Side::Right, Side::Down]);
+            self.send(commands, (grid, ODD, row), &[Side::Down]);
+        }
+        self.send(commands, (grid, EVEN, last), &horizontal);
+        for row in (1..=last).rev() {
+            self.send(commands, (grid, ODD, row), &[Side::Left, Side::Right, Side::Up]);
+            self.send(commands, (grid, EVEN, row), &[Side::Up]);
+        }
+        self.send(commands, (grid, ODD, 0), &horizontal);
+    }
+
+    /// The nodes of one colour in one row of every band send to these sides.
+    fn send(&mut self, commands: &mut Vec<Command>, (grid, colour, row): (usize, usize, usize), sides: &[Side]) {
+        let pipeline = self.update_pipeline(true);
+        for (nodes, rows) in self.band_rows(grid, colour, row) {
+            let mut work = self.work(nodes, rows);
+            work.parameters.sends = sides.iter().map(|&side| 1 << side as u32).sum();
+            let bound = self.messages(nodes, 0, 0);
+            self.dispatch(commands, pipeline.clone(), bound, work);
+        }
+        commands.push(Command::Barrier);
+    }
+
+    /// Labels of every band from its top row to its bottom row, in a row first of even nodes.
+    pub(super) fn decode(&mut self, commands: &mut Vec<Command>) {
+        for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
+            for (nodes, rows) in self.band_rows(0, colour, row) {
+                self.select(commands, nodes, self.work(nodes, rows));
+            }
+            commands.push(Command::Barrier);
+        }
+    }
+
+    /// The row so far below the first one of every band, in each strip that has any; strips begin with a band.
+    fn band_rows(&self, grid: usize, colour: usize, row: usize) -> Vec<(Nodes, Rows)> {
+        let strips = self.grids[grid].strips.iter().enumerate();
+        let rows = strips.map(|(strip, &layout)| {
+            let count = layout.rows.saturating_sub(row).div_ceil(BAND_ROWS);
+            (Nodes { grid, strip, colour }, Rows { first: row, step: BAND_ROWS, count })
+        });
+        rows.filter(|(_, rows)| rows.count > 0).collect()
+    }
+}

@@ -1,0 +1,67 @@
+//! How fast a device copies its own memory: the measure of its kernels.
+
+use std::time::{Duration, Instant};
+
+use bp_core::{Error, Stage};
+
+use crate::{Buffer, Command, Limits, Memory, Program, Queue, Segment};
+
+/// Bytes copied at a time where buffers may be so large: more than any cache holds.
+const BYTES: u64 = 256 << 20;
+/// Copies of which the median is taken, after one that is not timed.
+const COPIES: usize = 9;
+
+/// Bytes a second, read and written ones together; `prepare` makes a program ready on the device.
+///
+/// # Errors
+/// Those of the device.
+pub fn copy_rate(
+    limits: &Limits,
+    prepare: impl FnOnce(&Program) -> Result<Box<dyn Queue>, Error>,
+) -> Result<f64, Error> {
+    let memory = limits.memory_bytes.unwrap_or(u64::MAX);
+    let bytes = BYTES.min(limits.buffer_bytes).min(memory / 4) / 16 * 16;
+    let mut queue = prepare(&program(bytes))?;
+    let mut times = [Duration::ZERO; COPIES];
+    time(queue.as_mut())?;
+    for time_of_copy in &mut times {
+        *time_of_copy = time(queue.as_mut())?;
+    }
+    times.sort_unstable();
+    Ok(2.0 * bytes as f64 / times[COPIES / 2].as_secs_f64().max(f64::MIN_POSITIVE))
+}
+
+/// Time of a copy by the device's clock, or the host's where it has none.
+fn time(queue: &mut dyn Queue) -> Result<Duration, Error> {
+    queue.begin(&mut |_| ())?;
+    let start = Instant::now();
+    queue.mark()?;
+    queue.append(0)?;
+    queue.mark()?;
+    queue.finish(&mut |_| ())?;
+    let elapsed = start.elapsed();
+    Ok(queue.times().first().copied().unwrap_or(elapsed))
+}
+
+/// A program that copies one buffer to another.
+fn program(bytes: u64) -> Program {
+    let buffer = |name, bytes, memory| Buffer { name, bytes, memory };
+    let copy = Command::Copy { from: 3, from_offset: 0, to: 4, to_offset: 0, bytes };
+    Program {
+        buffers: vec![
+            buffer("parameters", 256, Memory::Device),
+            buffer("upload", 16, Memory::Upload),
+            buffer("download", 16, Memory::Download),
+            buffer("copied", bytes, Memory::Device),
+            buffer("copy", bytes, Memory::Device),
+        ],
+        parameters: vec![0; 256],
+        pipelines: Vec::new(),
+        bind_groups: Vec::new(),
+        segments: vec![Segment { stage: Stage::MatchCost, commands: vec![copy], moved_bytes: 2 * bytes }],
+        marks: 2,
+        submission_entries: 1,
+        grids: Vec::new(),
+        last_sent: Vec::new(),
+    }
+}

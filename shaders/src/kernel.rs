@@ -1,0 +1,107 @@
+//! The kernels: one WGSL file each.
+
+use std::fmt;
+
+/// Invocations of a workgroup; the WGSL files say the same.
+pub const WORKGROUP: u32 = 64;
+
+/// What a kernel does with a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// Reads it.
+    Read,
+    /// Writes it, and may read what it wrote.
+    Write,
+}
+
+use Access::{Read, Write};
+
+/// A kernel, named like its file and its entry point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kernel {
+    /// What the profile compares, of every pixel of one image; part of the stage `match_cost`.
+    Features,
+    /// Data costs of the image.
+    MatchCost,
+    /// Data costs of a coarser grid.
+    Coarsen,
+    /// First messages of a grid.
+    Refine,
+    /// Message passing.
+    UpdateMessages,
+    /// Labels.
+    SelectLabels,
+}
+
+impl Kernel {
+    /// All kernels.
+    pub const ALL: [Self; 6] =
+        [Self::Features, Self::MatchCost, Self::Coarsen, Self::Refine, Self::UpdateMessages, Self::SelectLabels];
+
+    /// The name of the kernel, of its file and of its entry point.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Features => "features",
+            Self::MatchCost => "match_cost",
+            Self::Coarsen => "coarsen",
+            Self::Refine => "refine",
+            Self::UpdateMessages => "update_messages",
+            Self::SelectLabels => "select_labels",
+        }
+    }
+
+    /// The whole WGSL text: what all kernels share, then the kernel's own.
+    #[must_use]
+    pub fn source(self) -> String {
+        let own = match self {
+            Self::Features => include_str!("../features.wgsl"),
+            Self::MatchCost => include_str!("../match_cost.wgsl"),
+            Self::Coarsen => include_str!("../coarsen.wgsl"),
+            Self::Refine => include_str!("../refine.wgsl"),
+            Self::UpdateMessages => include_str!("../update_messages.wgsl"),
+            Self::SelectLabels => include_str!("../select_labels.wgsl"),
+        };
+        let costs = match self {
+            Self::MatchCost | Self::Coarsen => include_str!("../costs.wgsl"),
+            _ => "",
+        };
+        [include_str!("../shared.wgsl"), costs, own].concat()
+    }
+
+    /// What it does with the storage buffers bound to group 0 from binding 1 on, in order. Binding 0 is one block of
+    /// the parameters, at a dynamic offset, which it reads.
+    #[must_use]
+    pub fn bindings(self) -> &'static [Access] {
+        match self {
+            Self::Features => &[Read, Write],
+            Self::MatchCost => &[Write, Write, Read, Read, Read],
+            Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
+            Self::Refine => &[Write, Read, Read],
+            Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write],
+            Self::SelectLabels => &[Write, Read, Read, Read, Read, Read],
+        }
+    }
+
+    /// Most storage buffers that any kernel binds, the parameters included.
+    #[must_use]
+    pub fn most_bindings() -> u32 {
+        Self::ALL.iter().map(|kernel| 1 + kernel.bindings().len() as u32).max().unwrap_or(0)
+    }
+}
+
+/// What is compiled as one: a kernel and the values of its pipeline-overridable constants.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Pipeline {
+    /// The kernel.
+    pub kernel: Kernel,
+    /// Name and value of each constant that its WGSL text declares with `override`.
+    pub constants: Vec<(&'static str, u32)>,
+}
+
+impl fmt::Display for Pipeline {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.kernel.name())?;
+        self.constants.iter().try_for_each(|(name, value)| write!(f, " {name}={value}"))
+    }
+}

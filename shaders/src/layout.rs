@@ -1,0 +1,120 @@
+//! Where the values of a plan lie in memory.
+
+use std::ops::Range;
+
+use bp_core::{BAND_ROWS, Error, Plan, Schedule, Size};
+
+use crate::Limits;
+
+/// Nodes of one colour whose bytes share a word.
+const WORD_NODES: usize = 4;
+/// Labels that share a vector.
+const QUAD_LABELS: usize = 4;
+/// Bytes of a vector: four labels at four nodes.
+const VECTOR_BYTES: u64 = 16;
+
+/// Rows of a grid whose planes are buffers of their own, so that no buffer is larger than a device allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Strip {
+    /// First row.
+    pub(crate) first: usize,
+    /// How many rows.
+    pub(crate) rows: usize,
+}
+
+/// A grid cut into strips.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid {
+    pub(crate) size: Size,
+    /// Words in a row of a plane.
+    pub(crate) words: usize,
+    /// Quads of labels.
+    pub(crate) quads: usize,
+    /// Bytes of a sum kept for the coarser grid: 0 where none are kept, 2 or 4.
+    pub(crate) sum_bytes: usize,
+    pub(crate) strips: Vec<Strip>,
+}
+
+impl Grid {
+    fn new(plan: &Plan, grid: usize) -> Self {
+        let size = plan.size(grid);
+        let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid).clamp(2, 4) } else { 0 };
+        let quads = plan.model().labels().div_ceil(QUAD_LABELS);
+        let words = size.width.div_ceil(2 * WORD_NODES);
+        Self { size, words, quads, sum_bytes, strips: vec![Strip { first: 0, rows: size.height }] }
+    }
+
+    /// Bytes of one row of a plane.
+    pub(crate) fn row_bytes(&self) -> u64 {
+        (self.quads as u64).saturating_mul(self.words as u64).saturating_mul(VECTOR_BYTES)
+    }
+
+    /// Bytes of a strip's plane, one row above and one below included.
+    pub(crate) fn plane_bytes(&self, strip: Strip) -> u64 {
+        self.row_bytes().saturating_mul(strip.rows as u64 + 2)
+    }
+
+    /// Bytes of the sums beside a plane.
+    pub(crate) fn sums_bytes(&self, strip: Strip) -> u64 {
+        self.plane_bytes(strip).saturating_mul(self.sum_bytes as u64)
+    }
+
+    /// The most rows of a strip whose largest buffer fits.
+    fn most_rows(&self, bytes: u64) -> usize {
+        let rows = bytes / self.row_bytes().saturating_mul(self.sum_bytes.max(1) as u64).max(1);
+        usize::try_from(rows.saturating_sub(2)).unwrap_or(usize::MAX)
+    }
+
+    fn cut(&mut self, rows: usize) {
+        let height = self.size.height;
+        self.strips = (0..height).step_by(rows).map(|first| Strip { first, rows: rows.min(height - first) }).collect();
+    }
+
+    /// The strip with row `y`.
+    pub(crate) fn strip_of(&self, y: usize) -> usize {
+        self.strips.iter().rposition(|strip| strip.first <= y).unwrap_or(0)
+    }
+
+    /// Where in a strip's plane the byte of a label at the node (x, y) lies; the node's colour says in which plane.
+    pub(crate) fn byte(&self, strip: Strip, (x, y): (usize, usize), label: usize) -> usize {
+        let node = x / 2;
+        let vector = ((y - strip.first + 1) * self.quads + label / QUAD_LABELS) * self.words + node / WORD_NODES;
+        (vector * QUAD_LABELS + label % QUAD_LABELS) * WORD_NODES + node % WORD_NODES
+    }
+}
+
+/// Colour of a node.
+pub(crate) fn colour((x, y): (usize, usize)) -> usize {
+    (x + y) % 2
+}
+
+/// The grids of a plan, cut into strips where a buffer would be too large: those of a grid begin where two rows of the
+/// next finer one's begin, or, under [`Schedule::Sweep`], also where a band begins.
+///
+/// # Errors
+/// [`Error::Unsupported`] where the fewest rows of a strip are too large.
+pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
+    let mut grids: Vec<_> = (0..plan.grids()).map(|grid| Grid::new(plan, grid)).collect();
+    let bytes = limits.binding_bytes.min(limits.buffer_bytes);
+    let too_large = |grid: &Grid| grid.most_rows(bytes) < grid.size.height;
+    let cut = 0..grids.iter().position(|grid| !too_large(grid)).unwrap_or(grids.len());
+    if cut.is_empty() {
+        return Ok(grids);
+    }
+    let rows = strip_rows(plan, &grids, cut.clone(), bytes);
+    if rows == 0 {
+        let what = format!("its buffers hold at most {bytes} bytes, too few for a strip of the image");
+        let reason = format!("{what}: take fewer labels, a smaller image or fewer grids");
+        return Err(Error::Unsupported { device: limits.device.clone(), reason });
+    }
+    cut.for_each(|grid| grids[grid].cut(rows >> grid));
+    Ok(grids)
+}
+
+/// Rows of grid 0 in a strip, when the grids `cut` are to be cut.
+fn strip_rows(plan: &Plan, grids: &[Grid], cut: Range<usize>, bytes: u64) -> usize {
+    let sweep = plan.settings().schedule == Schedule::Sweep;
+    let unit = if sweep { BAND_ROWS } else { 2 } << (cut.end - 1);
+    let most = cut.map(|grid| grids[grid].most_rows(bytes).min(plan.image_size().height) << grid).min().unwrap_or(0);
+    most / unit * unit
+}

@@ -1,0 +1,72 @@
+//! The parameters of a dispatch.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Declares the struct and, beside it, the names of its fields in order, which a test holds against the WGSL struct.
+macro_rules! parameters {
+    ($($(#[$doc:meta])* $field:ident: $type:ty,)*) => {
+        /// What a dispatch is told, see the WGSL struct of the same name in `shared.wgsl`.
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
+        pub struct Parameters {
+            $($(#[$doc])* pub $field: $type,)*
+        }
+
+        impl Parameters {
+            /// Names and offsets in bytes of the fields, in order.
+            pub const FIELDS: &[(&str, usize)] =
+                &[$((stringify!($field), std::mem::offset_of!(Parameters, $field)),)*];
+        }
+    };
+}
+
+parameters! {
+    /// Columns of the grid.
+    width: u32,
+    /// Rows of the grid.
+    height: u32,
+    /// Words in a row of a plane.
+    words: u32,
+    /// Labels.
+    labels: u32,
+    /// Quads of labels.
+    quads: u32,
+    /// Row of the grid that the strip begins with.
+    first_row: u32,
+    /// Colour of the nodes.
+    colour: u32,
+    /// First row of the dispatch, counted in the strip.
+    row: u32,
+    /// Distance of its rows.
+    row_step: u32,
+    /// How many rows.
+    rows: u32,
+    /// Slope of the smoothness cost.
+    slope: u32,
+    /// Truncation of the smoothness cost.
+    truncation: u32,
+    /// The least of both.
+    step: u32,
+    /// What data costs are clipped at.
+    clip: u32,
+    /// Disparity of label 0.
+    min_disparity: i32,
+    /// Data cost of the labels that fill the last quad.
+    padding_cost: u32,
+    /// First column behind the cut, or 0.
+    cut_x: u32,
+    /// First row behind the cut, or 0.
+    cut_y: u32,
+    /// Sides to send to, a bit each.
+    sends: u32,
+    /// The one side whose messages are refined.
+    side: u32,
+    /// Columns of the grid that is read.
+    other_width: u32,
+    /// Rows of the grid that is read.
+    other_height: u32,
+    /// Words in a row of its planes.
+    other_words: u32,
+    /// Row of it that its strip begins with.
+    other_first_row: u32,
+}

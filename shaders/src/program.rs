@@ -1,0 +1,177 @@
+//! What a device does for a plan: buffers, pipelines, and the commands of every stage, in terms that any API has.
+
+use bp_core::{Error, Plan, Side, Stage};
+
+use crate::{Kernel, Limits, Parameters, Pipeline, compose, layout::Grid};
+
+/// Where a buffer lies and what reaches it besides kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Memory {
+    /// On the device, cleared once when it is made; copied from and to.
+    Device,
+    /// Written by the host before every solve, copied from.
+    Upload,
+    /// Copied to, read by the host after every solve.
+    Download,
+}
+
+/// A buffer of a program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Buffer {
+    /// What it holds.
+    pub name: &'static str,
+    /// Its size in bytes, a multiple of 16.
+    pub bytes: u64,
+    /// Where it lies.
+    pub memory: Memory,
+}
+
+/// The buffers that a kernel is given from binding 1 on, as indices into [`Program::buffers`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct BindGroup {
+    /// The kernel, whose [`Kernel::bindings`] say what it does with them.
+    pub kernel: Kernel,
+    /// The buffers.
+    pub buffers: Vec<usize>,
+}
+
+/// Something that a device does. Commands between two barriers do not depend on each other.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Runs a kernel.
+    Dispatch {
+        /// Index into [`Program::pipelines`].
+        pipeline: usize,
+        /// Index into [`Program::bind_groups`].
+        bind_group: usize,
+        /// Where in the parameters its block begins, in bytes.
+        parameters: u32,
+        /// Number of workgroups, all in one dimension.
+        workgroups: u32,
+    },
+    /// Copies between two buffers, or two places of one that do not overlap. Offsets and size are multiples of 4.
+    Copy {
+        /// Index of the buffer that is read.
+        from: usize,
+        /// Offset there in bytes.
+        from_offset: u64,
+        /// Index of the buffer that is written.
+        to: usize,
+        /// Offset there in bytes.
+        to_offset: u64,
+        /// How many bytes.
+        bytes: u64,
+    },
+    /// Sets a whole buffer to zeros.
+    Clear {
+        /// Its index.
+        buffer: usize,
+    },
+    /// What comes after sees what came before: kernels and copies alike.
+    Barrier,
+}
+
+/// Commands that run together. What one segment wrote, the next one sees, as if a [`Command::Barrier`] lay between them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// The stage that it belongs to, or whose part it is.
+    pub stage: Stage,
+    /// The commands.
+    pub commands: Vec<Command>,
+    /// Bytes that its kernels have to read and write at least: every buffer bound counts once.
+    pub(crate) moved_bytes: u64,
+}
+
+/// All that a device does for a plan.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// The buffers. The first holds the parameters, its contents are [`Program::parameters`]; the second is the one of
+    /// [`Memory::Upload`], the third the one of [`Memory::Download`]; all others are [`Memory::Device`].
+    pub buffers: Vec<Buffer>,
+    /// The parameters of all dispatches: blocks of [`Program::PARAMETER_BYTES`], each at a multiple of 256 bytes.
+    pub parameters: Vec<u8>,
+    /// The pipelines.
+    pub pipelines: Vec<Pipeline>,
+    /// The bind groups.
+    pub bind_groups: Vec<BindGroup>,
+    /// The segments.
+    pub segments: Vec<Segment>,
+    /// Most marks of a solve.
+    pub marks: usize,
+    /// Message entries after which what was appended is worth a submission.
+    pub(crate) submission_entries: u64,
+    /// Where values lie.
+    pub(crate) grids: Vec<Grid>,
+    /// Indices of the buffers of grid 0's last messages, `[strip][side][colour]`.
+    pub(crate) last_sent: Vec<[[usize; 2]; 4]>,
+}
+
+/// What a segment does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SegmentOf {
+    MatchCost,
+    /// The data costs of a grid from 1 on.
+    Coarsen(usize),
+    /// The first messages of a grid.
+    Refine(usize),
+    /// One step on a grid; even steps are alike, and so are odd ones.
+    UpdateMessages(usize, u32),
+    SelectLabels,
+}
+
+impl Program {
+    /// Index of the buffer of parameters, a storage buffer that kernels read.
+    pub const PARAMETERS: usize = 0;
+    /// Index of the buffer that the host writes.
+    pub const UPLOAD: usize = 1;
+    /// Index of the buffer that the host reads.
+    pub const DOWNLOAD: usize = 2;
+    /// Bytes of one block of parameters: the size to which binding 0 is bound.
+    pub const PARAMETER_BYTES: u64 = size_of::<Parameters>() as u64;
+
+    /// The program of a plan.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where a device of these limits cannot run it, [`Error::OutOfMemory`] where its buffers
+    /// need more memory than there is.
+    pub fn new(plan: &Plan, limits: &Limits) -> Result<Self, Error> {
+        let program = compose::compose(plan, limits)?;
+        match limits.memory_bytes {
+            Some(available) if program.bytes() > available => {
+                Err(Error::OutOfMemory { what: "device buffers", needed: program.bytes(), available: Some(available) })
+            }
+            _ => Ok(program),
+        }
+    }
+
+    /// Bytes that a matcher of this plan takes on a device of these limits, its labels on the host included; those of
+    /// the plan itself where the device cannot run it.
+    #[must_use]
+    pub fn planned_bytes(plan: &Plan, limits: &Limits) -> u64 {
+        let labels = 2 * plan.image_size().pixels() as u64;
+        compose::compose(plan, limits).map_or_else(|_| plan.bytes(), |program| program.bytes().saturating_add(labels))
+    }
+
+    /// Bytes of all buffers.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.buffers.iter().fold(0, |sum, buffer| sum.saturating_add(buffer.bytes))
+    }
+
+    /// Index of a segment.
+    pub(crate) fn segment(&self, of: SegmentOf) -> usize {
+        let grids = self.grids.len();
+        match of {
+            SegmentOf::MatchCost => 0,
+            SegmentOf::Coarsen(grid) => grid,
+            SegmentOf::Refine(grid) => grids + grid,
+            SegmentOf::UpdateMessages(grid, step) => 2 * grids + 2 * grid + step as usize % 2,
+            SegmentOf::SelectLabels => 4 * grids,
+        }
+    }
+
+    /// Indices of the buffers of what the nodes of colour 0 and 1 in a strip of grid 0 sent last.
+    pub(crate) fn last_sent(&self, strip: usize, side: Side) -> [usize; 2] {
+        self.last_sent[strip][side as usize]
+    }
+}

@@ -1,0 +1,145 @@
+// Message passing: what the nodes of one colour send, from what those of the other colour sent last.
+//
+// A message is the lower envelope of h(a) + min(s |a - d|, K) over labels a, where h is the data cost plus what came from
+// the three other sides, less its least value. A pass up the labels and a pass down make it (Felzenszwalb and Huttenlocher
+// 2006). The first pass leaves its envelope in the messages' own place, the second reads it from there.
+
+@group(0) @binding(1) var<storage, read> cost: array<vec4<u32>>;
+// What all nodes of the other colour sent to their left, right, upper and lower neighbours.
+@group(0) @binding(2) var<storage, read> sent_left: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read> sent_right: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read> sent_up: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read> sent_down: array<vec4<u32>>;
+// What these nodes send.
+@group(0) @binding(6) var<storage, read_write> to_left: array<vec4<u32>>;
+@group(0) @binding(7) var<storage, read_write> to_right: array<vec4<u32>>;
+@group(0) @binding(8) var<storage, read_write> to_up: array<vec4<u32>>;
+@group(0) @binding(9) var<storage, read_write> to_down: array<vec4<u32>>;
+
+// Whether only some sides are sent to, as under the schedule `sweep`.
+override SELECTIVE: bool = false;
+
+// Four labels of what is sent left, right, up and down: a vector of sides for each label.
+struct Quad {
+    a: vec4<u32>,
+    b: vec4<u32>,
+    c: vec4<u32>,
+    d: vec4<u32>,
+}
+
+// From a vector of labels for each side.
+fn by_label(left: vec4<u32>, right: vec4<u32>, up: vec4<u32>, down: vec4<u32>) -> Quad {
+    return Quad(
+        vec4(left.x, right.x, up.x, down.x),
+        vec4(left.y, right.y, up.y, down.y),
+        vec4(left.z, right.z, up.z, down.z),
+        vec4(left.w, right.w, up.w, down.w),
+    );
+}
+
+fn is_sent(side: u32) -> bool {
+    return !SELECTIVE || ((parameters.sends >> side) & 1) != 0;
+}
+
+fn write(index: u32, quad: Quad) {
+    if is_sent(LEFT) {
+        to_left[index] = vec4(quad.a.x, quad.b.x, quad.c.x, quad.d.x);
+    }
+    if is_sent(RIGHT) {
+        to_right[index] = vec4(quad.a.y, quad.b.y, quad.c.y, quad.d.y);
+    }
+    if is_sent(UP) {
+        to_up[index] = vec4(quad.a.z, quad.b.z, quad.c.z, quad.d.z);
+    }
+    if is_sent(DOWN) {
+        to_down[index] = vec4(quad.a.w, quad.b.w, quad.c.w, quad.d.w);
+    }
+}
+
+// Which nodes have a neighbour to send to on each side.
+fn receivers(nodes: Nodes) -> vec4<u32> {
+    let x = column(nodes) + vec4(0u, 2u, 4u, 6u);
+    let exists = x < vec4(parameters.width);
+    let left = exists & (x != vec4(0u)) & (x != vec4(parameters.cut_x));
+    let right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
+    let up = nodes.y != 0 && nodes.y != parameters.cut_y;
+    let down = nodes.y + 1 != parameters.height && nodes.y + 1 != parameters.cut_y;
+    let all = bytes_where(exists);
+    return vec4(bytes_where(left), bytes_where(right), select(0, all, up), select(0, all, down));
+}
+
+// Data cost plus what came from all sides but the one sent to.
+fn gather(index: u32, row: u32, nodes: Nodes) -> Quad {
+    let data = cost[index];
+    var from_left = sent_right[index];
+    var from_right = sent_left[index];
+    // At even columns the left neighbour is one node back in its row, at odd ones the right neighbour one node on.
+    if nodes.parity == 0 {
+        var before = vec4(0u);
+        if nodes.word > 0 {
+            before = sent_right[index - 1];
+        }
+        from_left = (from_left << vec4(8u)) | (before >> vec4(24u));
+    } else {
+        var behind = vec4(0u);
+        if nodes.word + 1 < parameters.words {
+            behind = sent_left[index + 1];
+        }
+        from_right = (from_right >> vec4(8u)) | (behind << vec4(24u));
+    }
+    let from_above = sent_down[index - row];
+    let from_below = sent_up[index + row];
+    let vertical = sum(data, sum(from_above, from_below));
+    let horizontal = sum(data, sum(from_left, from_right));
+    return by_label(
+        sum(vertical, from_right),
+        sum(vertical, from_left),
+        sum(horizontal, from_below),
+        sum(horizontal, from_above),
+    );
+}
+
+@compute @workgroup_size(64)
+fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
+    let nodes = nodes(id.x);
+    if !nodes.exist {
+        return;
+    }
+    let row = parameters.quads * parameters.words;
+    let first = plane_index(nodes.row, nodes.word);
+    let step = splat(parameters.step);
+
+    var least = vec4(0xffffffffu);
+    // What the labels below offer to the next one.
+    var offer = vec4(0xffffffffu);
+    for (var quad = 0u; quad < parameters.quads; quad++) {
+        let index = first + quad * parameters.words;
+        var h = gather(index, row, nodes);
+        least = minimum(least, minimum(minimum(h.a, h.b), minimum(h.c, h.d)));
+        h.a = minimum(h.a, offer);
+        h.b = minimum(h.b, sum(h.a, step));
+        h.c = minimum(h.c, sum(h.b, step));
+        h.d = minimum(h.d, sum(h.c, step));
+        offer = sum(h.d, step);
+        write(index, h);
+    }
+
+    let truncation = splat(parameters.truncation);
+    let mask = receivers(nodes);
+    offer = vec4(0xffffffffu);
+    for (var quad = parameters.quads; quad > 0; quad--) {
+        let index = first + (quad - 1) * parameters.words;
+        var h = by_label(to_left[index], to_right[index], to_up[index], to_down[index]);
+        h.d = minimum(h.d, offer);
+        h.c = minimum(h.c, sum(h.d, step));
+        h.b = minimum(h.b, sum(h.c, step));
+        h.a = minimum(h.a, sum(h.b, step));
+        offer = sum(h.a, step);
+        write(index, Quad(
+            minimum(h.a - least, truncation) & mask,
+            minimum(h.b - least, truncation) & mask,
+            minimum(h.c - least, truncation) & mask,
+            minimum(h.d - least, truncation) & mask,
+        ));
+    }
+}
