@@ -8,14 +8,11 @@
 // Bytes of a stored sum, 0 where none is stored.
 override SUM_BYTES: u32 = 0;
 
-// Columns of four nodes, less that of the first.
-const APART = vec4<u32>(0, 2, 4, 6);
-
 // What is stored of one label.
 fn stored(nodes: Nodes, label: u32, unclipped: vec4<u32>, least: vec4<u32>) -> u32 {
     let clipped = min(unclipped - least, vec4(parameters.clip));
     let costs = select(clipped, vec4(parameters.padding_cost), label >= parameters.labels);
-    return pack(select(vec4(0u), costs, column(nodes) + APART < vec4(parameters.width)));
+    return pack(select(vec4(0u), costs, columns(nodes) < vec4(parameters.width)));
 }
 
 fn store(nodes: Nodes, quad: u32, unclipped: array<vec4<u32>, 4>, least: vec4<u32>) {

@@ -1,10 +1,5 @@
 // What the profile compares, of every pixel of one image: its grey value, its census code, or its colour.
 
-const THESIS: u32 = 0;
-const CENSUS: u32 = 1;
-const MRF: u32 = 2;
-override PROFILE: u32 = THESIS;
-
 // Red, green and blue bytes of all pixels, without gaps.
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read_write> values: array<u32>;

@@ -1,10 +1,5 @@
 // Data costs of the image, for the nodes of one colour.
 
-const THESIS: u32 = 0;
-const CENSUS: u32 = 1;
-const MRF: u32 = 2;
-override PROFILE: u32 = THESIS;
-
 // A known match: the point where the cuts cross, its label, and whether there is one.
 struct Seed {
     x: u32,
@@ -49,14 +44,14 @@ fn compare(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
 
 // Whether these nodes touch the seed's point.
 fn touches_seed(nodes: Nodes) -> vec4<bool> {
-    let x = column(nodes) + APART;
+    let x = columns(nodes);
     let row = seed.exists != 0 && (nodes.y == seed.y || nodes.y + 1 == seed.y);
     return vec4(row) & ((x == vec4(seed.x)) | (x + 1 == vec4(seed.x)));
 }
 
 // The costs of one label at four nodes; 0 beyond the border.
 fn costs(nodes: Nodes, at_left: vec4<u32>, seeded: vec4<bool>, label: u32) -> vec4<u32> {
-    let x = column(nodes) + APART;
+    let x = columns(nodes);
     let match_x = vec4<i32>(x) - (parameters.min_disparity + i32(label));
     let inside = (match_x >= vec4(0)) & (match_x < vec4(i32(parameters.width)));
     let safe = select(vec4(0u), vec4<u32>(match_x), inside) + nodes.y * parameters.width;
@@ -73,7 +68,7 @@ fn match_cost(@builtin(global_invocation_id) id: vec3<u32>) {
     if !nodes.exist {
         return;
     }
-    let x = min(column(nodes) + APART, vec4(parameters.width - 1)) + nodes.y * parameters.width;
+    let x = min(columns(nodes), vec4(parameters.width - 1)) + nodes.y * parameters.width;
     let at_left = vec4(left[x.x], left[x.y], left[x.z], left[x.w]);
     let seeded = touches_seed(nodes);
     var least = vec4(0xffffffffu);

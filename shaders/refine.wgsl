@@ -65,9 +65,9 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     return odd[index];
 }
 
-// Which nodes of a word in the row send anything at first.
-fn starting(word: u32, nodes: Nodes) -> u32 {
-    let x = 8 * word + nodes.parity + vec4(0u, 2u, 4u, 6u);
+// Which nodes send anything at first.
+fn starting(nodes: Nodes) -> u32 {
+    let x = columns(nodes);
     var start = x < vec4(parameters.width);
     switch parameters.side {
         case LEFT: {
@@ -100,10 +100,11 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let y = coarse_y(nodes.y);
     let row = u32(y + 1 - i32(parameters.other_first_row));
     // The senders of every second node are neighbours in their row and colour.
-    let a = coarse_x(column(nodes), y);
-    let b = coarse_x(column(nodes) + 2, y);
-    let mask = vec4(starting(nodes.word, nodes));
-    let next_mask = vec4(starting(nodes.word + 1, nodes));
+    let x = columns(nodes);
+    let a = coarse_x(x[0], y);
+    let b = coarse_x(x[1], y);
+    let mask = vec4(starting(nodes));
+    let next_mask = vec4(starting(nodes_at(line, nodes.word + 1)));
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let even_nodes = coarse_nodes((a + y) & 1, row, a >> 1, quad);
         let odd_nodes = coarse_nodes((b + y) & 1, row, b >> 1, quad);

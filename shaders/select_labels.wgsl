@@ -1,13 +1,7 @@
 // Labels of the nodes of one colour: those of least belief or, under the schedule `sweep`, decided one after another.
 
 // [colour][row of the grid][word], two bytes for each of the four nodes.
-@group(0) @binding(1) var<storage, read_write> labels: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read> cost: array<vec4<u32>>;
-// What all nodes of the other colour sent to their left, right, upper and lower neighbours.
-@group(0) @binding(3) var<storage, read> sent_left: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read> sent_right: array<vec4<u32>>;
-@group(0) @binding(5) var<storage, read> sent_up: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read> sent_down: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read_write> labels: array<vec2<u32>>;
 
 // Enough for 1024 labels and those that fill the last quad.
 const LABEL_BITS: u32 = 11;
@@ -15,37 +9,14 @@ const LABEL_BITS: u32 = 11;
 override SWEEP: bool = false;
 override BAND_ROWS: u32 = 32;
 
-fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
-    if nodes.parity == 1 {
-        return sent_right[index];
-    }
-    var before = vec4(0u);
-    if nodes.word > 0 {
-        before = sent_right[index - 1];
-    }
-    return (sent_right[index] << vec4(8u)) | (before >> vec4(24u));
-}
-
-fn from_right(index: u32, nodes: Nodes) -> vec4<u32> {
-    if nodes.parity == 0 {
-        return sent_left[index];
-    }
-    var behind = vec4(0u);
-    if nodes.word + 1 < parameters.words {
-        behind = sent_left[index + 1];
-    }
-    return (sent_left[index] >> vec4(8u)) | (behind << vec4(24u));
-}
-
 // Data cost and the messages that count, for a quad of labels.
 fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
-    let row = parameters.quads * parameters.words;
-    var total = sum(cost[index], sent_up[index + row]);
+    var total = sum(cost[index], from_below(index));
     if !SWEEP || parameters.colour == 0 {
         total = sum(total, sum(from_left(index, nodes), from_right(index, nodes)));
     }
     if !SWEEP {
-        total = sum(total, sent_down[index - row]);
+        total = sum(total, from_above(index));
     }
     return total;
 }
@@ -79,7 +50,7 @@ struct Decided {
 }
 
 fn decided_neighbours(nodes: Nodes) -> Decided {
-    let x = column(nodes) + vec4(0u, 2u, 4u, 6u);
+    let x = columns(nodes);
     let other = 1 - parameters.colour;
     var known: Decided;
     known.has_up = vec4(nodes.y % BAND_ROWS != 0 && nodes.y != parameters.cut_y);

@@ -42,14 +42,18 @@ struct Parameters {
     sends: u32,
     // refine: the side that the messages are sent to, numbered likewise.
     side: u32,
-    // coarsen and refine: size, words and strip of the grid that is read.
+    // coarsen and refine: width, words and strip of the grid that is read.
     other_width: u32,
-    other_height: u32,
     other_words: u32,
     other_first_row: u32,
 }
 
 @group(0) @binding(0) var<storage, read> parameters: Parameters;
+
+// What the data cost compares.
+const THESIS: u32 = 0;
+const CENSUS: u32 = 1;
+override PROFILE: u32 = THESIS;
 
 const LEFT: u32 = 0;
 const RIGHT: u32 = 1;
@@ -80,9 +84,9 @@ fn nodes_at(line: u32, word: u32) -> Nodes {
     return Nodes(row, y, word, (y + parameters.colour) & 1, line < parameters.rows);
 }
 
-// Column of the first of the four; the others follow at distances of 2.
-fn column(nodes: Nodes) -> u32 {
-    return 8 * nodes.word + nodes.parity;
+// Columns of the four.
+fn columns(nodes: Nodes) -> vec4<u32> {
+    return 8 * nodes.word + nodes.parity + vec4(0u, 2u, 4u, 6u);
 }
 
 // Index of a node's first quad in a plane; further quads follow at distances of `words`.

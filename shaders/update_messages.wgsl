@@ -4,12 +4,6 @@
 // the three other sides, less its least value. A pass up the labels and a pass down make it (Felzenszwalb and Huttenlocher
 // 2006). The first pass leaves its envelope in the messages' own place, the second reads it from there.
 
-@group(0) @binding(1) var<storage, read> cost: array<vec4<u32>>;
-// What all nodes of the other colour sent to their left, right, upper and lower neighbours.
-@group(0) @binding(2) var<storage, read> sent_left: array<vec4<u32>>;
-@group(0) @binding(3) var<storage, read> sent_right: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read> sent_up: array<vec4<u32>>;
-@group(0) @binding(5) var<storage, read> sent_down: array<vec4<u32>>;
 // What these nodes send.
 @group(0) @binding(6) var<storage, read_write> to_left: array<vec4<u32>>;
 @group(0) @binding(7) var<storage, read_write> to_right: array<vec4<u32>>;
@@ -41,7 +35,28 @@ fn is_sent(side: u32) -> bool {
     return !SELECTIVE || ((parameters.sends >> side) & 1) != 0;
 }
 
-fn write(index: u32, quad: Quad) {
+// What the first pass left.
+fn load_quad(index: u32) -> Quad {
+    var left: vec4<u32>;
+    var right: vec4<u32>;
+    var up: vec4<u32>;
+    var down: vec4<u32>;
+    if is_sent(LEFT) {
+        left = to_left[index];
+    }
+    if is_sent(RIGHT) {
+        right = to_right[index];
+    }
+    if is_sent(UP) {
+        up = to_up[index];
+    }
+    if is_sent(DOWN) {
+        down = to_down[index];
+    }
+    return by_label(left, right, up, down);
+}
+
+fn store_quad(index: u32, quad: Quad) {
     if is_sent(LEFT) {
         to_left[index] = vec4(quad.a.x, quad.b.x, quad.c.x, quad.d.x);
     }
@@ -56,47 +71,28 @@ fn write(index: u32, quad: Quad) {
     }
 }
 
-// Which nodes have a neighbour to send to on each side.
+// Which nodes have a neighbour to send to on each side. Those beyond the right border cost nothing and receive zeros, so
+// that they send zeros.
 fn receivers(nodes: Nodes) -> vec4<u32> {
-    let x = column(nodes) + vec4(0u, 2u, 4u, 6u);
-    let exists = x < vec4(parameters.width);
-    let left = exists & (x != vec4(0u)) & (x != vec4(parameters.cut_x));
+    let x = columns(nodes);
+    let left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
     let right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
     let up = nodes.y != 0 && nodes.y != parameters.cut_y;
     let down = nodes.y + 1 != parameters.height && nodes.y + 1 != parameters.cut_y;
-    let all = bytes_where(exists);
-    return vec4(bytes_where(left), bytes_where(right), select(0, all, up), select(0, all, down));
+    let all = vec2(0xffffffffu);
+    return vec4(bytes_where(left), bytes_where(right), select(vec2(0u), all, vec2(up, down)));
 }
 
 // Data cost plus what came from all sides but the one sent to.
-fn gather(index: u32, row: u32, nodes: Nodes) -> Quad {
+fn gather(index: u32, nodes: Nodes) -> Quad {
     let data = cost[index];
-    var from_left = sent_right[index];
-    var from_right = sent_left[index];
-    // At even columns the left neighbour is one node back in its row, at odd ones the right neighbour one node on.
-    if nodes.parity == 0 {
-        var before = vec4(0u);
-        if nodes.word > 0 {
-            before = sent_right[index - 1];
-        }
-        from_left = (from_left << vec4(8u)) | (before >> vec4(24u));
-    } else {
-        var behind = vec4(0u);
-        if nodes.word + 1 < parameters.words {
-            behind = sent_left[index + 1];
-        }
-        from_right = (from_right >> vec4(8u)) | (behind << vec4(24u));
-    }
-    let from_above = sent_down[index - row];
-    let from_below = sent_up[index + row];
-    let vertical = sum(data, sum(from_above, from_below));
-    let horizontal = sum(data, sum(from_left, from_right));
-    return by_label(
-        sum(vertical, from_right),
-        sum(vertical, from_left),
-        sum(horizontal, from_below),
-        sum(horizontal, from_above),
-    );
+    let left = from_left(index, nodes);
+    let right = from_right(index, nodes);
+    let above = from_above(index);
+    let below = from_below(index);
+    let vertical = sum(data, sum(above, below));
+    let horizontal = sum(data, sum(left, right));
+    return by_label(sum(vertical, right), sum(vertical, left), sum(horizontal, below), sum(horizontal, above));
 }
 
 @compute @workgroup_size(64)
@@ -105,7 +101,6 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     if !nodes.exist {
         return;
     }
-    let row = parameters.quads * parameters.words;
     let first = plane_index(nodes.row, nodes.word);
     let step = splat(parameters.step);
 
@@ -114,14 +109,14 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     var offer = vec4(0xffffffffu);
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let index = first + quad * parameters.words;
-        var h = gather(index, row, nodes);
+        var h = gather(index, nodes);
         least = minimum(least, minimum(minimum(h.a, h.b), minimum(h.c, h.d)));
         h.a = minimum(h.a, offer);
         h.b = minimum(h.b, sum(h.a, step));
         h.c = minimum(h.c, sum(h.b, step));
         h.d = minimum(h.d, sum(h.c, step));
         offer = sum(h.d, step);
-        write(index, h);
+        store_quad(index, h);
     }
 
     let truncation = splat(parameters.truncation);
@@ -129,13 +124,13 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     offer = vec4(0xffffffffu);
     for (var quad = parameters.quads; quad > 0; quad--) {
         let index = first + (quad - 1) * parameters.words;
-        var h = by_label(to_left[index], to_right[index], to_up[index], to_down[index]);
+        var h = load_quad(index);
         h.d = minimum(h.d, offer);
         h.c = minimum(h.c, sum(h.d, step));
         h.b = minimum(h.b, sum(h.c, step));
         h.a = minimum(h.a, sum(h.b, step));
         offer = sum(h.a, step);
-        write(index, Quad(
+        store_quad(index, Quad(
             minimum(h.a - least, truncation) & mask,
             minimum(h.b - least, truncation) & mask,
             minimum(h.c - least, truncation) & mask,

@@ -7,6 +7,9 @@ use sha2::{Digest, Sha256};
 /// Length of a SHA-256 sum.
 const SUM_BYTES: usize = 32;
 
+/// More than any pipelines take: another file would only take time and memory.
+const MOST_BYTES: u64 = 64 << 20;
+
 /// The folder, where the system has one for such things: a driver that keeps no cache of its own makes the first
 /// start after a reboot slow without it.
 #[must_use]
@@ -17,7 +20,10 @@ pub fn folder() -> Option<PathBuf> {
 /// What was stored under this key, if it is still whole: a driver may not survive reading anything else.
 #[must_use]
 pub fn load(key: &str) -> Option<Vec<u8>> {
-    let stored = fs::read(folder()?.join(key)).ok()?;
+    let path = folder()?.join(key);
+    let is_ours = |file: &fs::Metadata| file.is_file() && file.len() <= MOST_BYTES;
+    fs::metadata(&path).ok().filter(is_ours)?;
+    let stored = fs::read(path).ok()?;
     let (sum, data) = stored.split_at_checked(SUM_BYTES)?;
     (Sha256::digest(data).as_slice() == sum).then(|| data.to_vec())
 }

@@ -1,23 +1,27 @@
 //! Composes the program of a plan.
 
 mod buffers;
-mod segments;
+mod parts;
+mod recorder;
 mod sweep;
 
-use bp_core::{Error, Plan, Schedule, Stage};
+use bp_core::{Error, Plan, Schedule};
 use indexmap::IndexSet;
 
 use crate::{
-    BindGroup, Buffer, Command, Kernel, Limits, Memory, Parameters, Pipeline, Program, Segment, WORKGROUP,
-    compose::buffers::{Buffers, StripBuffers},
+    BindGroup, Buffer, Command, Kernel, Limits, Memory, Parameters, Pipeline, Program, WORKGROUP,
+    compose::{
+        buffers::{Buffers, StripBuffers},
+        recorder::{PartRecorder, Recorder},
+    },
     layout::{self, Grid},
 };
 
 /// Alignment of dynamic offsets: the most that any device asks for.
 const PARAMETERS_ALIGNMENT: usize = 256;
 
-/// How many full dispatches a submission holds: few enough for progress to be told and stopping to be quick, enough for
-/// handing over to take no time in comparison.
+/// How many full dispatches a submission holds: few enough for watchdogs, for progress to be told and stopping to be quick,
+/// enough for handing over to take no time in comparison.
 const DISPATCHES_PER_SUBMISSION: u64 = 8;
 
 /// Most marks that are kept.
@@ -28,7 +32,7 @@ pub(crate) fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
     check_sums(plan, limits)?;
     let grids = layout::grids(plan, limits)?;
     let buffers = Buffers::new(plan, &grids);
-    check_buffers(&buffers.list, limits)?;
+    check_limits(plan, &buffers.list, limits)?;
     let composer = Composer {
         plan,
         limits,
@@ -53,12 +57,17 @@ fn check_sums(plan: &Plan, limits: &Limits) -> Result<(), Error> {
     Err(Error::Unsupported { device: limits.device.clone(), reason })
 }
 
-/// Refuses buffers that are too large or too many.
-fn check_buffers(buffers: &[Buffer], limits: &Limits) -> Result<(), Error> {
+/// Refuses buffers that are too large or too many, and rows of more workgroups than a dispatch may have.
+fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), Error> {
     let unsupported = |reason| Err(Error::Unsupported { device: limits.device.clone(), reason });
     if limits.bindings < Kernel::most_bindings() {
         let needed = Kernel::most_bindings();
         return unsupported(format!("a kernel needs {needed} buffers and it allows {}", limits.bindings));
+    }
+    let width = plan.image_size().width;
+    if width.div_ceil(WORKGROUP as usize) > limits.workgroups as usize {
+        let most = limits.workgroups as usize * WORKGROUP as usize;
+        return unsupported(format!("a row has {width} pixels and it computes at most {most} at a time"));
     }
     // Kernels are not given what the host reads and writes.
     let most = |buffer: &Buffer| match buffer.memory {
@@ -103,17 +112,21 @@ struct Composer<'a> {
 
 impl Composer<'_> {
     fn program(mut self) -> Program {
-        let grids = 0..self.plan.grids();
-        // In the order of Program::segment.
-        let mut segments = vec![self.match_cost()];
-        segments.extend(grids.clone().skip(1).map(|grid| self.coarsen(grid)));
-        segments.extend(grids.clone().map(|grid| self.refine(grid)));
-        segments.extend(grids.flat_map(|grid| [(grid, 0), (grid, 1)]).map(|(grid, step)| self.step(grid, step)));
-        segments.push(self.select_labels());
+        let (grids, periods) = (0..self.plan.grids(), self.periods());
+        let submission_entries = DISPATCHES_PER_SUBMISSION.saturating_mul(self.limits.dispatch_entries);
+        let mut recorder = Recorder::new(submission_entries);
+        // In the order of Program::segments_of.
+        self.match_cost(recorder.part());
+        grids.clone().skip(1).for_each(|grid| self.coarsen(recorder.part(), grid));
+        grids.clone().for_each(|grid| self.refine(recorder.part(), grid));
+        for (grid, step) in grids.flat_map(|grid| (0..periods).map(move |step| (grid, step))) {
+            self.step(recorder.part(), grid, step);
+        }
+        self.select_labels(recorder.part());
+        let (segments, parts) = recorder.finish(&self.bind_groups, &self.buffers.list);
         let parameters = self.parameter_blocks();
         let mut buffers = self.buffers.list.clone();
         buffers[Program::PARAMETERS].bytes = parameters.len() as u64;
-        let submission_entries = DISPATCHES_PER_SUBMISSION.saturating_mul(self.limits.dispatch_entries);
         Program {
             marks: self.marks(submission_entries),
             last_sent: self.last_sent(),
@@ -122,9 +135,16 @@ impl Composer<'_> {
             bind_groups: self.bind_groups.into_iter().collect(),
             buffers,
             segments,
+            parts,
+            periods,
             submission_entries,
             grids: self.grids.to_vec(),
         }
+    }
+
+    /// After how many steps they repeat.
+    fn periods(&self) -> u32 {
+        if self.plan.settings().schedule == Schedule::Sweep { 1 } else { 2 }
     }
 
     fn parameter_blocks(&self) -> Vec<u8> {
@@ -156,18 +176,8 @@ impl Composer<'_> {
         if self.plan.settings().schedule == Schedule::Sync { step as usize % 2 } else { 0 }
     }
 
-    fn segment(&self, stage: Stage, commands: Vec<Command>) -> Segment {
-        let bound = commands.iter().filter_map(|command| match command {
-            Command::Dispatch { bind_group, .. } => Some(&self.bind_groups[*bind_group].buffers),
-            _ => None,
-        });
-        let buffers: IndexSet<usize> = bound.flatten().copied().collect();
-        let moved_bytes = buffers.into_iter().map(|buffer| self.buffers.list[buffer].bytes).sum();
-        Segment { stage, commands, moved_bytes }
-    }
-
-    /// Appends dispatches of a kernel to rows of a strip, as many as the limits ask for.
-    fn dispatch(&mut self, commands: &mut Vec<Command>, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
+    /// Records dispatches of a kernel to rows of a strip, as many as the limits ask for.
+    fn dispatch(&mut self, part: &mut PartRecorder, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
         let kernel = pipeline.kernel;
         let pipeline = self.pipelines.insert_full(pipeline).0;
         let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
@@ -179,17 +189,22 @@ impl Composer<'_> {
             let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
             let workgroups = (rows * work.row_invocations).div_ceil(WORKGROUP as usize) as u32;
-            commands.push(Command::Dispatch { pipeline, bind_group, parameters, workgroups });
+            let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
+            part.push(command, rows as u64 * self.row_entries(&work));
         }
     }
 
-    /// How many rows a dispatch may compute: an invocation makes four messages at four nodes for every label, or less.
+    /// Message entries that a row of this work is worth: an invocation makes four messages at four nodes for every label,
+    /// or does less.
+    fn row_entries(&self, work: &Work) -> u64 {
+        work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
+    }
+
+    /// How many rows a dispatch may compute.
     fn rows_per_dispatch(&self, work: &Work) -> usize {
-        let row = work.row_invocations as u64;
-        let entries = row * 16 * self.plan.model().labels() as u64;
-        let by_time = self.limits.dispatch_entries / entries.max(1);
-        let by_count = u64::from(self.limits.workgroups) * u64::from(WORKGROUP) / row.max(1);
-        usize::try_from(by_time.min(by_count)).unwrap_or(usize::MAX).max(1)
+        let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
+        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / work.row_invocations.max(1);
+        usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
     }
 
     /// The parameters of a strip's nodes of one colour, on rows that are still to be told.

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use bp_core::{Error, Stage};
+use bp_core::Error;
 
 use crate::{Buffer, Command, Limits, Memory, Program, Queue, Segment};
 
@@ -20,7 +20,7 @@ pub fn copy_rate(
     prepare: impl FnOnce(&Program) -> Result<Box<dyn Queue>, Error>,
 ) -> Result<f64, Error> {
     let memory = limits.memory_bytes.unwrap_or(u64::MAX);
-    let bytes = BYTES.min(limits.buffer_bytes).min(memory / 4) / 16 * 16;
+    let bytes = BYTES.min(limits.buffer_bytes).min(memory / 4) / 256 * 256;
     let mut queue = prepare(&program(bytes))?;
     let mut times = [Duration::ZERO; COPIES];
     time(queue.as_mut())?;
@@ -50,15 +50,17 @@ fn program(bytes: u64) -> Program {
     Program {
         buffers: vec![
             buffer("parameters", 256, Memory::Device),
-            buffer("upload", 16, Memory::Upload),
-            buffer("download", 16, Memory::Download),
+            buffer("upload", 256, Memory::Upload),
+            buffer("download", 256, Memory::Download),
             buffer("copied", bytes, Memory::Device),
             buffer("copy", bytes, Memory::Device),
         ],
         parameters: vec![0; 256],
         pipelines: Vec::new(),
         bind_groups: Vec::new(),
-        segments: vec![Segment { stage: Stage::MatchCost, commands: vec![copy], moved_bytes: 2 * bytes }],
+        segments: vec![Segment { commands: vec![copy], entries: 0, moved_bytes: 2 * bytes }],
+        periods: 1,
+        parts: Vec::new(),
         marks: 2,
         submission_entries: 1,
         grids: Vec::new(),

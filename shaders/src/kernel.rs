@@ -51,7 +51,7 @@ impl Kernel {
         }
     }
 
-    /// The whole WGSL text: what all kernels share, then the kernel's own.
+    /// The whole WGSL text: what all kernels share, what some do, then the kernel's own.
     #[must_use]
     pub fn source(self) -> String {
         let own = match self {
@@ -62,11 +62,12 @@ impl Kernel {
             Self::UpdateMessages => include_str!("../update_messages.wgsl"),
             Self::SelectLabels => include_str!("../select_labels.wgsl"),
         };
-        let costs = match self {
+        let of_several = match self {
             Self::MatchCost | Self::Coarsen => include_str!("../costs.wgsl"),
-            _ => "",
+            Self::UpdateMessages | Self::SelectLabels => include_str!("../messages.wgsl"),
+            Self::Features | Self::Refine => "",
         };
-        [include_str!("../shared.wgsl"), costs, own].concat()
+        [include_str!("../shared.wgsl"), of_several, own].concat()
     }
 
     /// What it does with the storage buffers bound to group 0 from binding 1 on, in order. Binding 0 is one block of
@@ -79,7 +80,7 @@ impl Kernel {
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine => &[Write, Read, Read],
             Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write],
-            Self::SelectLabels => &[Write, Read, Read, Read, Read, Read],
+            Self::SelectLabels => &[Read, Read, Read, Read, Read, Write],
         }
     }
 

@@ -22,14 +22,14 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// How many message entries a device of this kind is sure to compute within 0.2 s. The slowest GPUs that run Vulkan
-    /// move some 10 GB/s, and an entry moves two to three bytes; a software rasteriser takes about a
-    /// nanosecond an entry on two cores, ten on a slow one.
+    /// How many message entries a device of this kind is sure to compute within 0.2 s: the slowest move some 10 GB/s, and
+    /// an entry moves four bytes or less; a software rasteriser takes about a nanosecond an entry on two cores, ten
+    /// on a slow one.
     #[must_use]
     pub fn dispatch_entries(kind: DeviceKind) -> u64 {
         match kind {
-            DeviceKind::DiscreteGpu => 1 << 29,
-            DeviceKind::IntegratedGpu | DeviceKind::VirtualGpu | DeviceKind::Other => 1 << 28,
+            DeviceKind::DiscreteGpu => 1 << 28,
+            DeviceKind::IntegratedGpu | DeviceKind::VirtualGpu | DeviceKind::Other => 1 << 27,
             DeviceKind::Processor | DeviceKind::SoftwareRasteriser => 1 << 24,
         }
     }

@@ -63,8 +63,6 @@ parameters! {
     side: u32,
     /// Columns of the grid that is read.
     other_width: u32,
-    /// Rows of the grid that is read.
-    other_height: u32,
     /// Words in a row of its planes.
     other_words: u32,
     /// Row of it that its strip begins with.

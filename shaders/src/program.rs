@@ -1,6 +1,8 @@
 //! What a device does for a plan: buffers, pipelines, and the commands of every stage, in terms that any API has.
 
-use bp_core::{Error, Plan, Side, Stage};
+use std::ops::Range;
+
+use bp_core::{Error, Plan, Side};
 
 use crate::{Kernel, Limits, Parameters, Pipeline, compose, layout::Grid};
 
@@ -20,13 +22,14 @@ pub enum Memory {
 pub struct Buffer {
     /// What it holds.
     pub name: &'static str,
-    /// Its size in bytes, a multiple of 16.
+    /// Its size in bytes, a multiple of 256, so that buffers side by side leave no gaps.
     pub bytes: u64,
     /// Where it lies.
     pub memory: Memory,
 }
 
-/// The buffers that a kernel is given from binding 1 on, as indices into [`Program::buffers`].
+/// The buffers that a kernel is given from binding 1 on, as indices into [`Program::buffers`]. None of them is both read and
+/// written under two bindings.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BindGroup {
     /// The kernel, whose [`Kernel::bindings`] say what it does with them.
@@ -49,7 +52,7 @@ pub enum Command {
         /// Number of workgroups, all in one dimension.
         workgroups: u32,
     },
-    /// Copies between two buffers, or two places of one that do not overlap. Offsets and size are multiples of 4.
+    /// Copies between two buffers. Offsets and size are multiples of 4.
     Copy {
         /// Index of the buffer that is read.
         from: usize,
@@ -71,14 +74,15 @@ pub enum Command {
     Barrier,
 }
 
-/// Commands that run together. What one segment wrote, the next one sees, as if a [`Command::Barrier`] lay between them.
+/// Commands that are recorded together. What one segment wrote, the next one sees, as if a [`Command::Barrier`] lay between
+/// them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// The stage that it belongs to, or whose part it is.
-    pub stage: Stage,
     /// The commands.
     pub commands: Vec<Command>,
-    /// Bytes that its kernels have to read and write at least: every buffer bound counts once.
+    /// Message entries that it computes, or as many as its work is worth.
+    pub(crate) entries: u64,
+    /// Bytes that it has to read and write at least, but for what segments of the same part count.
     pub(crate) moved_bytes: u64,
 }
 
@@ -98,7 +102,11 @@ pub struct Program {
     pub segments: Vec<Segment>,
     /// Most marks of a solve.
     pub marks: usize,
-    /// Message entries after which what was appended is worth a submission.
+    /// After how many steps on a grid they repeat.
+    pub(crate) periods: u32,
+    /// The segments of each [`Part`], by [`Program::segments_of`].
+    pub(crate) parts: Vec<Range<usize>>,
+    /// Most message entries of a submission; no segment has more, unless one row has.
     pub(crate) submission_entries: u64,
     /// Where values lie.
     pub(crate) grids: Vec<Grid>,
@@ -106,15 +114,15 @@ pub struct Program {
     pub(crate) last_sent: Vec<[[usize; 2]; 4]>,
 }
 
-/// What a segment does.
+/// A part of a program: what one call of the driver asks for, or one step of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum SegmentOf {
+pub(crate) enum Part {
     MatchCost,
     /// The data costs of a grid from 1 on.
     Coarsen(usize),
     /// The first messages of a grid.
     Refine(usize),
-    /// One step on a grid; even steps are alike, and so are odd ones.
+    /// One step on a grid.
     UpdateMessages(usize, u32),
     SelectLabels,
 }
@@ -158,16 +166,17 @@ impl Program {
         self.buffers.iter().fold(0, |sum, buffer| sum.saturating_add(buffer.bytes))
     }
 
-    /// Index of a segment.
-    pub(crate) fn segment(&self, of: SegmentOf) -> usize {
-        let grids = self.grids.len();
-        match of {
-            SegmentOf::MatchCost => 0,
-            SegmentOf::Coarsen(grid) => grid,
-            SegmentOf::Refine(grid) => grids + grid,
-            SegmentOf::UpdateMessages(grid, step) => 2 * grids + 2 * grid + step as usize % 2,
-            SegmentOf::SelectLabels => 4 * grids,
-        }
+    /// Indices of a part's segments.
+    pub(crate) fn segments_of(&self, part: Part) -> Range<usize> {
+        let (grids, periods) = (self.grids.len(), self.periods as usize);
+        let index = match part {
+            Part::MatchCost => 0,
+            Part::Coarsen(grid) => grid,
+            Part::Refine(grid) => grids + grid,
+            Part::UpdateMessages(grid, step) => 2 * grids + periods * grid + step as usize % periods,
+            Part::SelectLabels => (2 + periods) * grids,
+        };
+        self.parts[index].clone()
     }
 
     /// Indices of the buffers of what the nodes of colour 0 and 1 in a strip of grid 0 sent last.

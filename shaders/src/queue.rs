@@ -4,10 +4,14 @@ use std::time::Duration;
 
 use bp_core::Error;
 
+/// How long a device is given to finish what was submitted. A submission takes a fraction of a second, see
+/// [`crate::Limits::dispatch_entries`].
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
 /// A program made ready on a device: buffers allocated and cleared, kernels compiled, segments recorded.
 ///
-/// Segments run in the order in which they are appended. Nothing is allocated or compiled by any method but
-/// [`Queue::read`].
+/// Segments run in the order in which they are appended. No method but [`Queue::read`] allocates device memory or
+/// compiles.
 pub trait Queue: Send {
     /// Begins anew: waits for work under way, drops what was appended and not submitted, forgets all marks, and lets
     /// `fill` write the program's upload buffer.

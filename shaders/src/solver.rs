@@ -4,7 +4,7 @@ use std::{ops::Range, time::Duration};
 
 use bp_core::{Error, Plan, Seed, Side, Solver, Stage, StereoPair};
 
-use crate::{Program, Queue, answer, compose, program::SegmentOf};
+use crate::{Program, Queue, answer, compose, program::Part};
 
 /// Runs the program of a plan on a queue, segment after segment, and hands over what has gathered whenever that is
 /// enough work.
@@ -39,12 +39,17 @@ impl GpuSolver {
         })
     }
 
-    /// Appends segments of one stage, and a mark behind them.
-    fn run(&mut self, stage: Stage, segments: impl Iterator<Item = SegmentOf>) -> Result<(), Error> {
-        for segment in segments {
-            let segment = self.program.segment(segment);
-            self.moved_bytes[stage as usize] += self.program.segments[segment].moved_bytes;
-            self.queue.append(segment)?;
+    /// Appends parts of one stage, and a mark behind them; what has gathered is handed over before it gets too much.
+    fn run(&mut self, stage: Stage, parts: impl Iterator<Item = Part>) -> Result<(), Error> {
+        for index in parts.flat_map(|part| self.program.segments_of(part)) {
+            let segment = &self.program.segments[index];
+            if self.pending > 0 && self.pending + segment.entries > self.program.submission_entries {
+                self.queue.submit()?;
+                self.pending = 0;
+            }
+            self.queue.append(index)?;
+            self.pending += segment.entries;
+            self.moved_bytes[stage as usize] += segment.moved_bytes;
         }
         if self.stages.len() < self.stages.capacity() {
             self.stages.push(stage);
@@ -61,30 +66,23 @@ impl Solver for GpuSolver {
         self.moved_bytes = [0; Stage::ALL.len()];
         self.queue.begin(&mut |upload| answer::write_pair(pair, seed, upload))?;
         self.queue.mark()?;
-        self.run(Stage::MatchCost, [SegmentOf::MatchCost].into_iter())
+        self.run(Stage::MatchCost, [Part::MatchCost].into_iter())
     }
 
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
-        self.run(Stage::Coarsen, [SegmentOf::Coarsen(grid)].into_iter())
+        self.run(Stage::Coarsen, [Part::Coarsen(grid)].into_iter())
     }
 
     fn refine(&mut self, grid: usize) -> Result<(), Error> {
-        self.run(Stage::Refine, [SegmentOf::Refine(grid)].into_iter())
+        self.run(Stage::Refine, [Part::Refine(grid)].into_iter())
     }
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
-        let count = u64::from(steps.end.saturating_sub(steps.start));
-        self.run(Stage::UpdateMessages, steps.map(|step| SegmentOf::UpdateMessages(grid, step)))?;
-        self.pending += count * self.plan.updates_per_step(grid);
-        if self.pending >= self.program.submission_entries {
-            self.pending = 0;
-            self.queue.submit()?;
-        }
-        Ok(())
+        self.run(Stage::UpdateMessages, steps.map(|step| Part::UpdateMessages(grid, step)))
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        self.run(Stage::SelectLabels, [SegmentOf::SelectLabels].into_iter())?;
+        self.run(Stage::SelectLabels, [Part::SelectLabels].into_iter())?;
         let size = self.plan.image_size();
         self.queue.finish(&mut |download| answer::read_labels(size, download, labels))?;
         let between = self.queue.times();
@@ -118,5 +116,112 @@ impl Solver for GpuSolver {
 
     fn allocated_bytes(&self) -> u64 {
         self.queue.allocated_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use bp_core::{Algorithm, Model, Profile, Schedule, conformance::noise_pair};
+
+    use super::*;
+    use crate::Limits;
+
+    /// Notes the message entries of each submission, and answers zeros.
+    struct Counter {
+        entries: Vec<u64>,
+        download: Vec<u8>,
+        pending: u64,
+        submitted: Arc<Mutex<Vec<u64>>>,
+    }
+
+    impl Queue for Counter {
+        fn begin(&mut self, _: &mut dyn FnMut(&mut [u8])) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn append(&mut self, segment: usize) -> Result<(), Error> {
+            self.pending += self.entries[segment];
+            Ok(())
+        }
+
+        fn mark(&mut self) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn submit(&mut self) -> Result<(), Error> {
+            self.submitted.lock().unwrap().push(std::mem::take(&mut self.pending));
+            Ok(())
+        }
+
+        fn finish(&mut self, read: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+            self.submit()?;
+            read(&self.download);
+            Ok(())
+        }
+
+        fn times(&mut self) -> &[Duration] {
+            &[]
+        }
+
+        fn read(&mut self, _: usize) -> Result<Vec<u8>, Error> {
+            Ok(Vec::new())
+        }
+
+        fn compile_time(&self) -> Duration {
+            Duration::ZERO
+        }
+
+        fn allocated_bytes(&self) -> u64 {
+            0
+        }
+    }
+
+    /// What each submission of a solve is worth, and the most that one should be.
+    fn submissions(plan: &Plan, dispatch_entries: u64) -> (Vec<u64>, u64) {
+        let limits = Limits {
+            device: String::new(),
+            binding_bytes: 1 << 30,
+            buffer_bytes: 1 << 30,
+            bindings: 16,
+            workgroups: 65_535,
+            memory_bytes: None,
+            dispatch_entries,
+        };
+        let program = Program::new(plan, &limits).unwrap();
+        let submitted = Arc::new(Mutex::new(Vec::new()));
+        let counter = Counter {
+            entries: program.segments.iter().map(|segment| segment.entries).collect(),
+            download: vec![0; program.buffers[Program::DOWNLOAD].bytes as usize],
+            pending: 0,
+            submitted: Arc::clone(&submitted),
+        };
+        let most = program.submission_entries;
+        let mut solver = GpuSolver::new(plan, program, Box::new(counter)).unwrap();
+        let pair = noise_pair(plan.image_size().width, plan.image_size().height, 1);
+        solver.match_cost(&pair, None).unwrap();
+        (1..plan.grids()).for_each(|grid| solver.coarsen(grid).unwrap());
+        for grid in (0..plan.grids()).rev() {
+            solver.refine(grid).unwrap();
+            solver.update_messages(grid, 0..plan.settings().steps).unwrap();
+        }
+        solver.select_labels(&mut vec![0; plan.image_size().pixels()]).unwrap();
+        (submitted.lock().unwrap().clone(), most)
+    }
+
+    /// No watchdog has to wait for more than a few dispatches, and nobody hands over next to nothing.
+    #[test]
+    fn submissions_are_neither_long_nor_many() {
+        let pair = noise_pair(60, 70, 1);
+        for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
+            let settings = algorithm.settings(pair.size(), 30, 2, schedule);
+            let plan = Plan::new(pair.size(), Model::new(Profile::Census, 16).unwrap(), settings).unwrap();
+            let (submitted, most) = submissions(&plan, 1 << 14);
+            assert!(submitted.iter().all(|&entries| entries <= most), "{submitted:?} {plan:?}");
+            let half_full = submitted.iter().filter(|&&entries| 2 * entries >= most).count();
+            assert!(2 * half_full + 1 >= submitted.len(), "{submitted:?} {plan:?}");
+            assert_eq!(submissions(&plan, 1 << 40).0.len(), 1);
+        }
     }
 }

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
-use bp_shaders::{Command, Kernel, Limits, Parameters, Program};
+use bp_shaders::{Access, Command, Kernel, Limits, Parameters, Program};
 
 fn roomy() -> Limits {
     Limits {
@@ -72,27 +72,52 @@ fn no_dispatch_and_no_buffer_passes_a_limit() {
     assert!(cut > 0, "no grid was cut into strips");
 }
 
-/// Every row of every colour is computed once by the kernels that compute all of them, with any limits.
+/// How often a program's kernels compute each row of each colour.
+fn computed(program: &Program) -> HashMap<(Kernel, u32, u32, u32), u32> {
+    let mut times = HashMap::new();
+    for Dispatch { kernel, parameters: p, .. } in dispatches(program) {
+        for row in (0..p.rows).map(|i| p.first_row + p.row + i * p.row_step) {
+            *times.entry((kernel, p.width, row, p.colour)).or_default() += 1;
+        }
+    }
+    times
+}
+
+/// How often a kernel should compute a row of the image in a program of one grid; `features` knows no colours.
+fn expected(kernel: Kernel, schedule: Schedule, (row, colour): (u32, u32)) -> u32 {
+    let last_of_band = row % 32 == 31;
+    match (kernel, schedule) {
+        (Kernel::Features, _) => 2,
+        (Kernel::MatchCost | Kernel::SelectLabels, _) => 1,
+        // Two steps are composed.
+        (Kernel::UpdateMessages, Schedule::Sync) => 2,
+        (Kernel::UpdateMessages, Schedule::Checkerboard) => 1,
+        // Down and up, but for odd nodes of a band's last row and even ones of its first.
+        (Kernel::UpdateMessages, Schedule::Sweep) if colour == 1 && last_of_band => 1,
+        (Kernel::UpdateMessages, Schedule::Sweep) if colour == 0 && row % 32 == 0 => 1,
+        (Kernel::UpdateMessages, Schedule::Sweep) => 2,
+        (Kernel::Coarsen | Kernel::Refine, _) => 0,
+    }
+}
+
 #[test]
-fn every_row_is_computed_once() {
+fn every_row_is_computed_as_often_as_it_should_be() {
     let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..roomy() };
     for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), roomy()), (plan, tight.clone())]) {
-        let program = Program::new(&plan, &limits).unwrap();
-        let mut rows: HashMap<(Kernel, u32, u32, u32), u32> = HashMap::new();
-        let whole = [Kernel::Features, Kernel::MatchCost, Kernel::Coarsen, Kernel::SelectLabels];
-        for Dispatch { kernel, parameters: p, .. } in dispatches(&program).filter(|d| whole.contains(&d.kernel)) {
-            for row in (0..p.rows).map(|i| p.first_row + p.row + i * p.row_step) {
-                *rows.entry((kernel, p.width, row, p.colour)).or_default() += 1;
-            }
-        }
-        let height = |grid: usize| plan.size(grid).height;
+        let rows = computed(&Program::new(&plan, &limits).unwrap());
+        let (size, height) = (plan.image_size(), |grid: usize| plan.size(grid).height);
+        let sum = |wanted| rows.iter().filter(|((kernel, ..), _)| *kernel == wanted).map(|(_, &n)| n as usize).sum();
         let coarse: usize = (1..plan.grids()).map(height).sum();
-        // Coarsest grids may have the same width; then their rows count together.
-        let computed: u32 = rows.values().sum();
-        assert_eq!(computed as usize, 2 * (3 * height(0) + coarse), "{plan:?}");
-        for (&(kernel, _, row, colour), &count) in rows.iter().filter(|((kernel, ..), _)| *kernel != Kernel::Coarsen) {
-            let images = if kernel == Kernel::Features { 2 } else { 1 };
-            assert!(count == images && (row as usize) < height(0), "{kernel:?} {colour} {row}: {count} {plan:?}");
+        assert_eq!(2 * coarse, sum(Kernel::Coarsen), "{plan:?}");
+        if plan.settings().schedule != Schedule::Sweep {
+            let fine: usize = (0..plan.grids() - 1).map(height).sum();
+            assert_eq!(4 * 2 * fine, sum(Kernel::Refine), "{plan:?}");
+        }
+        // The coarsest grids may have the same width; then their rows count together.
+        for (&(kernel, _, row, colour), &count) in rows.iter().filter(|_| plan.grids() == 1) {
+            let expected = expected(kernel, plan.settings().schedule, (row, colour));
+            assert!((row as usize) < size.height, "{kernel:?} {plan:?}");
+            assert_eq!(count, expected, "{kernel:?}, row {row}, colour {colour}: {plan:?}");
         }
     }
 }
@@ -104,6 +129,8 @@ fn what_no_device_can_run_is_refused() {
     let refusal = |plan: &Plan, limits: Limits| Program::new(plan, &limits).unwrap_err().to_string();
     let error = refusal(&bp, Limits { bindings: 8, ..roomy() });
     assert!(error.starts_with("a device cannot run this plan: a kernel needs 10 buffers"), "{error}");
+    let error = refusal(&bp, Limits { workgroups: 1, ..roomy() });
+    assert!(error.contains("a row has 90 pixels and it computes at most 64"), "{error}");
     let error = refusal(&bp, Limits { binding_bytes: 1000, ..roomy() });
     assert!(error.contains("at most 1000 bytes"), "{error}");
 
@@ -122,4 +149,65 @@ fn what_does_not_fit_is_refused_with_both_numbers() {
     assert!(Program::new(&bp, &limits(needed)).is_ok());
     let error = Program::new(&bp, &limits(needed - 1)).unwrap_err();
     assert_eq!(error, Error::OutOfMemory { what: "device buffers", needed, available: Some(needed - 1) });
+}
+
+/// What a command does with a buffer: (buffer, whether it is written, by which kernel if any, colour and first row).
+type Use = (usize, bool, Option<Kernel>, (u32, u32));
+
+/// Stands for the place of a copy.
+const COPIED: (u32, u32) = (u32::MAX, 0);
+
+fn uses(program: &Program, command: &Command) -> Vec<Use> {
+    match *command {
+        Command::Dispatch { bind_group, parameters, .. } => {
+            let block = &program.parameters[parameters as usize..][..size_of::<Parameters>()];
+            let p: Parameters = bytemuck::pod_read_unaligned(block);
+            let group = &program.bind_groups[bind_group];
+            let bound = group.buffers.iter().zip(group.kernel.bindings());
+            bound
+                .map(|(&buffer, &access)| (buffer, access == Access::Write, Some(group.kernel), (p.colour, p.row)))
+                .collect()
+        }
+        Command::Copy { from, to, .. } => vec![(from, false, None, COPIED), (to, true, None, COPIED)],
+        Command::Clear { buffer } => vec![(buffer, true, None, (0, 0))],
+        Command::Barrier => Vec::new(),
+    }
+}
+
+/// Whether two commands without a barrier between them may meet in a buffer: they may not where one writes what the
+/// other reads or writes. Dispatches of one kernel write rows of their own; labels are shared by
+/// all colours and strips, and under the schedule `sweep` those of the other colour are read; what is copied between strips
+/// are first and last rows, which come from other rows than those that they go to.
+fn may_meet(program: &Program, sweep: bool, a: Use, b: Use) -> bool {
+    let is_read_only = !a.1 && !b.1;
+    let other_rows = a.1 && b.1 && a.2.is_some() && a.2 == b.2 && a.3 != b.3;
+    let labels = program.buffers[a.0].name == "labels" && a.2.is_some() && b.2.is_some();
+    let unused = program.buffers[a.0].name == "unused";
+    let copies = (a.3, b.3) == (COPIED, COPIED);
+    let decided_one_after_another = labels && sweep && a.3.0 != b.3.0;
+    is_read_only || copies || unused || (!decided_one_after_another && (other_rows || labels))
+}
+
+/// On lavapipe dispatches never overlap, and validation layers see no more than copies: so that a barrier is not missed
+/// where it matters, this looks for it.
+#[test]
+fn commands_without_a_barrier_between_them_do_not_meet() {
+    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..roomy() };
+    for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), roomy()), (plan, tight.clone())]) {
+        let program = Program::new(&plan, &limits).unwrap();
+        let sweep = plan.settings().schedule == Schedule::Sweep;
+        for segment in &program.segments {
+            for run in segment.commands.split(|command| *command == Command::Barrier) {
+                let mut used: HashMap<usize, Vec<Use>> = HashMap::new();
+                for (command, a) in
+                    run.iter().flat_map(|command| uses(&program, command).into_iter().map(move |a| (command, a)))
+                {
+                    let before = used.entry(a.0).or_default();
+                    let meets = before.iter().find(|&&b| !may_meet(&program, sweep, a, b));
+                    assert!(meets.is_none(), "{command:?} in {:?}: {plan:?}", program.buffers[a.0].name);
+                    before.push(a);
+                }
+            }
+        }
+    }
 }

@@ -5,9 +5,11 @@
 
 mod cases;
 mod oracle;
+mod random;
 
 pub use cases::{cases, noise_pair};
 pub use oracle::Oracle;
+pub use random::random_case;
 
 use std::ops::ControlFlow;
 
@@ -75,23 +77,55 @@ pub fn assert_same(reference: &dyn Device, tested: &dyn Device, case: &Case) {
     assert_equal(&solved(reference, case), &solved(tested, case), case);
 }
 
+/// Asserts that devices give the same labels and messages on the random cases of these seeds, each on the first of the
+/// `tested` devices that does not refuse it as [`Error::Unsupported`]: from the smallest to the largest, say. Tells how
+/// many cases all of them refuse.
+///
+/// # Panics
+/// Where one fails otherwise, or they differ; the message names the seed, the plan and the first node that differs.
+pub fn assert_same_at_random(
+    reference: &dyn Device,
+    tested: &[&dyn Device],
+    seeds: impl IntoIterator<Item = u64>,
+) -> usize {
+    let runs = |&seed: &u64| {
+        let case = random_case(seed);
+        let is_refused = |found: &Result<Answer, Error>| matches!(found, Err(Error::Unsupported { .. }));
+        let Some(found) = tested.iter().map(|device| solve(*device, &case)).find(|found| !is_refused(found)) else {
+            return false;
+        };
+        let differ = |found: Answer| Ok(difference(&solve(reference, &case)?, &found, &case));
+        if let Some(what) = found.and_then(differ).unwrap_or_else(|error| Some(error.to_string())) {
+            panic!("random_case({seed}): {what}\n{:?}", case.plan);
+        }
+        true
+    };
+    seeds.into_iter().filter(|seed| !runs(seed)).count()
+}
+
 fn solved(device: &dyn Device, case: &Case) -> Answer {
     solve(device, case).unwrap_or_else(|error| panic!("{error}\n{:?}", case.plan))
 }
 
 fn assert_equal(expected: &Answer, found: &Answer, case: &Case) {
+    if let Some(difference) = difference(expected, found, case) {
+        panic!("{difference}\n{:?}", case.plan);
+    }
+}
+
+/// The first node where two answers differ, in words.
+fn difference(expected: &Answer, found: &Answer, case: &Case) -> Option<String> {
     let (width, labels) = (case.pair.size().width, case.plan.model().labels());
     for ((expected, found), side) in expected.messages.iter().zip(&found.messages).zip(Side::ALL) {
         if let Some(i) = first_difference(expected, found) {
             let (node, label) = (i / labels, i % labels);
             let place = format!("({}, {}) from {side:?}, label {label}", node % width, node / width);
-            panic!("message at {place}: {} instead of {}\n{:?}", found[i], expected[i], case.plan);
+            return Some(format!("message at {place}: {} instead of {}", found[i], expected[i]));
         }
     }
-    if let Some(i) = first_difference(&expected.labels, &found.labels) {
-        let (expected, found) = (expected.labels[i], found.labels[i]);
-        panic!("label at ({}, {}): {found} instead of {expected}\n{:?}", i % width, i / width, case.plan);
-    }
+    let i = first_difference(&expected.labels, &found.labels)?;
+    let (expected, found) = (expected.labels[i], found.labels[i]);
+    Some(format!("label at ({}, {}): {found} instead of {expected}", i % width, i / width))
 }
 
 /// Asserts that a matcher answers as a fresh one does, after another pair and after a solve that was stopped.

@@ -98,6 +98,13 @@ impl Matcher {
         self.solver.compile_time()
     }
 
+    /// Bytes that each stage of the last match had to read and write at least, in the order of [`Stage::ALL`], where
+    /// the device counts them; see [`Solver::moved_bytes`].
+    #[must_use]
+    pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        self.solver.moved_bytes()
+    }
+
     /// Matches a pair; [`Matcher::labels`] and [`Matcher::disparities`] hold the answer until the next.
     ///
     /// # Errors

@@ -1,20 +1,18 @@
 //! The loader, the connection to the drivers, and the devices they offer.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
-use std::{env, ffi::CStr, sync::LazyLock};
+use std::{ffi::CStr, sync::LazyLock};
 
 use ash::{Entry, ext, khr, vk};
 use bp_core::{DeviceInfo, DeviceKind};
+use bp_shaders::missing;
 
-use crate::validation;
+use crate::{limits, validation};
 
 /// The loader. It stays loaded to the end: drivers may leave code behind that threads run when they end.
 static ENTRY: LazyLock<Result<Entry, String>> = LazyLock::new(|| {
     // SAFETY: a Vulkan loader may be loaded at any time; nothing else is loaded under its name.
-    unsafe { Entry::load() }.map_err(|error| {
-        let packages = "Debian's and Ubuntu's package is libvulkan1, Fedora's vulkan-loader, Arch's vulkan-icd-loader";
-        format!("there is no Vulkan loader, the library libvulkan.so.1; {packages} ({error})")
-    })
+    unsafe { Entry::load() }.map_err(|error| format!("{} ({error})", missing::loader()))
 });
 
 /// The loader, or why there is none.
@@ -58,8 +56,9 @@ impl Instance {
         if version.is_none_or(|version| version < vk::API_VERSION_1_2) {
             return Err("the Vulkan loader, libvulkan.so.1, is older than Vulkan 1.2".to_owned());
         }
-        let mut instance = Self { raw: create(entry)?, messenger: None };
-        if validation::is_on(entry) {
+        let validated = validation::is_on(entry);
+        let mut instance = Self { raw: create(entry, validated)?, messenger: None };
+        if validated {
             let listeners = ext::debug_utils::Instance::new(entry, &instance.raw);
             // SAFETY: the instance was made with the extension.
             let messenger = unsafe { listeners.create_debug_utils_messenger(&validation::listener(), None) };
@@ -77,10 +76,14 @@ impl Instance {
     pub(crate) fn adapters(&self) -> Result<Vec<Adapter>, String> {
         // SAFETY: the instance is alive.
         let devices = unsafe { self.raw.enumerate_physical_devices() };
-        let devices = devices.map_err(|error| format!("the Vulkan drivers list no devices: {error}"))?;
+        let devices = devices.map_err(|error| {
+            format!(
+                "the Vulkan drivers list no devices: {error}; memory may be short, or a driver without its hardware"
+            )
+        })?;
         let mut adapters: Vec<_> = devices.into_iter().map(|device| self.adapter(device)).collect();
         adapters.sort_by_key(|adapter| adapter.info.kind);
-        if adapters.is_empty() { Err(no_driver()) } else { Ok(adapters) }
+        if adapters.is_empty() { Err(missing::driver()) } else { Ok(adapters) }
     }
 
     fn adapter(&self, raw: vk::PhysicalDevice) -> Adapter {
@@ -88,14 +91,15 @@ impl Instance {
         let properties = unsafe { self.raw.get_physical_device_properties(raw) };
         // SAFETY: the same.
         let memory = unsafe { self.raw.get_physical_device_memory_properties(raw) };
-        let own = memory.memory_heaps_as_slice().iter();
-        let own = own.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+        let kind = kind(properties.device_type);
+        let shared = kind == DeviceKind::SoftwareRasteriser;
+        let heap = limits::device_heap(&memory).filter(|_| !shared);
         let mut info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
-            kind: kind(properties.device_type),
+            kind,
             api: Some(format!("Vulkan {}", version_text(properties.api_version))),
             driver: None,
-            memory_bytes: Some(own.map(|heap| heap.size).sum()),
+            memory_bytes: heap.map(|heap| memory.memory_heaps[heap].size),
             uuid: None,
             workers: 1,
         };
@@ -172,7 +176,7 @@ impl Drop for Instance {
     }
 }
 
-fn create(entry: &Entry) -> Result<ash::Instance, String> {
+fn create(entry: &Entry, validated: bool) -> Result<ash::Instance, String> {
     // The highest version whose functions are asked for; what a device has is looked at before it is used.
     let application =
         vk::ApplicationInfo::default().application_name(c"belief-propagation-stereo").api_version(vk::API_VERSION_1_3);
@@ -180,28 +184,14 @@ fn create(entry: &Entry) -> Result<ash::Instance, String> {
     let layers = [validation::LAYER.as_ptr()];
     let extensions = validation::EXTENSIONS.map(CStr::as_ptr);
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&validation::EXTRAS);
-    if validation::is_on(entry) {
+    if validated {
         info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).push_next(&mut features);
     }
     // SAFETY: all that the structure points to lives until the end of the function.
     unsafe { entry.create_instance(&info, None) }.map_err(|error| match error {
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_driver(),
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => missing::driver(),
         _ => format!("the Vulkan loader makes no instance: {error}"),
     })
-}
-
-/// Why there is a loader and no device.
-fn no_driver() -> String {
-    let chosen = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| {
-        let value = env::var_os(name)?;
-        Some(format!("; {name} is set, so that it looks only for {}", value.display()))
-    });
-    format!(
-        "the Vulkan loader finds no driver that offers a device{}. Install the vendor's driver, or Mesa's (Debian's and \
-         Ubuntu's package is mesa-vulkan-drivers). In a container, the driver's file in /usr/share/vulkan/icd.d or \
-         /etc/vulkan/icd.d may be missing; VK_DRIVER_FILES can name it elsewhere",
-        chosen.unwrap_or_default()
-    )
 }
 
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {

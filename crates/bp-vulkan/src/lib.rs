@@ -20,11 +20,9 @@ mod timeline;
 mod timer;
 pub mod validation;
 
-pub use device::VulkanDevice;
-
 use bp_core::{Backend, Device, DeviceInfo, Error};
-use bp_shaders::Limits;
-
+use bp_shaders::{Limits, missing};
+use device::VulkanDevice;
 use instance::{Adapter, Instance};
 
 /// The backend.
@@ -37,11 +35,15 @@ impl Vulkan {
     ///
     /// # Errors
     /// [`Error::Unavailable`] with the reason.
-    pub fn open_with(&self, device: usize, change: impl FnOnce(&mut Limits)) -> Result<VulkanDevice, Error> {
-        let unavailable = |reason| Error::Unavailable { backend: self.name(), device, reason };
-        let instance = Instance::new().map_err(unavailable)?;
-        let adapter = pick(instance.adapters().map_err(unavailable)?, device).map_err(unavailable)?;
-        VulkanDevice::open(instance, adapter, change).map_err(unavailable)
+    pub fn open_with(&self, device: usize, change: impl FnOnce(&mut Limits)) -> Result<Box<dyn Device>, Error> {
+        let open = || {
+            let instance = Instance::new()?;
+            let adapter = pick(instance.adapters()?, device)?;
+            let opened = VulkanDevice::open(instance, adapter, change)?;
+            bp_shaders::check(&opened)?;
+            Ok(Box::new(opened) as Box<dyn Device>)
+        };
+        open().map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })
     }
 }
 
@@ -56,10 +58,7 @@ impl Backend for Vulkan {
     }
 
     fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {
-        let opened = self.open_with(device, |_| {})?;
-        let works = bp_shaders::check(&opened);
-        works.map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })?;
-        Ok(Box::new(opened))
+        self.open_with(device, |_| ())
     }
 }
 
@@ -68,7 +67,5 @@ fn pick(mut adapters: Vec<Adapter>, device: usize) -> Result<Adapter, String> {
     if device < count {
         return Ok(adapters.swap_remove(device));
     }
-    let devices =
-        if count == 1 { "1 device, number 0".to_owned() } else { format!("{count} devices, numbered from 0") };
-    Err(format!("Vulkan offers {devices}"))
+    Err(missing::device(count))
 }

@@ -19,20 +19,20 @@ pub(crate) fn of(gpu: &Gpu) -> Limits {
         buffer_bytes: gpu.most_bytes.buffer,
         bindings: bindings.into_iter().min().unwrap_or(0),
         workgroups: limits.max_compute_work_group_count[0],
-        memory_bytes: heap(gpu).map(|heap| gpu.memory.memory_heaps[heap].size),
+        memory_bytes: device_heap(&gpu.memory).map(|heap| gpu.memory.memory_heaps[heap].size),
         dispatch_entries: Limits::dispatch_entries(gpu.adapter.info.kind),
     }
 }
 
 /// Bytes of memory on the device that are free now, where its driver tells.
 pub(crate) fn free_bytes(gpu: &Gpu) -> Option<u64> {
-    gpu.instance().free_bytes(gpu.adapter.raw, heap(gpu)?)
+    gpu.instance().free_bytes(gpu.adapter.raw, device_heap(&gpu.memory)?)
 }
 
 /// The heap that [`Memory::Device`] is taken from.
-fn heap(gpu: &Gpu) -> Option<usize> {
-    let kind = memory_type(&gpu.memory, Memory::Device, u32::MAX)?;
-    Some(gpu.memory.memory_types[kind as usize].heap_index as usize)
+pub(crate) fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<usize> {
+    let kind = memory_type(memory, Memory::Device, u32::MAX)?;
+    Some(memory.memory_types[kind as usize].heap_index as usize)
 }
 
 /// The type of memory for such buffers among those allowed: the first, since drivers list the fastest first, with

@@ -50,6 +50,8 @@ impl Compiled {
 pub(crate) struct Pipelines {
     gpu: Arc<Gpu>,
     cache: Owned<vk::PipelineCache>,
+    /// What an earlier run, or this one, stored of the cache.
+    stored: Vec<u8>,
     layouts: HashMap<Kernel, Arc<Layout>>,
     compiled: HashMap<Pipeline, Arc<Compiled>>,
 }
@@ -62,7 +64,7 @@ impl Pipelines {
         // SAFETY: the data is empty or what this driver once stored for this device, whole.
         let cache = gpu.checked("making a pipeline cache", unsafe { gpu.raw().create_pipeline_cache(&info, None) })?;
         let cache = Owned::new(gpu, cache);
-        Ok(Self { gpu: Arc::clone(gpu), cache, layouts: HashMap::new(), compiled: HashMap::new() })
+        Ok(Self { gpu: Arc::clone(gpu), cache, stored, layouts: HashMap::new(), compiled: HashMap::new() })
     }
 
     /// These kernels, and how long compiling those took that had not been.
@@ -95,11 +97,13 @@ impl Pipelines {
         Ok(layout)
     }
 
-    /// Stores what the driver wants to keep for the next run.
-    pub(crate) fn store(&self) {
+    /// Stores what the driver wants to keep for the next run, unless it is stored already.
+    pub(crate) fn store(&mut self) {
         // SAFETY: the cache is alive, and whoever compiles has it alone.
-        if let Ok(data) = unsafe { self.gpu.raw().get_pipeline_cache_data(self.cache.raw) } {
+        let data = unsafe { self.gpu.raw().get_pipeline_cache_data(self.cache.raw) }.unwrap_or_default();
+        if data != self.stored {
             cache::store(&cache_key(&self.gpu), &data);
+            self.stored = data;
         }
     }
 }

@@ -8,7 +8,7 @@ use naga::{
     back::{
         PipelineConstants,
         pipeline_constants::process_overrides,
-        spv::{self, Capability, ZeroInitializeWorkgroupMemoryMode},
+        spv::{self, Capability},
     },
     proc::{BoundsCheckPolicies, BoundsCheckPolicy},
     valid::{Capabilities, ValidationFlags, Validator},
@@ -36,8 +36,8 @@ fn describe(error: impl fmt::Display) -> String {
     error.to_string()
 }
 
-/// Plain code, without checks that the kernels do not need: their loops end, their indices are within their buffers,
-/// and none relies on workgroup memory being zeros. Private variables begin as zeros, on which some rely.
+/// Plain code, without checks that the kernels do not need: their loops end and their indices are within their buffers.
+/// Variables begin as zeros, on which some rely.
 fn options() -> spv::Options<'static> {
     let unchecked = BoundsCheckPolicy::Unchecked;
     spv::Options {
@@ -51,7 +51,6 @@ fn options() -> spv::Options<'static> {
             image_load: unchecked,
             binding_array: unchecked,
         },
-        zero_initialize_workgroup_memory: ZeroInitializeWorkgroupMemoryMode::None,
         force_loop_bounding: false,
         ..spv::Options::default()
     }
@@ -59,7 +58,43 @@ fn options() -> spv::Options<'static> {
 
 #[cfg(test)]
 mod tests {
+    use std::{collections::HashSet, io::Write as _, process::Command};
+
+    use bp_core::{Algorithm, Model, Plan, Profile, Schedule, Size};
+    use bp_shaders::{Limits, Program};
+
     use super::*;
+
+    /// Every pipeline that plans of all profiles, schedules and algorithms ask for.
+    fn pipelines() -> HashSet<Pipeline> {
+        let size = Size { width: 90, height: 70 };
+        let limits = Limits {
+            device: String::new(),
+            binding_bytes: 1 << 30,
+            buffer_bytes: 1 << 30,
+            bindings: 16,
+            workgroups: 65_535,
+            memory_bytes: None,
+            dispatch_entries: 1 << 30,
+        };
+        let settings = Schedule::ALL.into_iter().flat_map(|s| Algorithm::ALL.map(|a| a.settings(size, 9, 2, s)));
+        let plans = settings.flat_map(|settings| Profile::ALL.map(|profile| (profile, settings)));
+        let plans = plans.map(|(profile, settings)| Plan::new(size, Model::new(profile, 20).unwrap(), settings));
+        plans.flat_map(|plan| Program::new(&plan.unwrap(), &limits).unwrap().pipelines).collect()
+    }
+
+    /// By the Khronos validator (Debian: spirv-tools), where it is installed.
+    #[test]
+    fn all_kernels_are_valid_spirv() {
+        for pipeline in pipelines() {
+            let words = translate(&pipeline).unwrap();
+            let mut file = tempfile::NamedTempFile::new().unwrap();
+            words.iter().for_each(|word| file.write_all(&word.to_le_bytes()).unwrap());
+            let validator = Command::new("spirv-val").args(["--target-env", "vulkan1.2"]).arg(file.path()).output();
+            let Ok(output) = validator else { return };
+            assert!(output.status.success(), "{pipeline}: {}", String::from_utf8_lossy(&output.stderr));
+        }
+    }
 
     const TEXT: &str = "
         override N: u32;

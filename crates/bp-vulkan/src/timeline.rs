@@ -6,7 +6,9 @@ use std::sync::Arc;
 use ash::vk;
 use bp_core::Error;
 
-use crate::{device::Gpu, error::PATIENCE, object::Owned, validation};
+use bp_shaders::PATIENCE;
+
+use crate::{device::Gpu, object::Owned, validation};
 
 /// Counts pieces of work, submitted and done.
 pub(crate) struct Timeline {

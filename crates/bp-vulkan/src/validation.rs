@@ -66,7 +66,7 @@ fn has_layer(entry: &Entry) -> bool {
     layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER))
 }
 
-/// What an instance, and whoever listens to the layer, is made with to be told of complaints.
+/// What a listener to the layer is made with.
 pub(crate) fn listener() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)

@@ -71,13 +71,10 @@ impl Clock {
     /// Reads the marks once `last`, the submission in which they were resolved, is done.
     pub(crate) fn read(&mut self, gpu: &Gpu, last: &SubmissionIndex) -> Result<(), Error> {
         let (marks, period, times) = (self.marks as usize, self.period, &mut self.times);
-        let between =
-            |(before, after): (u64, u64)| Duration::from_nanos((after.saturating_sub(before) as f64 * period) as u64);
         buffers::read(gpu, &self.readable, last, |bytes| {
             let (ticks, _) = bytes.as_chunks();
-            let ticks = ticks[..marks].iter().map(|tick| u64::from_le_bytes(*tick));
             times.clear();
-            times.extend(ticks.clone().zip(ticks.skip(1)).map(between));
+            times.extend(between(ticks[..marks].iter().map(|tick| u64::from_le_bytes(*tick)), period));
         })
     }
 
@@ -89,5 +86,26 @@ impl Clock {
     /// Bytes allocated.
     pub(crate) fn bytes(&self) -> u64 {
         self.resolved.size() + self.readable.size()
+    }
+}
+
+/// The times between readings of a clock that counts once in `period` nanoseconds; none if it ran over, since wgpu does
+/// not tell at which number it does.
+fn between(ticks: impl Iterator<Item = u64> + Clone, period: f64) -> impl Iterator<Item = Duration> {
+    let kept = if ticks.clone().is_sorted() { usize::MAX } else { 0 };
+    let pairs = ticks.clone().zip(ticks.skip(1)).take(kept);
+    pairs.map(move |(before, after)| Duration::from_nanos(((after - before) as f64 * period) as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_ran_over_tells_no_times() {
+        let times = |ticks: &[u64]| between(ticks.iter().copied(), 2.5).collect::<Vec<_>>();
+        assert_eq!(times(&[4, 8, 8]), [Duration::from_nanos(10), Duration::ZERO]);
+        assert_eq!(times(&[4, 8, 1, 5]), []);
+        assert_eq!(times(&[4]), []);
     }
 }

@@ -6,11 +6,12 @@ use bp_core::{Device, Error, Plan, Solver};
 use bp_shaders::{GpuSolver, Limits, Program};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
-use crate::{clock::Clock, error::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue};
+use crate::{clock::Clock, error::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue, vulkan};
 
 /// An open adapter.
 pub(crate) struct WgpuDevice {
     gpu: Arc<Gpu>,
+    adapter: Adapter,
     limits: Limits,
     pipelines: Pipelines,
 }
@@ -31,8 +32,15 @@ impl WgpuDevice {
         let mut limits = limits(adapter);
         change(&mut limits);
         let gpu = Arc::new(Gpu::new(limits.device.clone(), device, queue));
-        let pipelines = Pipelines::new(&gpu).map_err(|error| error.to_string())?;
-        Ok(Self { gpu, limits, pipelines })
+        let pipelines = Pipelines::new(&gpu, adapter).map_err(|error| error.to_string())?;
+        Ok(Self { gpu, adapter: adapter.clone(), limits, pipelines })
+    }
+
+    /// What it allows, with no more memory than is free now: drivers let more be allocated than there is, and then
+    /// swap or end the program.
+    fn limits(&self) -> Limits {
+        let bytes = [self.limits.memory_bytes, vulkan::free_bytes(&self.adapter)];
+        Limits { memory_bytes: bytes.into_iter().flatten().min(), ..self.limits.clone() }
     }
 }
 
@@ -44,14 +52,14 @@ fn limits(adapter: &Adapter) -> Limits {
         buffer_bytes: limits.max_buffer_size,
         bindings: limits.max_storage_buffers_per_shader_stage,
         workgroups: limits.max_compute_workgroups_per_dimension,
-        memory_bytes: None,
+        memory_bytes: vulkan::memory_bytes(adapter),
         dispatch_entries: Limits::dispatch_entries(instance::kind(adapter)),
     }
 }
 
 impl Device for WgpuDevice {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
-        let program = Program::new(plan, &self.limits)?;
+        let program = Program::new(plan, &self.limits())?;
         let queue = WgpuQueue::new(&self.gpu, &self.pipelines, &program)?;
         Ok(Box::new(GpuSolver::new(plan, program, Box::new(queue))?))
     }
@@ -63,7 +71,7 @@ impl Device for WgpuDevice {
     }
 
     fn copy_rate(&self) -> Result<Option<f64>, Error> {
-        let rate = bp_shaders::copy_rate(&self.limits, |program| {
+        let rate = bp_shaders::copy_rate(&self.limits(), |program| {
             Ok(Box::new(WgpuQueue::new(&self.gpu, &self.pipelines, program)?))
         });
         rate.map(Some)
@@ -101,8 +109,11 @@ mod tests {
         let refused =
             device.gpu.guard(0, || Ok(crate::buffers::buffer(&device.gpu, "", 4, wgpu::BufferUsages::empty())));
         assert!(matches!(refused, Err(Error::Device { .. })));
-        let panicked = device.gpu.guard(0, || -> Result<(), Error> { panic!("as wgpu does") });
-        assert!(matches!(panicked, Err(Error::Device { reason, .. }) if reason == "as wgpu does"));
         assert_eq!(device.gpu.guard(0, || Ok(())), Ok(()));
+        let panicked = device.gpu.guard(0, || -> Result<(), Error> { panic!("as it does") });
+        let lost =
+            |result| matches!(result, Err(Error::DeviceLost { reason, .. }) if reason == "wgpu panicked: as it does");
+        assert!(lost(panicked));
+        assert!(lost(device.gpu.guard(0, || Ok(()))));
     }
 }

@@ -5,14 +5,11 @@ use std::{
     mem,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, OnceLock},
-    time::Duration,
 };
 
 use bp_core::Error;
+use bp_shaders::PATIENCE;
 use wgpu::{ErrorFilter, PollError, PollType, SubmissionIndex};
-
-/// How long a device is given to finish what was submitted.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// An open device of wgpu's, shared by all that is prepared on it.
 pub(crate) struct Gpu {
@@ -46,36 +43,48 @@ impl Gpu {
         self.alive()?;
         let filters = [ErrorFilter::Validation, ErrorFilter::Internal, ErrorFilter::OutOfMemory];
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
-        // wgpu panics where it notices during a wait that the device is lost.
+        // wgpu panics where it notices during a wait that the device is lost. Whatever it panics for, it may have left
+        // something half done.
         let result = catch_unwind(AssertUnwindSafe(work));
+        let result = result.unwrap_or_else(|panic| Err(self.ended(self.lost(message(panic.as_ref())))));
         // Lack of memory is asked for first: what could not be allocated is reported as invalid wherever it is used.
         let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
         let error = errors.fold(None, Option::or);
+        // wgpu also takes a device for lost that lacks memory.
+        if let Some(wgpu::Error::OutOfMemory { .. }) = error {
+            return Err(Error::OutOfMemory { what: "buffers on the device", needed: bytes, available: None });
+        }
         self.alive()?;
-        match (error, result) {
-            (Some(wgpu::Error::OutOfMemory { .. }), _) => {
-                Err(Error::OutOfMemory { what: "buffers on the device", needed: bytes, available: None })
-            }
-            (Some(error), _) => Err(self.failed(error.to_string())),
-            (None, Err(panic)) => Err(self.failed(message(panic.as_ref()))),
-            (None, Ok(result)) => result,
+        match error {
+            Some(error) => Err(self.failed(error.to_string())),
+            None => result,
         }
     }
 
     /// Waits until a submission is done. To be called under [`Gpu::guard`].
     pub(crate) fn wait(&self, submission: &SubmissionIndex) -> Result<(), Error> {
-        let wait = PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(PATIENCE) };
+        self.wait_for(Some(submission.clone()))
+    }
+
+    /// The same; for all submissions where none is named.
+    fn wait_for(&self, submission_index: Option<SubmissionIndex>) -> Result<(), Error> {
+        let wait = PollType::Wait { submission_index, timeout: Some(PATIENCE) };
         let end = match self.device.poll(wait) {
             Ok(_) => return Ok(()),
-            Err(PollError::Timeout) => {
-                // Dropping the last handle would wait again, without end.
-                mem::forget((self.device.clone(), self.queue.clone()));
-                Error::Timeout { device: self.name.clone(), seconds: PATIENCE.as_secs() }
-            }
+            Err(PollError::Timeout) => Error::Timeout { device: self.name.clone(), seconds: PATIENCE.as_secs() },
             // The index of a submission that a lost device did not take.
-            Err(error) => Error::DeviceLost { device: self.name.clone(), reason: error.to_string() },
+            Err(error) => self.lost(error.to_string()),
         };
-        Err(self.end.get_or_init(|| end).clone())
+        Err(self.ended(end))
+    }
+
+    /// Notes what ends the device, unless something has before, and returns what did.
+    fn ended(&self, end: Error) -> Error {
+        self.end.get_or_init(|| end).clone()
+    }
+
+    fn lost(&self, reason: String) -> Error {
+        Error::DeviceLost { device: self.name.clone(), reason }
     }
 
     /// An error of this device.
@@ -88,8 +97,18 @@ impl Gpu {
     }
 }
 
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // With its last handle, wgpu waits for the device without end. One that does not answer stays until the process
+        // ends.
+        if self.guard(0, || self.wait_for(None)).is_err() {
+            mem::forget((self.device.clone(), self.queue.clone()));
+        }
+    }
+}
+
 /// What a panic said.
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("wgpu panicked").to_owned()
+    text.map_or_else(|| "wgpu panicked".to_owned(), |text| format!("wgpu panicked: {text}"))
 }

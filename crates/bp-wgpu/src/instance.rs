@@ -1,7 +1,10 @@
 //! The adapters there are.
 
 use bp_core::{DeviceInfo, DeviceKind};
-use wgpu::{Adapter, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags, MemoryBudgetThresholds};
+use bp_shaders::missing;
+use wgpu::{Adapter, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
+
+use crate::vulkan;
 
 /// What wgpu is asked to reach devices through.
 const BACKENDS: Backends = Backends::VULKAN;
@@ -16,8 +19,8 @@ pub(crate) fn adapters() -> Vec<Adapter> {
         backends: BACKENDS,
         // A debug build would otherwise load validation layers.
         flags: InstanceFlags::empty().with_env(),
-        // Drivers let more be allocated than there is, and then swap or end the program.
-        memory_budget_thresholds: MemoryBudgetThresholds { for_resource_creation: Some(100), for_device_loss: None },
+        // No thresholds of memory: wgpu would refuse to upload more than fits the host's small window to a GPU's memory,
+        // though it can lie outside. `WgpuDevice` itself asks what is free.
         ..InstanceDescriptor::new_without_display_handle()
     });
     let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
@@ -36,32 +39,28 @@ pub(crate) fn kind(adapter: &Adapter) -> DeviceKind {
     }
 }
 
-/// What is known of an adapter. wgpu tells neither its memory nor its identifier.
+/// What is known of an adapter.
 pub(crate) fn info(adapter: &Adapter) -> DeviceInfo {
     let info = adapter.get_info();
     let driver = [info.driver, info.driver_info].join(" ").trim().to_owned();
+    let kind = kind(adapter);
     DeviceInfo {
         name: info.name,
-        kind: kind(adapter),
-        api: Some("Vulkan through wgpu 30".to_owned()),
+        kind,
+        api: vulkan::api(adapter),
         driver: Some(driver).filter(|driver| !driver.is_empty()),
-        memory_bytes: None,
-        uuid: None,
+        // A software rasteriser has none of its own.
+        memory_bytes: vulkan::memory_bytes(adapter).filter(|_| kind != DeviceKind::SoftwareRasteriser),
+        uuid: vulkan::uuid(adapter),
         workers: 1,
     }
 }
 
 /// Why there is no device at an index beyond `count` adapters.
 pub(crate) fn missing(count: usize) -> String {
-    if count > 0 {
-        let devices = if count == 1 { "is 1 device" } else { &format!("are {count} devices") };
-        return format!("there {devices}, numbered from 0");
+    match count {
+        0 if !vulkan::has_loader() => missing::loader(),
+        0 => missing::driver(),
+        _ => missing::device(count),
     }
-    let set = |name: &&str| std::env::var_os(name).map(|value| format!("; {name} is {}", value.display()));
-    let variables: String = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].iter().filter_map(set).collect();
-    format!(
-        "no Vulkan loader (libvulkan.so.1) with a working driver was found. Install the GPU vendor's driver, or on Debian \
-         `apt-get install libvulkan1 mesa-vulkan-drivers`. In a container, VK_DRIVER_FILES may have to name the driver's \
-         ICD file, such as nvidia_icd.json{variables}"
-    )
 }

@@ -4,7 +4,9 @@
 //! all that can go wrong there into errors. Its devices are those that have a Vulkan driver.
 //!
 //! `instance` lists adapters, `device` opens one, `buffers` and `pipelines` make what a program names, `recording` encodes
-//! its commands, `queue` runs them, `clock` times them, and `error` sees to it that wgpu never ends the program.
+//! its commands, `queue` runs them, `clock` times them, `error` sees to it that wgpu never ends the program, and
+//! `vulkan` asks for what wgpu does not tell.
+#![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffers;
 mod clock;
@@ -14,6 +16,7 @@ mod instance;
 mod pipelines;
 mod queue;
 mod recording;
+mod vulkan;
 
 use bp_core::{Backend, Device, DeviceInfo, Error};
 use bp_shaders::Limits;
@@ -29,12 +32,14 @@ impl Wgpu {
     /// # Errors
     /// [`Error::Unavailable`] with the reason.
     pub fn open_with(&self, device: usize, change: impl FnOnce(&mut Limits)) -> Result<Box<dyn Device>, Error> {
-        let unavailable = |reason| Error::Unavailable { backend: self.name(), device, reason };
-        let adapters = instance::adapters();
-        let adapter = adapters.get(device).ok_or_else(|| unavailable(instance::missing(adapters.len())))?;
-        let opened = device::WgpuDevice::open(adapter, change).map_err(unavailable)?;
-        bp_shaders::check(&opened).map_err(unavailable)?;
-        Ok(Box::new(opened))
+        let open = || {
+            let adapters = instance::adapters();
+            let adapter = adapters.get(device).ok_or_else(|| instance::missing(adapters.len()))?;
+            let opened = device::WgpuDevice::open(adapter, change)?;
+            bp_shaders::check(&opened)?;
+            Ok(Box::new(opened) as Box<dyn Device>)
+        };
+        open().map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })
     }
 }
 

@@ -9,7 +9,7 @@ use clap::{
     builder::{NonEmptyStringValueParser, OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-use crate::{backends, files::PixelLimit};
+use crate::{backends, files::PixelLimit, speed::Problem};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
@@ -28,7 +28,8 @@ Examples:
   bp reproduce --quick
   bp doctor
 
-Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable, 6 out of memory, 130 interrupted.";
+Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable or unable to run the plan,
+6 out of memory, 130 interrupted.";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -49,6 +50,8 @@ pub(crate) enum Command {
     Doctor(DoctorArgs),
     /// Check that backends give the reference's labels and messages, to the bit.
     Conform(ConformArgs),
+    /// Time devices against each other on fixed problems, in turns and in one process.
+    Speed(SpeedArgs),
 }
 
 /// `bp match`.
@@ -281,6 +284,31 @@ pub(crate) struct ConformArgs {
     /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
+}
+
+/// `bp speed`.
+#[derive(Debug, Args)]
+pub(crate) struct SpeedArgs {
+    /// Backends, separated by commas, the one first that the others are compared with; NAME:DEVICE for another than a
+    /// backend's first device.
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
+    /// Problems, separated by commas. [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = named(&Problem::ALL, Problem::name))]
+    pub(crate) problem: Vec<Problem>,
+    /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of
+    /// them. [default: 9, with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) rounds: Option<u32>,
+    /// Images of a third of the width and height, and one round unless --rounds says otherwise. Says so in the output.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Folder for speed.md and, with every sample, speed.json; neither may be there yet.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) threads: Option<u16>,
 }
 
 fn threads() -> impl TypedValueParser<Value = u16> {

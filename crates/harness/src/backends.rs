@@ -1,5 +1,12 @@
 //! The one list of backends, and how options name their devices.
 
+mod asked;
+#[cfg(test)]
+pub(crate) mod flaky;
+
+use std::time::{Duration, Instant};
+
+pub(crate) use asked::{Asked, open_all};
 use bp_core::{Backend, Device, DeviceInfo, Error};
 
 use crate::failure::Failure;
@@ -26,6 +33,33 @@ pub(crate) struct Opened {
     pub(crate) name: String,
     pub(crate) info: DeviceInfo,
     pub(crate) device: Box<dyn Device>,
+    /// How long opening took, the test of the device included.
+    pub(crate) open_time: Duration,
+    backend: &'static dyn Backend,
+    index: usize,
+    lost: bool,
+}
+
+impl Opened {
+    /// Remembers a failure after which the device refuses all further work.
+    pub(crate) fn note(&mut self, failure: &Failure) {
+        self.lost |= failure.is_device_lost();
+    }
+
+    /// Opens the device again if it was lost.
+    pub(crate) fn recover(&mut self) -> Result<(), Failure> {
+        if !self.lost {
+            return Ok(());
+        }
+        let failed = |reason| Failure::unavailable(format!("it was lost and cannot be opened again: {reason}"));
+        // Else its numbers could go on as another device's.
+        if self.backend.devices().get(self.index) != Some(&self.info) {
+            return Err(failed("it is not listed any more".to_owned()));
+        }
+        self.device = self.backend.open(self.index).map_err(|error| failed(reason(error)))?;
+        self.lost = false;
+        Ok(())
+    }
 }
 
 /// A backend and one of its devices, not opened yet.
@@ -44,10 +78,12 @@ impl Chosen {
     /// Those of [`Backend::open`].
     pub(crate) fn open(self) -> Result<Opened, Error> {
         let Self { name, backend, index, info } = self;
+        let start = Instant::now();
         let device = backend.open(index)?;
+        let open_time = start.elapsed();
         let unlisted =
             || Error::Unavailable { backend: backend.name(), device: index, reason: "not listed".to_owned() };
-        Ok(Opened { name, info: info.ok_or_else(unlisted)?, device })
+        Ok(Opened { name, info: info.ok_or_else(unlisted)?, device, open_time, backend, index, lost: false })
     }
 }
 
@@ -100,7 +136,10 @@ pub(crate) fn reason(error: Error) -> String {
 /// The indices of the devices that are meant by their index, their name or a part of it, or the beginning of their UUID.
 fn find(devices: &[DeviceInfo], wanted: &str) -> Vec<usize> {
     if let Ok(index) = wanted.parse() {
-        return Vec::from_iter((index < devices.len()).then_some(index));
+        // Names and UUIDs have digits too, but a short number means an index: 1 is no device that has "1 thread".
+        if index < devices.len() || wanted.len() <= 2 {
+            return Vec::from_iter((index < devices.len()).then_some(index));
+        }
     }
     let wanted = wanted.to_lowercase();
     let all = |is_it: &dyn Fn(&DeviceInfo) -> bool| -> Vec<usize> {
@@ -155,11 +194,14 @@ mod tests {
         let devices = [
             device("RTX 4090", Some("12ab34cd-0000-4000-8000-000000000000")),
             device("RTX 4090 D", Some("12ac0000-0000-4000-8000-000000000000")),
-            device("llvmpipe", None),
+            device("llvmpipe", Some("12340000-0000-4000-8000-000000000000")),
         ];
         for (wanted, found) in [
             ("1", vec![1]),
             ("3", vec![]),
+            ("40", vec![]),
+            ("4090", vec![0, 1]),
+            ("1234", vec![2]),
             ("LLVM", vec![2]),
             ("rtx 4090", vec![0]),
             ("4090 d", vec![1]),

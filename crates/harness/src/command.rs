@@ -7,6 +7,7 @@ pub(crate) mod evaluate;
 pub(crate) mod match_pair;
 mod plan;
 pub(crate) mod scenes;
+mod speed;
 
 use std::io::Write;
 
@@ -16,6 +17,7 @@ pub(crate) use doctor::doctor;
 pub(crate) use evaluate::evaluate;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
+pub(crate) use speed::speed;
 
 use crate::failure::Failure;
 

@@ -18,6 +18,7 @@ enum Kind {
     Input,
     Unavailable,
     Unsupported,
+    DeviceLost,
     OutOfMemory,
     Interrupted,
 }
@@ -80,7 +81,7 @@ impl Failure {
             Kind::Other => 1,
             Kind::Usage => 2,
             Kind::Input => 3,
-            Kind::Unavailable | Kind::Unsupported => 5,
+            Kind::Unavailable | Kind::Unsupported | Kind::DeviceLost => 5,
             Kind::OutOfMemory => 6,
             Kind::Interrupted => 130,
         }
@@ -89,6 +90,11 @@ impl Failure {
     /// Whether the device is there, but the plan is more than it can run.
     pub(crate) fn is_beyond_device(&self) -> bool {
         matches!(self.kind, Kind::Unsupported | Kind::OutOfMemory)
+    }
+
+    /// Whether the device went away: until it is opened again it refuses all further work.
+    pub(crate) fn is_device_lost(&self) -> bool {
+        self.kind == Kind::DeviceLost
     }
 
     /// Whether the user stopped the program.
@@ -103,9 +109,8 @@ impl From<bp_core::Error> for Failure {
             bp_core::Error::Stopped => Kind::Interrupted,
             bp_core::Error::OutOfMemory { .. } => Kind::OutOfMemory,
             bp_core::Error::Unsupported { .. } => Kind::Unsupported,
-            bp_core::Error::Unavailable { .. } | bp_core::Error::DeviceLost { .. } | bp_core::Error::Timeout { .. } => {
-                Kind::Unavailable
-            }
+            bp_core::Error::Unavailable { .. } => Kind::Unavailable,
+            bp_core::Error::DeviceLost { .. } | bp_core::Error::Timeout { .. } => Kind::DeviceLost,
             bp_core::Error::Plan(_)
             | bp_core::Error::Labels { .. }
             | bp_core::Error::Truncation { .. }

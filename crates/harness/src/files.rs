@@ -21,17 +21,25 @@ pub(crate) fn write_whole<E: std::fmt::Display>(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
 ) -> Result<(), Failure> {
-    let failed = |error: &dyn std::fmt::Display| Failure::writing(path, error);
     // What a link points to is replaced, not the link.
     let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    filled_beside(path, write)?.persist(path).map_err(|e| Failure::writing(path, &e.error))?;
+    Ok(())
+}
+
+/// A file in the folder of `path`, filled by `write` and safe on the disk, which vanishes unless it is kept.
+fn filled_beside<E: std::fmt::Display>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<tempfile::NamedTempFile, Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::writing(path, error);
     let mut file = temporary_beside(path)?;
     let mut buffered = BufWriter::new(file.as_file_mut());
     write(&mut buffered).map_err(|e| failed(&e))?;
     buffered.flush().map_err(|e| failed(&e))?;
     drop(buffered);
     file.as_file().sync_all().map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
-    Ok(())
+    Ok(file)
 }
 
 /// Fails where no file could be written at `path`; for telling so before the work is done.
@@ -70,6 +78,21 @@ pub(crate) fn check_distinct(other: &Path, output: &Path) -> Result<(), Failure>
 /// Writes text as [`write_whole`] does.
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_whole(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Writes text to a new file, whole or not at all; one that is there already stays as it is.
+pub(crate) fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
+    let file = filled_beside(path, |file| file.write_all(text.as_bytes()))?;
+    file.persist_noclobber(path).map_err(|error| Failure::writing(path, &error.error))?;
+    Ok(())
+}
+
+/// Fails where there is a file at `path`, which [`write_new`] would refuse in the end.
+pub(crate) fn check_new(path: &Path) -> Result<(), Failure> {
+    match path.symlink_metadata() {
+        Ok(_) => Err(Failure::writing(path, &"it is there, and no record is overwritten; name another folder")),
+        Err(_) => Ok(()),
+    }
 }
 
 /// Creates a folder and those above it.

@@ -21,7 +21,11 @@ pub(crate) fn listen() -> Result<(), Failure> {
             std::process::exit(Failure::interrupted().code().into());
         }
     };
-    ctrlc::set_handler(stop).map_err(|error| Failure::other(format!("cannot handle Ctrl-C: {error}")))
+    let reason = |error| match error {
+        ctrlc::Error::System(error) => error.to_string(),
+        other => other.to_string(),
+    };
+    ctrlc::set_handler(stop).map_err(|error| Failure::other(format!("cannot handle Ctrl-C: {}", reason(error))))
 }
 
 /// Fails where the user has asked to stop.

@@ -14,6 +14,7 @@ pub mod record;
 pub mod report;
 pub mod reproduce;
 mod scenes;
+mod speed;
 mod threads;
 
 use std::{io::Write, process::ExitCode};
@@ -44,9 +45,10 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Reproduce(args) => reproduce::reproduce(args),
         Command::Report(args) => report::command(args),
         Command::Scenes(args) => command::scenes(args),
-        Command::Devices(args) => command::devices(args),
-        Command::Doctor(args) => command::doctor(args),
-        Command::Conform(args) => command::conform(args),
+        Command::Devices(args) => threads::run_on(None, || command::devices(args)),
+        Command::Doctor(args) => threads::run_on(None, || command::doctor(args)),
+        Command::Conform(args) => threads::run_on(None, || command::conform(args)),
+        Command::Speed(args) => command::speed(args),
     }
 }
 

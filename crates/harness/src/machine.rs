@@ -28,8 +28,8 @@ pub(crate) fn machine(name: Option<&str>) -> Machine {
 }
 
 /// Refuses what would not fit into the memory that is allowed, or that this machine has available now, before anything
-/// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has memory
-/// of its own.
+/// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
+/// have, memory of its own.
 pub(crate) fn check_memory(
     kind: DeviceKind,
     needed: u64,
@@ -40,7 +40,8 @@ pub(crate) fn check_memory(
         let what = format!("{needed} bytes are needed and --max-memory allows {allowed}; {advice}");
         return Err(Failure::out_of_memory(what));
     }
-    let Some(Memory { available, .. }) = memory().filter(|_| kind != DeviceKind::DiscreteGpu) else { return Ok(()) };
+    let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
+    let Some(Memory { available, .. }) = memory().filter(|_| shares) else { return Ok(()) };
     if needed <= available {
         return Ok(());
     }

@@ -3,7 +3,7 @@
 mod chart;
 mod diagrams;
 mod figures;
-mod format;
+pub(crate) mod format;
 mod html;
 mod markdown;
 mod readme;
@@ -12,6 +12,8 @@ mod tables;
 mod thesis;
 
 use std::path::Path;
+
+pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
 
 use crate::{
     args::ReportArgs,

@@ -1,6 +1,5 @@
 //! `bp reproduce`: the thesis's experiments, run and recorded.
 
-mod devices;
 mod energies;
 mod plans;
 mod run;
@@ -13,6 +12,7 @@ use std::{ops::ControlFlow, path::Path};
 
 use crate::{
     args::ReproduceArgs,
+    backends,
     failure::Failure,
     interrupt, machine,
     record::{Cell, Labelling, Outcome, Record, Run},
@@ -46,7 +46,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
 /// Runs what is asked for and writes its report.
 fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     let source = Source::new(&args.data, args.quick)?;
-    let devices = devices::open(&args.backend)?;
+    let mut devices = backends::open_all(&args.backend)?;
     let opened: Vec<_> = devices.iter().filter_map(|asked| asked.device.as_ref().ok()).collect();
     threads::check(args.threads, &opened)?;
     let settings = Run {
@@ -62,26 +62,27 @@ fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     source.check()?;
     let machine = machine::machine(args.machine.as_deref());
     let mut storage = storage::open(&args.results, machine, settings)?;
-    let outcome = run::run(&source, &devices, &mut storage);
+    let outcome = run::run(&source, &mut devices, &mut storage);
     if outcome.as_ref().is_err_and(Failure::is_interrupted) {
         tell(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
     }
-    outcome?;
+    let late = outcome?;
     report::write(storage.folder(), storage.record())?;
     tell(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
-    check_cells(storage.record())
+    check_cells(storage.record(), late)
 }
 
-/// Fails where a cell failed, or where none could be run at all.
-fn check_cells(record: &Record) -> Result<(), Failure> {
+/// Fails where a cell failed, be it `late`, after samples that are kept, or where none could be run at all.
+fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
     let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
-    let mut failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
+    let failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
         Outcome::Error(error) => Some(format!("{}: {error}", such_as(cell))),
         _ => None,
     });
+    let mut failed = failed.chain(late);
     if let Some(first) = failed.next() {
         let count = 1 + failed.count();
-        return Err(Failure::other(format!("{count} cells could not be run, such as {first}")));
+        return Err(Failure::other(format!("{count} cells could not be run in full, such as {first}")));
     }
     let mut unavailable = record.cells.iter().filter_map(|cell| match &cell.outcome {
         Outcome::Unavailable(reason) => Some(format!("{}: {reason}", such_as(cell))),

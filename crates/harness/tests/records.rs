@@ -45,10 +45,16 @@ fn committed_records_fit_the_schema_and_are_whole() {
         let record: Record = serde_json::from_str(&text).unwrap();
         assert!(record.complete && record.program.clean_tree, "{}", run.display());
         for cell in &record.cells {
-            let Outcome::Measured(measured) = &cell.outcome else { panic!("{} {}", cell.scene, cell.plan) };
-            assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
-            let planned = cell.settings.planned_bytes;
-            assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
+            match &cell.outcome {
+                Outcome::Measured(measured) => {
+                    assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
+                    let planned = cell.settings.planned_bytes;
+                    assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
+                }
+                // A GPU may be too small for a plan, or not there.
+                Outcome::Unavailable(reason) => assert!(!reason.is_empty(), "{} {}", cell.scene, cell.plan),
+                Outcome::Pending | Outcome::Error(_) => panic!("{}: {} {}", run.display(), cell.scene, cell.plan),
+            }
         }
     }
 }
@@ -98,16 +104,21 @@ fn recorded_accuracy_is_that_of_the_prototypes() {
     ];
     let records = runs().into_iter().map(|run| serde_json::from_str::<Record>(&read(&run)).unwrap());
     let real: Vec<Record> = records.filter(|record| record.run.data == "middlebury2006").collect();
-    assert!(!real.is_empty());
+    let mut compared = 0;
     for (record, (plan, expected)) in real.iter().flat_map(|record| expected.map(|plan| (record, plan))) {
-        let cells = record.cells.iter().filter(|cell| cell.plan == plan);
-        let measured: Vec<_> = cells.filter_map(|cell| cell.measured()).collect();
-        let mean = |value: fn(&harness::record::Measurement) -> f64| {
-            measured.iter().map(|measured| value(measured)).sum::<f64>() / measured.len() as f64
-        };
-        let found = [mean(|m| m.visible.bad[1]), mean(|m| m.all.bad[1]), mean(|m| m.all.rmse)];
-        for (found, expected) in found.iter().zip(expected) {
-            assert!((found / expected - 1.0).abs() < 0.1, "{plan}: {found} where prototypes had {expected}");
+        for backend in &record.run.backends {
+            let cells = record.cells.iter().filter(|cell| cell.plan == plan && cell.backend == *backend);
+            // Means over some of the scenes are others.
+            let Some(measured) = cells.map(|cell| cell.measured()).collect::<Option<Vec<_>>>() else { continue };
+            let mean = |value: fn(&harness::record::Measurement) -> f64| {
+                measured.iter().map(|measured| value(measured)).sum::<f64>() / measured.len() as f64
+            };
+            let found = [mean(|m| m.visible.bad[1]), mean(|m| m.all.bad[1]), mean(|m| m.all.rmse)];
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 0.1, "{plan}: {found} where prototypes had {expected}");
+            }
+            compared += 1;
         }
     }
+    assert!(compared > 0);
 }

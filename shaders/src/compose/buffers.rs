@@ -8,6 +8,9 @@ use crate::{
     layout::Grid,
 };
 
+/// What sizes are rounded up to: the most that devices align buffers to, so that they lie side by side without gaps.
+const BUFFER_ALIGNMENT: u64 = 256;
+
 /// Indices of a strip's buffers, each for colour 0 and 1.
 pub(crate) struct StripBuffers {
     /// Stored data costs.
@@ -39,7 +42,7 @@ impl Buffers {
         let size = plan.image_size();
         let mut list = Vec::new();
         let mut add = |name, bytes: u64, memory| {
-            list.push(Buffer { name, bytes: bytes.next_multiple_of(16), memory });
+            list.push(Buffer { name, bytes: bytes.next_multiple_of(BUFFER_ALIGNMENT), memory });
             list.len() - 1
         };
         // In the order of Program::PARAMETERS, UPLOAD and DOWNLOAD; the size of the first is not known yet.

@@ -2,7 +2,7 @@
 
 use bp_core::{BAND_ROWS, Side};
 
-use super::{Composer, Nodes, Rows};
+use super::{Composer, Nodes, PartRecorder, Rows};
 use crate::Command;
 
 const EVEN: usize = 0;
@@ -10,39 +10,39 @@ const ODD: usize = 1;
 
 impl Composer<'_> {
     /// One loop on a grid: forward and backward through every band, see [`bp_core::Schedule::Sweep`].
-    pub(super) fn sweep(&mut self, commands: &mut Vec<Command>, grid: usize) {
+    pub(super) fn sweep(&mut self, part: &mut PartRecorder, grid: usize) {
         let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
         for row in 0..last {
-            self.send(commands, (grid, EVEN, row), &[Side::Left, Side::Right, Side::Down]);
-            self.send(commands, (grid, ODD, row), &[Side::Down]);
+            self.send(part, (grid, EVEN, row), &[Side::Left, Side::Right, Side::Down]);
+            self.send(part, (grid, ODD, row), &[Side::Down]);
         }
-        self.send(commands, (grid, EVEN, last), &horizontal);
+        self.send(part, (grid, EVEN, last), &horizontal);
         for row in (1..=last).rev() {
-            self.send(commands, (grid, ODD, row), &[Side::Left, Side::Right, Side::Up]);
-            self.send(commands, (grid, EVEN, row), &[Side::Up]);
+            self.send(part, (grid, ODD, row), &[Side::Left, Side::Right, Side::Up]);
+            self.send(part, (grid, EVEN, row), &[Side::Up]);
         }
-        self.send(commands, (grid, ODD, 0), &horizontal);
+        self.send(part, (grid, ODD, 0), &horizontal);
     }
 
     /// The nodes of one colour in one row of every band send to these sides.
-    fn send(&mut self, commands: &mut Vec<Command>, (grid, colour, row): (usize, usize, usize), sides: &[Side]) {
+    fn send(&mut self, part: &mut PartRecorder, (grid, colour, row): (usize, usize, usize), sides: &[Side]) {
         let pipeline = self.update_pipeline(true);
         for (nodes, rows) in self.band_rows(grid, colour, row) {
             let mut work = self.work(nodes, rows);
             work.parameters.sends = sides.iter().map(|&side| 1 << side as u32).sum();
             let bound = self.messages(nodes, 0, 0);
-            self.dispatch(commands, pipeline.clone(), bound, work);
+            self.dispatch(part, pipeline.clone(), bound, work);
         }
-        commands.push(Command::Barrier);
+        part.push_short(Command::Barrier);
     }
 
     /// Labels of every band from its top row to its bottom row, in a row first of even nodes.
-    pub(super) fn decode(&mut self, commands: &mut Vec<Command>) {
+    pub(super) fn decode(&mut self, part: &mut PartRecorder) {
         for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
             for (nodes, rows) in self.band_rows(0, colour, row) {
-                self.select(commands, nodes, self.work(nodes, rows));
+                self.select(part, nodes, self.work(nodes, rows));
             }
-            commands.push(Command::Barrier);
+            part.push_short(Command::Barrier);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{Cursor, Read},
+    io::{Cursor, ErrorKind, Read},
     path::Path,
 };
 
@@ -118,7 +118,10 @@ pub(super) fn read_limited(path: &Path, limit: PixelLimit) -> Result<Vec<u8>, Fa
     }
     let most = limit.pixels.saturating_mul(16).saturating_add(1 << 20);
     let mut bytes = Vec::new();
-    file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(|e| failed(&e))?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| match error.kind() {
+        ErrorKind::OutOfMemory => Failure::out_of_memory(format!("{}: {error}", path.display())),
+        _ => failed(&error),
+    })?;
     if bytes.len() as u64 > most {
         return Err(failed(&"the file is too long for the pixels it may hold; --max-megapixels raises that limit"));
     }
@@ -141,6 +144,10 @@ fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, 
     // The decoded image, and two copies as colours of 8 bits while it is converted.
     let needed = decoder.total_bytes().saturating_add(6 * u64::from(width) * u64::from(height));
     machine::check_memory(DeviceKind::Processor, needed, None, &format!("{} is too large", path.display()))?;
+    // A decoder that gets no memory, below `ulimit -v` say, ends the program.
+    if Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX)).is_err() {
+        return Err(Failure::out_of_memory(format!("{}: {needed} bytes are needed to read it", path.display())));
+    }
     DynamicImage::from_decoder(decoder).map_err(|error| match error {
         ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
         error => failed(&error),

@@ -2,16 +2,16 @@
 
 /// A sample of numbers: their median and range.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Spread {
-    pub(super) median: f64,
-    pub(super) low: f64,
-    pub(super) high: f64,
-    pub(super) count: usize,
+pub(crate) struct Spread {
+    pub(crate) median: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) count: usize,
 }
 
 impl Spread {
     /// The spread of some numbers; `None` of none.
-    pub(super) fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub(crate) fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
         let (&low, &high) = (sorted.first()?, sorted.last()?);
@@ -21,7 +21,7 @@ impl Spread {
     }
 
     /// The mean of some medians; `None` of none.
-    pub(super) fn mean(spreads: impl IntoIterator<Item = f64>) -> Option<f64> {
+    pub(crate) fn mean(spreads: impl IntoIterator<Item = f64>) -> Option<f64> {
         let (sum, count) = spreads.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
         (count > 0).then(|| sum / f64::from(count))
     }
@@ -40,7 +40,7 @@ impl std::fmt::Display for Spread {
 }
 
 /// A number with so many decimals and commas between thousands.
-pub(super) fn number(value: f64, decimals: usize) -> String {
+pub(crate) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
     let (whole, fraction) = text.split_once('.').map_or((text.as_str(), None), |(whole, rest)| (whole, Some(rest)));
     let digits: Vec<char> = whole.chars().collect();
@@ -51,18 +51,18 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// A whole number with commas between thousands.
-pub(super) fn whole(value: u64) -> String {
+pub(crate) fn whole(value: u64) -> String {
     let digits: Vec<char> = value.to_string().chars().collect();
     digits.rchunks(3).rev().map(String::from_iter).collect::<Vec<_>>().join(",")
 }
 
 /// Bytes in MiB.
-pub(super) fn mebibytes(bytes: u64) -> f64 {
+pub(crate) fn mebibytes(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
 /// A value, or the word for there being none.
-pub(super) fn or(value: Option<String>, none: &str) -> String {
+pub(crate) fn or(value: Option<String>, none: &str) -> String {
     value.unwrap_or_else(|| none.to_owned())
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Drawing, Report, results::UNAVAILABLE, tables::Table};
-use crate::record::Device;
+use crate::record::{Device, Machine, Program};
 
 /// The whole page.
 pub(super) fn page(report: &Report<'_>) -> String {
@@ -34,15 +34,8 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
     let (run, program, machine) = (&record.run, &record.program, &record.machine);
     let mut facts = vec![
         format!("Images: {}; L = {} labels, k = {} loops of BP.", report.results.data(), run.labels, run.k),
-        format!("Machine: {}, {} cores, {}.", machine.cpu, machine.cores, machine.system),
-        format!(
-            "Program: bp {}, commit {}{}, {}, {}.",
-            program.version,
-            program.commit,
-            if program.clean_tree { "" } else { " with changes" },
-            program.rustc,
-            program.flags
-        ),
+        machine_fact(machine),
+        program_fact(program),
         format!("Begun {}, last written {}.", record.started, record.updated),
         "Printed numbers are the thesis's (GeForce GTX 750 Ti, CUDA); all others were measured in this run. Totals are \
          of the wall clock, message passing of the device's own where it has one. Machines are noisy: compare ratios, \
@@ -63,7 +56,20 @@ pub(super) fn facts(report: &Report<'_>) -> Vec<String> {
     facts
 }
 
-fn device_fact(backend: &str, device: &Device) -> String {
+/// The machine in a sentence.
+pub(crate) fn machine_fact(machine: &Machine) -> String {
+    format!("Machine: {}, {} cores, {}.", machine.cpu, machine.cores, machine.system)
+}
+
+/// The program in a sentence.
+pub(crate) fn program_fact(program: &Program) -> String {
+    let changes = if program.clean_tree { "" } else { " with changes" };
+    let Program { version, commit, rustc, flags, .. } = program;
+    format!("Program: bp {version}, commit {commit}{changes}, {rustc}, {flags}.")
+}
+
+/// A device in a sentence.
+pub(crate) fn device_fact(backend: &str, device: &Device) -> String {
     let through =
         [&device.api, &device.driver].into_iter().flatten().map(|name| format!(", {name}")).collect::<String>();
     let software = "; a software rasteriser, a CPU that pretends to be a GPU: its times are not a GPU's";
@@ -99,12 +105,17 @@ fn section(report: &Report<'_>, table: &Table) -> String {
 
 /// The lines of a table.
 pub(super) fn grid(table: &Table) -> String {
+    lines(&table.columns, &table.rows)
+}
+
+/// The lines of a table of these columns and rows.
+pub(crate) fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| {
         let cells: Vec<_> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
         format!("| {} |\n", cells.join(" | "))
     };
-    let rule = format!("|{}\n", "---|".repeat(table.columns.len()));
-    line(&table.columns) + &rule + &table.rows.iter().map(|row| line(row)).collect::<String>()
+    let rule = format!("|{}\n", "---|".repeat(columns.len()));
+    line(columns) + &rule + &rows.iter().map(|row| line(row)).collect::<String>()
 }
 
 fn drawing(drawing: &Drawing) -> String {

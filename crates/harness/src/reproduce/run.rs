@@ -6,13 +6,12 @@ use bp_core::{Energy, Matcher, Times};
 use sha2::{Digest, Sha256};
 
 use super::{
-    devices::Asked,
     energies,
     plans::{self, Planned},
     storage::{MAPS_FOLDER, Storage},
 };
 use crate::{
-    backends::Opened,
+    backends::{Asked, Opened},
     failure::Failure,
     files::{hex, write_map},
     interrupt::ProgressBar,
@@ -28,9 +27,11 @@ pub const ONE_SAMPLE_ABOVE_MS: f64 = 5000.0;
 /// Nanoseconds a message entry, to guess before the first sample which cells will get others.
 const GUESSED_NS: f64 = 2.5;
 
-/// Runs all cells that the record does not hold yet, on these devices.
-pub(crate) fn run(source: &Source, devices: &[Asked], storage: &mut Storage) -> Result<(), Failure> {
+/// Runs all cells that the record does not hold yet, on these devices. What failed after other samples of its cell, which
+/// are kept, is returned: no outcome tells it.
+pub(crate) fn run(source: &Source, devices: &mut [Asked], storage: &mut Storage) -> Result<Vec<String>, Failure> {
     let bar = ProgressBar::new(1);
+    let mut failed = Vec::new();
     for index in 0..crate::scenes::THESIS_SCENES.len() {
         bar.message(format!("scene {} of 6", index + 1));
         let scene = source.load(index)?;
@@ -39,8 +40,8 @@ pub(crate) fn run(source: &Source, devices: &[Asked], storage: &mut Storage) -> 
         bar.resume_at(done(storage.record()));
         for round in 0..storage.record().run.samples {
             for planned in plans::all() {
-                for device in devices.iter().filter_map(|asked| asked.device.as_ref().ok()) {
-                    sample_cell(&scene, &planned, device, round, storage, &bar)?;
+                for device in devices.iter_mut().filter_map(|asked| asked.device.as_mut().ok()) {
+                    failed.extend(sample_cell(&scene, &planned, device, round, storage, &bar)?);
                 }
             }
         }
@@ -53,7 +54,8 @@ pub(crate) fn run(source: &Source, devices: &[Asked], storage: &mut Storage) -> 
     }
     bar.finish();
     storage.record_mut().complete = true;
-    storage.save()
+    storage.save()?;
+    Ok(failed)
 }
 
 /// Adds a scene and its cells to the record, or checks that the record's scene is this one and goes on with its cells.
@@ -100,21 +102,22 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
     Ok(cells)
 }
 
-/// Takes the sample of one round, where the cell still wants it.
+/// Takes the sample of one round, where the cell still wants it. Samples that a cell has are not lost when this one
+/// fails: the failure is returned, and the cell gets no more.
 fn sample_cell(
     scene: &Scene,
     planned: &Planned,
-    device: &Opened,
+    device: &mut Opened,
     round: u32,
     storage: &mut Storage,
     bar: &ProgressBar,
-) -> Result<(), Failure> {
+) -> Result<Option<String>, Failure> {
     let (name, plan) = (&scene.record.name, planned.name);
     let is_it = |cell: &Cell| cell.scene == *name && cell.plan == plan && cell.backend == device.name;
     let record = storage.record();
-    let Some(index) = record.cells.iter().position(is_it) else { return Ok(()) };
+    let Some(index) = record.cells.iter().position(is_it) else { return Ok(None) };
     if !wants_sample(&record.cells[index], round) {
-        return Ok(());
+        return Ok(None);
     }
     bar.message(format!("{name} {plan} {}", device.name));
     let before = done(record);
@@ -126,13 +129,18 @@ fn sample_cell(
         }
         Err(failure) if failure.is_interrupted() => return Err(failure),
         Err(failure) => {
+            device.note(&failure);
             bar.line(&format!("{name:<11}{plan:<10}{:<8} {failure}", device.name));
+            if record.cells[index].measured().is_some() {
+                return Ok(Some(format!("{name}, {plan} on {}: round {}: {failure}", device.name, round + 1)));
+            }
             let beyond = failure.is_beyond_device();
             if beyond { Outcome::Unavailable(failure.to_string()) } else { Outcome::Error(failure.to_string()) }
         }
     };
     storage.record_mut().cells[index].outcome = outcome;
-    storage.save()
+    storage.save()?;
+    Ok(None)
 }
 
 fn wants_sample(cell: &Cell, round: u32) -> bool {
@@ -157,10 +165,11 @@ struct Solved {
 fn solve(
     scene: &Scene,
     planned: &Planned,
-    device: &Opened,
+    device: &mut Opened,
     run: &record::Run,
     update: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Solved, Failure> {
+    device.recover()?;
     let plan = planned.plan(scene.pair.size(), run)?;
     machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), None, "--quick needs less")?;
     let start = Instant::now();
@@ -242,4 +251,59 @@ fn work(record: &Record, index: usize) -> u64 {
     };
     let known: u64 = record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum();
     known * 6 / (index as u64 + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::{super::storage, *};
+    use crate::{
+        args::DataArgs,
+        backends::flaky::{self, Flaky},
+    };
+
+    #[test]
+    fn a_lost_device_is_opened_again_and_no_sample_is_lost_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let source = Source::new(&DataArgs { data: None, synthetic: true }, true).unwrap();
+        let run = record::Run {
+            data: source.set.name.to_owned(),
+            quick: true,
+            labels: source.set.labels,
+            k: 1,
+            samples: 2,
+            backends: vec!["flaky".to_owned()],
+            threads: None,
+        };
+        let backend: &'static Flaky = Box::leak(Box::default());
+        let mut devices = [Asked { name: "flaky".to_owned(), device: Ok(flaky::open(backend).unwrap()) }];
+        let mut storage = storage::open(folder.path(), machine::machine(Some("test")), run).unwrap();
+        let scene = source.load(0).unwrap();
+        add_scene(&mut storage, &scene, &devices).unwrap();
+        let device = devices[0].device.as_mut().unwrap();
+        let plans = plans::all();
+        let mut sample = |plan: usize, round| {
+            let failed = sample_cell(&scene, &plans[plan], device, round, &mut storage, &ProgressBar::new(1)).unwrap();
+            let outcome = storage.record().cells[plan].outcome.clone();
+            (failed, outcome, backend.opened.load(Ordering::Relaxed))
+        };
+        let samples = |outcome: &Outcome| match outcome {
+            Outcome::Measured(measurement) => measurement.samples.len(),
+            _ => 0,
+        };
+        let (failed, outcome, opened) = sample(0, 0);
+        assert_eq!((failed, samples(&outcome), opened), (None, 1, 1));
+        let (failed, outcome, opened) = sample(0, 1);
+        let told = failed.unwrap();
+        assert!(told.contains("round 2: flaky did not answer within 60 s"), "{told}");
+        assert_eq!((samples(&outcome), opened), (1, 1));
+        let (failed, outcome, opened) = sample(1, 0);
+        assert_eq!((failed, samples(&outcome), opened), (None, 1, 2));
+        let (failed, outcome, opened) = sample(2, 0);
+        assert!(matches!(outcome, Outcome::Error(_)), "{outcome:?}");
+        assert_eq!((failed, opened), (None, 2));
+        let (failed, outcome, opened) = sample(3, 0);
+        assert_eq!((failed, samples(&outcome), opened), (None, 1, 3));
+    }
 }

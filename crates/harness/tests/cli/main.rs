@@ -4,6 +4,7 @@
 mod devices;
 mod folder;
 mod running;
+mod speed;
 
 use std::{fs, path::Path, process::Command};
 

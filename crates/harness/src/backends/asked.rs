@@ -1,10 +1,7 @@
 //! The devices that a run asks for.
 
-use crate::{
-    backends::{self, Opened},
-    failure::Failure,
-    tell,
-};
+use super::{Opened, choose, reason};
+use crate::{failure::Failure, tell};
 
 /// A backend that a run asks for.
 pub(crate) struct Asked {
@@ -15,15 +12,15 @@ pub(crate) struct Asked {
 }
 
 /// Opens the devices that a run asks for, each once. One that cannot be opened is no failure as long as another can.
-pub(super) fn open(names: &[String]) -> Result<Vec<Asked>, Failure> {
+pub(crate) fn open_all(names: &[String]) -> Result<Vec<Asked>, Failure> {
     let mut all: Vec<Asked> = Vec::new();
     for name in names {
-        let chosen = backends::choose(name, None)?;
+        let chosen = choose(name, None)?;
         let name = chosen.name.clone();
         if all.iter().any(|other| other.name == name) {
             return Err(Failure::usage(format!("--backend names {name} twice")));
         }
-        all.push(Asked { name, device: chosen.open().map_err(backends::reason) });
+        all.push(Asked { name, device: chosen.open().map_err(reason) });
     }
     all.iter().filter_map(warning).for_each(|line| tell(&line));
     if all.iter().all(|asked| asked.device.is_err()) {

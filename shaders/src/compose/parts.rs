@@ -1,26 +1,24 @@
-//! The commands of every stage.
+//! The commands of every part.
 
-use bp_core::{MessageStart, Schedule, Side, Stage};
+use bp_core::{MessageStart, Schedule, Side};
 
-use super::{Composer, Nodes, Rows, Work};
+use super::{Composer, Nodes, PartRecorder, Rows, Work};
 use crate::{
-    Command, Kernel, Parameters, Pipeline, Program, Segment,
+    Command, Kernel, Parameters, Pipeline, Program,
     answer::{SEED_BYTES, image_bytes, label_bytes},
     layout::Strip,
 };
 
 impl Composer<'_> {
-    pub(super) fn match_cost(&mut self) -> Segment {
+    pub(super) fn match_cost(&mut self, part: &mut PartRecorder) {
         let (buffers, size) = (self.buffers, self.plan.image_size());
         let image = image_bytes(size);
         let upload =
             |to, from_offset, bytes| Command::Copy { from: Program::UPLOAD, from_offset, to, to_offset: 0, bytes };
-        let mut commands = vec![
-            upload(buffers.images[0], 0, image),
-            upload(buffers.images[1], image, image),
-            upload(buffers.seed, 2 * image, SEED_BYTES),
-            Command::Barrier,
-        ];
+        part.push_short(upload(buffers.images[0], 0, image));
+        part.push_short(upload(buffers.images[1], image, image));
+        part.push_short(upload(buffers.seed, 2 * image, SEED_BYTES));
+        part.push_short(Command::Barrier);
         let profile = ("PROFILE", self.plan.model().profile() as u32);
         for side in 0..2 {
             let parameters =
@@ -28,17 +26,16 @@ impl Composer<'_> {
             let rows = Rows { first: 0, step: 1, count: size.height };
             let work = Work { parameters, rows, row_invocations: size.width };
             let pipeline = Pipeline { kernel: Kernel::Features, constants: vec![profile] };
-            self.dispatch(&mut commands, pipeline, vec![buffers.images[side], buffers.features[side]], work);
+            self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
         }
-        commands.push(Command::Barrier);
+        part.push_short(Command::Barrier);
         for nodes in self.nodes(0) {
             let constants = vec![profile, ("SUM_BYTES", self.grids[0].sum_bytes as u32)];
             let pipeline = Pipeline { kernel: Kernel::MatchCost, constants };
             let [left, right] = buffers.features;
             let bound = [self.costs_written(nodes).as_slice(), &[left, right, buffers.seed]].concat();
-            self.dispatch(&mut commands, pipeline, bound, self.all_rows(nodes));
+            self.dispatch(part, pipeline, bound, self.all_rows(nodes));
         }
-        self.segment(Stage::MatchCost, commands)
     }
 
     /// The buffers that data costs of these nodes are stored to.
@@ -49,11 +46,10 @@ impl Composer<'_> {
     }
 
     /// Every strip of the finer grid gives its rows of the coarser one.
-    pub(super) fn coarsen(&mut self, grid: usize) -> Segment {
+    pub(super) fn coarsen(&mut self, part: &mut PartRecorder, grid: usize) {
         let (fine, coarse) = (&self.grids[grid - 1], &self.grids[grid]);
         let constants = vec![("SUM_BYTES", coarse.sum_bytes as u32), ("FINE_SUM_BYTES", fine.sum_bytes as u32)];
         let pipeline = Pipeline { kernel: Kernel::Coarsen, constants };
-        let mut commands = Vec::new();
         for (read, &from) in fine.strips.iter().enumerate() {
             let strip = coarse.strip_of(from.first / 2);
             let first = from.first / 2 - coarse.strips[strip].first;
@@ -63,10 +59,9 @@ impl Composer<'_> {
                 let children = &self.buffers.strips[grid - 1][read];
                 let sums = children.sums.unwrap_or([self.buffers.unused; 2]);
                 let bound = [self.costs_written(nodes), children.cost, sums].concat();
-                self.dispatch(&mut commands, pipeline.clone(), bound, work);
+                self.dispatch(part, pipeline.clone(), bound, work);
             }
         }
-        self.segment(Stage::Coarsen, commands)
     }
 
     /// The same work, reading a strip of another grid.
@@ -74,7 +69,6 @@ impl Composer<'_> {
         let other = &self.grids[grid];
         let parameters = Parameters {
             other_width: other.size.width as u32,
-            other_height: other.size.height as u32,
             other_words: other.words as u32,
             other_first_row: strip.first as u32,
             ..work.parameters
@@ -82,18 +76,16 @@ impl Composer<'_> {
         Work { parameters, ..work }
     }
 
-    pub(super) fn refine(&mut self, grid: usize) -> Segment {
-        let mut commands = Vec::new();
+    pub(super) fn refine(&mut self, part: &mut PartRecorder, grid: usize) {
         for (nodes, side) in self.nodes(grid).flat_map(|nodes| Side::ALL.map(|side| (nodes, side))) {
             let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
             if grid + 1 == self.plan.grids() || !self.starts(nodes, side) {
-                commands.push(Command::Clear { buffer: sent });
+                part.push_short(Command::Clear { buffer: sent });
             } else {
-                self.refine_side(&mut commands, nodes, side, sent);
+                self.refine_side(part, nodes, side, sent);
             }
         }
-        self.join_strips(&mut commands, grid, 0, &[0, 1]);
-        self.segment(Stage::Refine, commands)
+        self.join_strips(part, grid, 0, &[0, 1]);
     }
 
     /// Whether these nodes take over what was sent to that side, see [`Schedule::Sweep`].
@@ -106,7 +98,7 @@ impl Composer<'_> {
             }
     }
 
-    fn refine_side(&mut self, commands: &mut Vec<Command>, nodes: Nodes, side: Side, sent: usize) {
+    fn refine_side(&mut self, part: &mut PartRecorder, nodes: Nodes, side: Side, sent: usize) {
         let settings = self.plan.settings();
         let start = match settings.message_start {
             _ if settings.schedule == Schedule::Sweep => 2,
@@ -120,33 +112,31 @@ impl Composer<'_> {
         work.parameters.side = side as u32;
         work.row_invocations = work.row_invocations.div_ceil(2);
         let pipeline = Pipeline { kernel: Kernel::Refine, constants: vec![("START", start)] };
-        self.dispatch(commands, pipeline, vec![sent, planes[0], planes[1]], work);
+        self.dispatch(part, pipeline, vec![sent, planes[0], planes[1]], work);
     }
 
     /// One step that depends on the step before only, or one loop of [`Schedule::Sweep`].
-    pub(super) fn step(&mut self, grid: usize, step: u32) -> Segment {
-        let mut commands = Vec::new();
+    pub(super) fn step(&mut self, part: &mut PartRecorder, grid: usize, step: u32) {
         let (read, written) = (self.set(step), self.set(step + 1));
         match self.plan.settings().schedule {
             Schedule::Sync => {
-                self.nodes(grid).for_each(|nodes| self.update(&mut commands, nodes, read, written));
-                self.join_strips(&mut commands, grid, written, &[0, 1]);
+                self.nodes(grid).for_each(|nodes| self.update(part, nodes, read, written));
+                self.join_strips(part, grid, written, &[0, 1]);
             }
             Schedule::Checkerboard => {
                 let colour = step as usize % 2;
                 let nodes = self.nodes(grid).filter(|nodes| nodes.colour == colour);
-                nodes.for_each(|nodes| self.update(&mut commands, nodes, read, written));
-                self.join_strips(&mut commands, grid, written, &[colour]);
+                nodes.for_each(|nodes| self.update(part, nodes, read, written));
+                self.join_strips(part, grid, written, &[colour]);
             }
-            Schedule::Sweep => self.sweep(&mut commands, grid),
+            Schedule::Sweep => self.sweep(part, grid),
         }
-        self.segment(Stage::UpdateMessages, commands)
     }
 
-    fn update(&mut self, commands: &mut Vec<Command>, nodes: Nodes, read: usize, written: usize) {
+    fn update(&mut self, part: &mut PartRecorder, nodes: Nodes, read: usize, written: usize) {
         let pipeline = self.update_pipeline(false);
         let bound = self.messages(nodes, read, written);
-        self.dispatch(commands, pipeline, bound, self.all_rows(nodes));
+        self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }
 
     pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
@@ -170,19 +160,19 @@ impl Composer<'_> {
     }
 
     /// Copies what was sent across the border of two strips to where the other strip looks for it.
-    fn join_strips(&self, commands: &mut Vec<Command>, grid: usize, set: usize, colours: &[usize]) {
+    fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, colours: &[usize]) {
         let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
         let bytes = layout.row_bytes();
         for upper in 0..strips.len() - 1 {
             if upper == 0 {
-                commands.push(Command::Barrier);
+                part.push_short(Command::Barrier);
             }
             let rows = layout.strips[upper].rows as u64;
             for &colour in colours {
                 let buffer = |strip: usize, side: Side| strips[strip].sent[set][side as usize][colour];
                 let mut copy = |side, (from, from_row), (to, to_row)| {
                     let (from, to) = (buffer(from, side), buffer(to, side));
-                    commands.push(Command::Copy {
+                    part.push_short(Command::Copy {
                         from,
                         from_offset: from_row * bytes,
                         to,
@@ -197,22 +187,20 @@ impl Composer<'_> {
         }
     }
 
-    pub(super) fn select_labels(&mut self) -> Segment {
-        let mut commands = Vec::new();
+    pub(super) fn select_labels(&mut self, part: &mut PartRecorder) {
         if self.plan.settings().schedule == Schedule::Sweep {
-            self.decode(&mut commands);
+            self.decode(part);
         } else {
             for nodes in self.nodes(0) {
-                self.select(&mut commands, nodes, self.all_rows(nodes));
+                self.select(part, nodes, self.all_rows(nodes));
             }
         }
         let (from, bytes) = (self.buffers.labels, label_bytes(self.plan.image_size()));
-        commands.push(Command::Barrier);
-        commands.push(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
-        self.segment(Stage::SelectLabels, commands)
+        part.push_short(Command::Barrier);
+        part.push_short(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
     }
 
-    pub(super) fn select(&mut self, commands: &mut Vec<Command>, nodes: Nodes, work: Work) {
+    pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
         let sweep = self.plan.settings().schedule == Schedule::Sweep;
         let constants = vec![
             ("SATURATING", self.saturates(4, 0)),
@@ -223,7 +211,7 @@ impl Composer<'_> {
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);
         let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
-        let bound = [&[self.buffers.labels, strip.cost[nodes.colour]], received.as_slice()].concat();
-        self.dispatch(commands, pipeline, bound, work);
+        let bound = [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels]].concat();
+        self.dispatch(part, pipeline, bound, work);
     }
 }

@@ -1,0 +1,126 @@
+//! What wgpu does not tell of a device, asked of Vulkan behind it: both see the same instance and driver.
+#![expect(unsafe_code, reason = "Vulkan is a C interface")]
+
+use std::ops::Deref;
+
+use ash::{Entry, ext, vk};
+use wgpu::{
+    Adapter,
+    hal::{self, api::Vulkan},
+};
+
+/// Whether there is a Vulkan loader.
+pub(crate) fn has_loader() -> bool {
+    // SAFETY: a Vulkan loader may be loaded at any time; nothing else is loaded under its name.
+    unsafe { Entry::load() }.is_ok()
+}
+
+/// The version of Vulkan that a device has, and whom it is asked through.
+pub(crate) fn api(adapter: &Adapter) -> Option<String> {
+    let version = properties(adapter)?.api_version;
+    let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
+    Some(format!("Vulkan {major}.{minor}.{} through wgpu", vk::api_version_patch(version)))
+}
+
+/// The device's identifier.
+pub(crate) fn uuid(adapter: &Adapter) -> Option<String> {
+    let hal = raw(adapter).filter(|hal| answers_more(hal))?;
+    let mut id = vk::PhysicalDeviceIDProperties::default();
+    let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut id);
+    let instance = hal.shared_instance().raw_instance();
+    // SAFETY: the device is one of this instance's, and both have Vulkan 1.1, of which the structure is.
+    unsafe { instance.get_physical_device_properties2(hal.raw_physical_device(), &mut both) };
+    Some(uuid_text(id.device_uuid))
+}
+
+/// Names the driver and the device for which stored pipelines are good.
+pub(crate) fn cache_key(adapter: &Adapter) -> Option<String> {
+    let vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, pipeline_cache_uuid, .. } =
+        properties(adapter)?;
+    let uuid = pipeline_cache_uuid.map(|byte| format!("{byte:02x}")).concat();
+    Some(format!("wgpu-{vendor_id:x}-{device_id:x}-{driver_version:x}-{uuid}"))
+}
+
+/// Bytes of the heap that buffers on the device are taken from.
+pub(crate) fn memory_bytes(adapter: &Adapter) -> Option<u64> {
+    let memory = memory(&*raw(adapter)?);
+    Some(memory.memory_heaps[device_heap(&memory)?].size)
+}
+
+/// Bytes of that heap that are still free for this process, where the driver tells.
+pub(crate) fn free_bytes(adapter: &Adapter) -> Option<u64> {
+    let hal = raw(adapter).filter(|hal| answers_more(hal))?;
+    if !hal.physical_device_capabilities().supports_extension(ext::memory_budget::NAME) {
+        return None;
+    }
+    let heap = device_heap(&memory(&hal))?;
+    let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+    let mut both = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
+    let instance = hal.shared_instance().raw_instance();
+    // SAFETY: the device is one of this instance's, both have Vulkan 1.1, and the device has the structure's extension.
+    unsafe { instance.get_physical_device_memory_properties2(hal.raw_physical_device(), &mut both) };
+    Some(budget.heap_budget[heap].saturating_sub(budget.heap_usage[heap]))
+}
+
+/// The Vulkan side of an adapter.
+fn raw(adapter: &Adapter) -> Option<impl Deref<Target = hal::vulkan::Adapter>> {
+    // SAFETY: this module only asks the adapter for what it is, and destroys nothing.
+    unsafe { adapter.as_hal::<Vulkan>() }
+}
+
+fn properties(adapter: &Adapter) -> Option<vk::PhysicalDeviceProperties> {
+    Some(raw(adapter)?.physical_device_capabilities().properties())
+}
+
+/// Whether Vulkan is 1.1 or later on both sides: before that there are no extensible questions.
+fn answers_more(hal: &hal::vulkan::Adapter) -> bool {
+    let device = hal.physical_device_capabilities().properties().api_version;
+    hal.shared_instance().instance_api_version().min(device) >= vk::API_VERSION_1_1
+}
+
+fn memory(hal: &hal::vulkan::Adapter) -> vk::PhysicalDeviceMemoryProperties {
+    let instance = hal.shared_instance().raw_instance();
+    // SAFETY: the device is one of this instance's.
+    unsafe { instance.get_physical_device_memory_properties(hal.raw_physical_device()) }
+}
+
+/// The heap that wgpu takes buffers on the device from: that of the first type of memory which is the device's own.
+fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<usize> {
+    let types = memory.memory_types_as_slice();
+    let local = types.iter().find(|kind| kind.property_flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL));
+    local.or(types.first()).map(|kind| kind.heap_index as usize)
+}
+
+fn uuid_text(uuid: [u8; vk::UUID_SIZE]) -> String {
+    let digits = uuid.map(|byte| format!("{byte:02x}"));
+    let groups = [0..4, 4..6, 6..8, 8..10, 10..16].map(|group| digits[group].concat());
+    groups.join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifiers_are_written_as_usual() {
+        let uuid = std::array::from_fn(|i| 0xf0 - 16 + i as u8);
+        assert_eq!(uuid_text(uuid), "e0e1e2e3-e4e5-e6e7-e8e9-eaebecedeeef");
+    }
+
+    #[test]
+    fn the_heap_is_the_one_of_the_first_local_memory() {
+        let (host, local) = (vk::MemoryPropertyFlags::HOST_VISIBLE, vk::MemoryPropertyFlags::DEVICE_LOCAL);
+        let heap = |types: &[(vk::MemoryPropertyFlags, u32)]| {
+            let memory_type_count = types.len() as u32;
+            let mut memory = vk::PhysicalDeviceMemoryProperties { memory_type_count, ..Default::default() };
+            for (to, &(property_flags, heap_index)) in memory.memory_types.iter_mut().zip(types) {
+                *to = vk::MemoryType { property_flags, heap_index };
+            }
+            device_heap(&memory)
+        };
+        // The last is the small window to a GPU's memory that the host sees.
+        assert_eq!(heap(&[(host, 1), (local, 0), (local | host, 2)]), Some(0));
+        assert_eq!(heap(&[(host, 1)]), Some(1));
+        assert_eq!(heap(&[]), None);
+    }
+}

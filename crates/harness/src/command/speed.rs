@@ -1,0 +1,84 @@
+//! `bp speed`: devices against each other.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    args::SpeedArgs,
+    backends,
+    failure::Failure,
+    files::{check_new, check_writable, create_folder, write_new},
+    interrupt,
+    speed::{self, Outcome, Speed},
+    tell, threads,
+};
+
+/// Runs the command.
+pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
+    let files = args.output.as_deref().map(Files::new).transpose()?;
+    interrupt::listen()?;
+    let speed = threads::run_on(args.threads, || {
+        let mut asked = backends::open_all(&args.backend)?;
+        let opened: Vec<_> = asked.iter().filter_map(|asked| asked.device.as_ref().ok()).collect();
+        threads::check(args.threads, &opened)?;
+        files.as_ref().map_or(Ok(()), Files::check)?;
+        speed::measure(args, &mut asked)
+    })?;
+    let page = speed::page(&speed);
+    if let Some(files) = &files {
+        files.write(&speed, &page)?;
+    }
+    write!(std::io::stdout(), "{page}")?;
+    check(&speed)
+}
+
+/// What is written, both new.
+struct Files {
+    folder: PathBuf,
+    page: PathBuf,
+    record: PathBuf,
+}
+
+impl Files {
+    /// The files of a folder, which holds neither yet.
+    fn new(folder: &Path) -> Result<Self, Failure> {
+        let files =
+            Self { folder: folder.to_owned(), page: folder.join("speed.md"), record: folder.join("speed.json") };
+        check_new(&files.page)?;
+        check_new(&files.record)?;
+        Ok(files)
+    }
+
+    /// Makes the folder, and fails where nothing could be written to it; for telling so before the work is done.
+    fn check(&self) -> Result<(), Failure> {
+        create_folder(&self.folder)?;
+        check_writable(&self.record)
+    }
+
+    fn write(&self, speed: &Speed, page: &str) -> Result<(), Failure> {
+        let json = serde_json::to_string_pretty(speed).map_err(|error| Failure::writing(&self.record, &error))?;
+        write_new(&self.record, &(json + "\n"))?;
+        write_new(&self.page, page)?;
+        tell(&format!("written: {} and {}", self.page.display(), self.record.display()));
+        Ok(())
+    }
+}
+
+/// Fails where a device failed, or where none could run anything.
+fn check(speed: &Speed) -> Result<(), Failure> {
+    let entries =
+        || speed.contests.iter().flat_map(|contest| contest.entries.iter().map(move |entry| (contest, entry)));
+    let mut failed = entries().filter_map(|(contest, entry)| match &entry.outcome {
+        Outcome::Error(error) => Some(format!("{} on {}: {error}", contest.problem, entry.contestant)),
+        Outcome::Measured(_) | Outcome::Unavailable(_) => None,
+    });
+    if let Some(first) = failed.next() {
+        return Err(Failure::other(format!("{} solves failed, such as {first}", 1 + failed.count())));
+    }
+    if entries().all(|(_, entry)| entry.outcome.measured().is_none()) {
+        return Err(Failure::unavailable("no device could run any of the problems"));
+    }
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! Devices against each other.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::folder::{Folder, text};
+
+/// The quickest of all runs.
+const QUICK: &str = "speed --quick --problem sweep --backend scalar,rayon --threads 2";
+
+#[test]
+fn a_run_writes_a_page_and_every_sample_once() {
+    let folder = Folder::new();
+    let output = folder.run(&format!("{QUICK} --rounds 3 --output new/folder"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let page = fs::read_to_string(folder.path("new/folder/speed.md")).unwrap();
+    assert_eq!(page, text(&output.stdout));
+    let words = ["a quick run", "`sweep`: 207x185", "| sweep | scalar | 3 |", "as long as scalar", "coarsen"];
+    assert!(words.iter().all(|word| page.contains(word)), "{page}");
+    let record: Value = serde_json::from_slice(&fs::read(folder.path("new/folder/speed.json")).unwrap()).unwrap();
+    assert_eq!((&record["schema_version"], &record["threads"]), (&Value::from(1), &Value::from(2)));
+    let contests = record["contests"].as_array().unwrap();
+    assert!(contests.len() == 1 && contests[0]["labels_sha256"].is_string(), "{record}");
+    for (entry, name) in contests[0]["entries"].as_array().unwrap().iter().zip(["scalar", "rayon"]) {
+        let measured = &entry["outcome"]["measured"];
+        assert_eq!((&entry["contestant"], measured["samples"].as_array().unwrap().len()), (&Value::from(name), 3));
+        assert!(measured["samples"][0]["clocks"][0]["stages"]["update_messages_ms"].as_f64().unwrap() > 0.0);
+    }
+    folder.fails(&format!("{QUICK} --output new/folder"), 1, &["speed.md", "overwritten"]);
+    assert_eq!(fs::read_to_string(folder.path("new/folder/speed.md")).unwrap(), page);
+}
+
+#[test]
+fn what_cannot_be_run_is_told() {
+    let folder = Folder::new();
+    folder.fails("speed --problem chess", 2, &["chess", "update", "published"]);
+    folder.fails("speed --quick --backend rayon,rayon:0", 2, &["rayon twice"]);
+    folder.fails("speed --quick --backend magic", 5, &["magic", "scalar"]);
+}
+
+/// No driver is found, whatever this machine has.
+#[cfg(feature = "vulkan")]
+#[test]
+fn a_device_that_is_not_there_does_not_keep_others_from_running() {
+    let folder = Folder::new();
+    let without = |arguments: &str| {
+        let mut command = folder.command(arguments);
+        command.env("VK_DRIVER_FILES", "/nonexistent").env_remove("VK_ICD_FILENAMES");
+        command
+    };
+    let output = without("speed --quick --problem sweep --backend vulkan,rayon").output().unwrap();
+    let page = text(&output.stdout);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(page.contains("Backend vulkan: unavailable: ") && page.contains("| sweep | rayon | 1 |"), "{page}");
+    let words = ["vulkan: unavailable", "none is available"];
+    folder.command_fails(&mut without("speed --quick --backend vulkan --output out"), 5, &words);
+}

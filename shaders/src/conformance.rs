@@ -1,0 +1,122 @@
+//! What the tests of both GPU backends share: the suite of [`bp_core::conformance`] on devices whose limits were lowered, so
+//! that small plans are cut up like large ones, and what else a device has to keep to.
+//!
+//! `open` opens the backend's first device with changed limits; it gives `None` where there is none, see [`opened`].
+
+use std::{env, thread, time::Duration};
+
+use bp_core::{
+    Algorithm, Device, Error, Matcher, Model, Plan, Profile, Schedule,
+    conformance::{Case, assert_conforms, assert_same, assert_same_at_random, noise_pair},
+};
+
+use crate::Limits;
+
+/// The device, or `None` with a line that says why; with `BP_REQUIRE_GPU` in the environment there has to be one.
+///
+/// # Panics
+/// Where there has to be one and is none.
+#[must_use]
+pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>> {
+    match device {
+        Ok(device) => Some(device),
+        Err(error) if env::var_os("BP_REQUIRE_GPU").is_none() => {
+            eprintln!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// The whole suite, and random cases.
+///
+/// # Panics
+/// Where the device differs from the reference.
+pub fn conforms(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
+    let Some(device) = open(&|_| ()) else { return };
+    assert_conforms(reference, device.as_ref());
+    assert_eq!(assert_same_at_random(reference, &[device.as_ref()], 0..100), 0, "plans refused");
+}
+
+/// Every algorithm under every schedule, on an image of several bands that is cut into strips, with dispatches of a few
+/// rows and submissions of a few dispatches; then random cases, each with buffers as small as it can do with.
+///
+/// # Panics
+/// Where the device differs from the reference.
+pub fn conforms_cut_up(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
+    let lowered = [16, 32, 64, 128, 512, 2048].map(|kib| {
+        open(&|limits| {
+            limits.binding_bytes = kib << 10;
+            // As many workgroups as the widest of the images takes.
+            (limits.workgroups, limits.dispatch_entries) = (18, 5000);
+        })
+    });
+    let Some(devices) = lowered.into_iter().collect::<Option<Vec<_>>>() else { return };
+    for (case, device) in banded_cases().iter().flat_map(|case| [(case, &devices[1]), (case, &devices[2])]) {
+        assert_same(reference, device.as_ref(), case);
+    }
+    let devices: Vec<_> = devices.iter().map(Box::as_ref).collect();
+    let refused = assert_same_at_random(reference, &devices, 1000..1100);
+    assert!(refused <= 5, "{refused} plans refused");
+}
+
+fn banded_cases() -> Vec<Case> {
+    let pair = noise_pair(21, 97, 3);
+    let settings = Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| a.settings(pair.size(), 7, 2, s)));
+    let plans = settings.flat_map(|settings| Profile::ALL.map(|profile| (profile, settings)));
+    let plan = |(profile, settings)| Plan::new(pair.size(), Model::new(profile, 19).ok()?, settings).ok();
+    plans.filter_map(plan).map(|plan| Case { pair: pair.clone(), plan }).collect()
+}
+
+/// Solvers share a device's queue and its kernels.
+///
+/// # Panics
+/// Where the device differs from the reference.
+pub fn runs_plans_at_once(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
+    let Some(device) = open(&|_| ()) else { return };
+    thread::scope(|scope| {
+        for cases in banded_cases().chunks(18) {
+            let (cases, device) = (cases.to_vec(), device.as_ref());
+            scope.spawn(move || cases.iter().for_each(|case| assert_same(reference, device, case)));
+        }
+    });
+}
+
+/// What a device cannot run is refused when it is prepared or opened, as the kind of error that it is.
+///
+/// # Panics
+/// Where it is not.
+pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Error>) {
+    let Some(plan) = banded_cases().pop().map(|case| case.plan) else { return };
+    let prepare = |change: &dyn Fn(&mut Limits)| {
+        opened(open(change)).map(|device| Matcher::new(device.as_ref(), plan.clone()).err())
+    };
+    let small = prepare(&|limits| limits.binding_bytes = 4 << 10);
+    assert!(matches!(small, None | Some(Some(Error::Unsupported { .. }))), "{small:?}");
+    let little = prepare(&|limits| limits.memory_bytes = Some(1 << 16));
+    assert!(matches!(little, None | Some(Some(Error::OutOfMemory { available: Some(65_536), .. }))), "{little:?}");
+    let few = open(&|limits| limits.bindings = 4).err();
+    assert!(matches!(few, Some(Error::Unavailable { .. })), "{few:?}");
+}
+
+/// By a device's own clock, the stages of a solve fill most of the time that the host waits, and no more.
+///
+/// # Panics
+/// Where they do not.
+pub fn tells_times(open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
+    let Some(device) = open(&|_| ()) else { return };
+    let pair = noise_pair(150, 100, 3);
+    let settings = Algorithm::Bp.settings(pair.size(), 20, 1, Schedule::Sync);
+    let plan = Model::new(Profile::Thesis, 64).and_then(|model| Plan::new(pair.size(), model, settings));
+    let solve = |plan| {
+        let mut matcher = Matcher::new(device.as_ref(), plan)?;
+        matcher.solve(&pair)?;
+        matcher.solve(&pair)
+    };
+    let times = plan.and_then(solve).unwrap_or_else(|error| panic!("{error}"));
+    // A device may have no clock.
+    let Some(stages) = times.device else { return };
+    let sum: Duration = stages.iter().sum();
+    assert!(sum <= times.total && 4 * sum > times.total, "{times:?}");
+    assert!(stages[bp_core::Stage::UpdateMessages as usize] > sum / 4, "{times:?}");
+}
