@@ -6,6 +6,7 @@ use std::{ffi::CStr, sync::LazyLock};
 use ash::{Entry, ext, khr, vk};
 use bp_core::{DeviceInfo, DeviceKind};
 use bp_shaders::missing;
+use uuid::Uuid;
 
 use crate::{limits, validation};
 
@@ -121,7 +122,7 @@ impl Instance {
         if told.is_empty() {
             told = version;
         }
-        (Some(format!("{name} {told}")), Some(uuid_text(id.device_uuid)))
+        (Some(format!("{name} {told}")), Some(Uuid::from_bytes(id.device_uuid).to_string()))
     }
 
     /// Whether a device has an extension.
@@ -214,20 +215,12 @@ pub(crate) fn version_text(version: u32) -> String {
     format!("{major}.{minor}.{}", vk::api_version_patch(version))
 }
 
-fn uuid_text(uuid: [u8; vk::UUID_SIZE]) -> String {
-    let digits = uuid.map(|byte| format!("{byte:02x}"));
-    let groups = [0..4, 4..6, 6..8, 8..10, 10..16].map(|group| digits[group].concat());
-    groups.join("-")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn identifiers_are_written_as_usual() {
-        let uuid = std::array::from_fn(|i| 0xf0 - 16 + i as u8);
-        assert_eq!(uuid_text(uuid), "e0e1e2e3-e4e5-e6e7-e8e9-eaebecedeeef");
+    fn versions_are_written_as_usual() {
         assert_eq!(version_text(vk::make_api_version(0, 1, 3, 230)), "1.3.230");
     }
 }

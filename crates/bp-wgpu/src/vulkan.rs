@@ -4,6 +4,7 @@
 use std::ops::Deref;
 
 use ash::{Entry, ext, vk};
+use uuid::Uuid;
 use wgpu::{
     Adapter,
     hal::{self, api::Vulkan},
@@ -30,7 +31,7 @@ pub(crate) fn uuid(adapter: &Adapter) -> Option<String> {
     let instance = hal.shared_instance().raw_instance();
     // SAFETY: the device is one of this instance's, and both have Vulkan 1.1, of which the structure is.
     unsafe { instance.get_physical_device_properties2(hal.raw_physical_device(), &mut both) };
-    Some(uuid_text(id.device_uuid))
+    Some(Uuid::from_bytes(id.device_uuid).to_string())
 }
 
 /// Names the driver and the device for which stored pipelines are good.
@@ -91,21 +92,9 @@ fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<usize> {
     local.or(types.first()).map(|kind| kind.heap_index as usize)
 }
 
-fn uuid_text(uuid: [u8; vk::UUID_SIZE]) -> String {
-    let digits = uuid.map(|byte| format!("{byte:02x}"));
-    let groups = [0..4, 4..6, 6..8, 8..10, 10..16].map(|group| digits[group].concat());
-    groups.join("-")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn identifiers_are_written_as_usual() {
-        let uuid = std::array::from_fn(|i| 0xf0 - 16 + i as u8);
-        assert_eq!(uuid_text(uuid), "e0e1e2e3-e4e5-e6e7-e8e9-eaebecedeeef");
-    }
 
     #[test]
     fn the_heap_is_the_one_of_the_first_local_memory() {

@@ -61,7 +61,7 @@ fn described(contest: &Contest) -> String {
     let Contest { problem, width, height, settings, .. } = contest;
     let steps = if settings.schedule == "checkerboard" { "half-steps" } else { "loops" };
     format!(
-        "`{problem}`: {width}x{height} pixels, {} labels, profile {}, {} grids x {} {steps} ({}), {} message entries.",
+        "`{problem}`: {width}x{height} pixels, {} labels, profile {}, grids: {}, {steps} on each: {} ({}), {} message entries.",
         settings.labels,
         settings.profile,
         settings.grids,
