@@ -9,7 +9,7 @@ use clap::{
     builder::{NonEmptyStringValueParser, OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-use crate::{backends, files::PixelLimit, speed::Problem};
+use crate::{backends, export::Format, files::PixelLimit, speed::Problem};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
@@ -52,6 +52,10 @@ pub(crate) enum Command {
     Conform(ConformArgs),
     /// Time devices against each other on fixed problems, in turns and in one process.
     Speed(SpeedArgs),
+    /// Set recorded runs of several machines, commits or backends beside one another.
+    Compare(CompareArgs),
+    /// Write a recorded run in the format of another program.
+    Export(ExportArgs),
 }
 
 /// `bp match`.
@@ -309,6 +313,32 @@ pub(crate) struct SpeedArgs {
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
+}
+
+/// `bp compare`.
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// Recorded runs of the same images, L and k: each a record.json or its folder. The others are compared with the
+    /// first.
+    #[arg(required = true, num_args = 2.., value_name = "RECORD")]
+    pub(crate) records: Vec<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `bp export`.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// A recorded run: a record.json or its folder.
+    pub(crate) record: PathBuf,
+    /// Format: input of github-action-benchmark (customSmallerIsBetter) or Bencher (Bencher Metric Format), a table
+    /// with a row for every sample, or a Vega-Lite chart.
+    #[arg(long, value_parser = named(&Format::ALL, Format::name))]
+    pub(crate) format: Format,
+    /// The file to write. [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 fn threads() -> impl TypedValueParser<Value = u16> {

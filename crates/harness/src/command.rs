@@ -1,9 +1,11 @@
 //! One file a command, and `plan`, which `bp match` runs.
 
+mod compare;
 mod conform;
 mod devices;
 mod doctor;
 pub(crate) mod evaluate;
+mod export;
 pub(crate) mod match_pair;
 mod plan;
 pub(crate) mod scenes;
@@ -11,10 +13,12 @@ mod speed;
 
 use std::io::Write;
 
+pub(crate) use compare::compare;
 pub(crate) use conform::conform;
 pub(crate) use devices::devices;
 pub(crate) use doctor::doctor;
 pub(crate) use evaluate::evaluate;
+pub(crate) use export::export;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
 pub(crate) use speed::speed;

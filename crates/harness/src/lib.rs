@@ -1,11 +1,14 @@
 //! The `bp` program: commands, files, scenes, records, reports.
 //!
 //! `command` holds one file a command, `reproduce` runs the thesis's experiments and records them, `report` makes
-//! tables, charts and pages from records. `backends` is the only file that lists backends.
+//! tables, charts and pages from records, `compare` and `export` set several beside one another and hand one to other
+//! programs. `backends` is the only file that lists backends.
 
 mod args;
 mod backends;
 mod command;
+mod compare;
+mod export;
 mod failure;
 mod files;
 mod interrupt;
@@ -15,6 +18,7 @@ pub mod report;
 pub mod reproduce;
 mod scenes;
 mod speed;
+mod summary;
 mod threads;
 
 use std::{io::Write, process::ExitCode};
@@ -49,6 +53,8 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Doctor(args) => threads::run_on(None, || command::doctor(args)),
         Command::Conform(args) => threads::run_on(None, || command::conform(args)),
         Command::Speed(args) => command::speed(args),
+        Command::Compare(args) => command::compare(args),
+        Command::Export(args) => command::export(args),
     }
 }
 

@@ -2,8 +2,10 @@
 //! schema.
 
 mod from_core;
+mod load;
 
 pub(crate) use from_core::clocks;
+pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, load, record_file};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

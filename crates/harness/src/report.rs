@@ -2,6 +2,7 @@
 
 mod chart;
 mod diagrams;
+mod escape;
 mod figures;
 pub(crate) mod format;
 mod html;
@@ -13,14 +14,14 @@ mod thesis;
 
 use std::path::Path;
 
+pub(crate) use escape::{markdown as markdown_escaped, printable};
 pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
 
 use crate::{
     args::ReportArgs,
     failure::Failure,
     files::write_text,
-    record::Record,
-    reproduce::{RECORD_FILE, load_record},
+    record::{RECORD_FILE, Record, load},
     tell,
 };
 use readme::{BEGIN, END};
@@ -76,7 +77,7 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
 /// `bp report`.
 pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
     let run = if args.run.ends_with(RECORD_FILE) { args.run.parent().unwrap_or(&args.run) } else { &args.run };
-    let record = load_record(run)?;
+    let record = load(&args.run)?;
     match &args.readme {
         None => {
             write(run, &record)?;
@@ -96,6 +97,6 @@ pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
 /// For checking that what is committed is what the record says.
 #[must_use]
 pub fn renewed_readme(text: &str, run: &Path, shown_as: &Path) -> Option<String> {
-    let record = load_record(run).ok()?;
+    let record = load(run).ok()?;
     readme::splice(text, &readme::part(shown_as, &Results::new(&record).ok()?))
 }

@@ -6,7 +6,6 @@ mod run;
 mod storage;
 
 pub use run::ONE_SAMPLE_ABOVE_MS;
-pub(crate) use storage::{RECORD_FILE, load_record};
 
 use std::{ops::ControlFlow, path::Path};
 

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use super::{Drawing, Report, results::UNAVAILABLE, tables::Table};
+use super::{Drawing, Report, escape, results::UNAVAILABLE, tables::Table};
 use crate::record::{Device, Machine, Program};
 
 /// The whole page.
 pub(super) fn page(report: &Report<'_>) -> String {
-    let mut text = format!("# {}\n\n", title(report));
+    let mut text = format!("# {}\n\n", escape::markdown(&title(report)));
     for line in facts(report) {
-        let _ = writeln!(text, "* {line}");
+        let _ = writeln!(text, "* {}", escape::markdown(&line));
     }
     text += "\n## Tables\n\n";
     for table in &report.tables {
@@ -111,7 +111,7 @@ pub(super) fn grid(table: &Table) -> String {
 /// The lines of a table of these columns and rows.
 pub(crate) fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| {
-        let cells: Vec<_> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        let cells: Vec<_> = cells.iter().map(|cell| escape::markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
     let rule = format!("|{}\n", "---|".repeat(columns.len()));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{
+    escape::markdown,
     format::{Spread, mebibytes, number, or},
     markdown::grid,
     results::{Part, Results, Row},
@@ -33,7 +34,7 @@ pub(super) fn part(run: &Path, results: &Results<'_>) -> String {
     let run = run.trim_end_matches('/');
     let (machine, settings) = (&record.machine, &record.run);
     let devices: Vec<_> = (results.devices().iter())
-        .map(|(backend, device)| format!("{} on {}{}", results.label(backend), device.name, workers(device)))
+        .map(|(backend, device)| format!("{} on {}{}", results.label(backend), markdown(&device.name), workers(device)))
         .chain(results.unavailable().map(|why| why.trim_end_matches('.').to_owned()))
         .collect();
     let note = format!(
@@ -43,7 +44,7 @@ pub(super) fn part(run: &Path, results: &Results<'_>) -> String {
         results.data(),
         settings.labels,
         settings.k,
-        machine.cpu,
+        markdown(&machine.cpu),
         machine.cores,
         devices.join("; ")
     );

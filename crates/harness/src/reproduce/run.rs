@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::{
     energies,
     plans::{self, Planned},
-    storage::{MAPS_FOLDER, Storage},
+    storage::Storage,
 };
 use crate::{
     backends::{Asked, Opened},
@@ -217,7 +217,7 @@ fn first_measurement(
     let disparities = matcher.disparities();
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
-    let map = format!("{MAPS_FOLDER}/{}-{}.png", cell.scene, cell.plan);
+    let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
     write_map(&storage.folder().join(&map), &disparities)?;
     Ok(Measurement {
         samples: Vec::new(),

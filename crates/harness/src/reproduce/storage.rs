@@ -11,16 +11,10 @@ use crate::{
     failure::Failure,
     files::{create_folder, write_text},
     machine,
-    record::{Machine, Program, Record, Run, SCHEMA_VERSION},
+    record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
     tell,
 };
-
-/// Name of the record in a run's folder.
-pub(crate) const RECORD_FILE: &str = "record.json";
-
-/// Name of the folder of disparity maps in a run's folder.
-pub(crate) const MAPS_FOLDER: &str = "maps";
 
 /// Name of the file whose lock says that a run is at work.
 const LOCK_FILE: &str = ".lock";
@@ -39,7 +33,7 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
         let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;
-        load_record(folder).ok().filter(|record| same(record) && is_unfinished(folder, record))
+        load(folder).ok().filter(|record| same(record) && is_unfinished(folder, record))
     };
     for folder in runs(results).into_iter().filter(|folder| interrupted(folder).is_some()) {
         let Some(lock) = lock(&folder)? else { continue };
@@ -86,18 +80,6 @@ fn lock(folder: &Path) -> Result<Option<File>, Failure> {
         Err(TryLockError::WouldBlock) => Ok(None),
         Err(TryLockError::Error(error)) => Err(Failure::writing(&path, &error)),
     }
-}
-
-/// Reads the record of a run's folder.
-pub(crate) fn load_record(folder: &Path) -> Result<Record, Failure> {
-    let path = folder.join(RECORD_FILE);
-    let text = fs::read_to_string(&path).map_err(|error| Failure::reading(&path, &error))?;
-    let record: Record = serde_json::from_str(&text).map_err(|error| Failure::reading(&path, &error))?;
-    if record.schema_version != SCHEMA_VERSION {
-        let found = record.schema_version;
-        return Err(Failure::reading(&path, &format!("schema version {found}, this program reads {SCHEMA_VERSION}")));
-    }
-    Ok(record)
 }
 
 /// Folders of recorded runs, in order of their names.

@@ -1,0 +1,29 @@
+//! `bp export`: a record for other programs.
+
+use std::io::Write;
+
+use crate::{
+    args::ExportArgs,
+    export,
+    failure::Failure,
+    files::{check_distinct, check_writable, write_text},
+    record::{load, record_file},
+    tell,
+};
+
+/// Runs the command.
+pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
+    if let Some(output) = &args.output {
+        check_distinct(&record_file(&args.record), output)?;
+        check_writable(output)?;
+    }
+    let record = load(&args.record)?;
+    if !export::has_numbers(&record) {
+        return Err(Failure::reading(&args.record, &"nothing in it was measured; run `bp reproduce` to its end"));
+    }
+    let text = export::export(&record, args.format)?;
+    let Some(output) = &args.output else { return Ok(write!(std::io::stdout(), "{text}")?) };
+    write_text(output, &text)?;
+    tell(&format!("written: {}", output.display()));
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! Reading records, ours and strangers'. This is the one place where it is done: what it hands on fits the types and
+//! this program's schema. Strings in it are whatever its author wrote, and no path in it has been followed.
+
+use std::{
+    borrow::Cow,
+    fmt::Display,
+    fs::{self, File},
+    io::Read,
+    path::Path,
+};
+
+use serde::Deserialize;
+
+use super::{Cell, Record, SCHEMA_VERSION};
+use crate::{failure::Failure, report::printable};
+
+/// Name of the record in a run's folder.
+pub(crate) const RECORD_FILE: &str = "record.json";
+
+/// Name of the folder of maps beside it.
+pub(crate) const MAPS_FOLDER: &str = "maps";
+
+/// Larger files are not read: ours are below one MiB, and somebody's may be of any size.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// What is shown at most of why a record is refused: a stranger's may quote itself at any length.
+const MAX_MESSAGE: usize = 300;
+
+/// The one field that every version of the schema has.
+#[derive(Deserialize)]
+struct Versioned {
+    schema_version: u32,
+}
+
+/// Reads a record: the file, or the one in a run's folder.
+pub(crate) fn load(path: &Path) -> Result<Record, Failure> {
+    let path = record_file(path);
+    let text = read(&path)?;
+    let refused = |error: &dyn Display| {
+        let why: String = printable(&error.to_string()).chars().take(MAX_MESSAGE).collect();
+        Failure::reading(&path, &format!("not a record of `bp reproduce` (see results/schema.json): {why}"))
+    };
+    // The version comes first: another one may well have other fields.
+    let Versioned { schema_version } = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    if schema_version != SCHEMA_VERSION {
+        let what = format!("schema version {schema_version}, this program reads {SCHEMA_VERSION}");
+        return Err(Failure::reading(&path, &format!("{what}; read it with the version of bp that wrote it")));
+    }
+    let record: Record = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    match record.cells.iter().filter_map(Cell::measured).find(|measured| !is_beside(&measured.map)) {
+        Some(measured) => Err(refused(&format!("a map outside of its folder: {}", measured.map))),
+        None => Ok(record),
+    }
+}
+
+/// Whether a map is where ours are: reports show it, and a stranger's record may name any file.
+fn is_beside(map: &str) -> bool {
+    let name = map.strip_prefix(MAPS_FOLDER).and_then(|rest| rest.strip_prefix('/'));
+    name.is_some_and(|name| !name.is_empty() && !name.contains(['/', '\\']) && name != "..")
+}
+
+/// The file that a record is in, where its folder may have been named.
+pub(crate) fn record_file(path: &Path) -> Cow<'_, Path> {
+    if path.is_dir() { path.join(RECORD_FILE).into() } else { path.into() }
+}
+
+/// The text of a plain file that is not too large.
+fn read(path: &Path) -> Result<String, Failure> {
+    let failed = |error: &dyn Display| Failure::reading(path, error);
+    // Asked before it is opened: opening a pipe waits for its other end.
+    let about = fs::metadata(path).map_err(|error| failed(&error))?;
+    if !about.is_file() {
+        return Err(failed(&format!("not a file; name a {RECORD_FILE} or its folder")));
+    }
+    let too_large = || failed(&format!("larger than {} MiB, so it is no record, and is not read", MAX_BYTES >> 20));
+    if about.len() > MAX_BYTES {
+        return Err(too_large());
+    }
+    let mut text = String::new();
+    // It may have grown since, or be one of those whose size the system does not tell.
+    let limited = File::open(path).map(|file| file.take(MAX_BYTES + 1));
+    let count = limited.and_then(|mut file| file.read_to_string(&mut text)).map_err(|error| failed(&error))?;
+    if count as u64 > MAX_BYTES { Err(too_large()) } else { Ok(text) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_lie_beside_their_record() {
+        assert!(is_beside("maps/Baby1-bp.png"));
+        for map in
+            ["", "maps", "maps/", "maps/..", "maps/../../secret.png", "/etc/passwd", "mapsx/a.png", "maps/a/b.png"]
+        {
+            assert!(!is_beside(map), "{map}");
+        }
+    }
+}
