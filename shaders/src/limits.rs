@@ -22,6 +22,20 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// Those of a device that allows nearly anything: to look at programs where there is none.
+    #[must_use]
+    pub fn roomy() -> Self {
+        Self {
+            device: "a device".to_owned(),
+            binding_bytes: 1 << 32,
+            buffer_bytes: 1 << 32,
+            bindings: 16,
+            workgroups: 65_535,
+            memory_bytes: None,
+            dispatch_entries: 1 << 30,
+        }
+    }
+
     /// How many message entries a device of this kind is sure to compute within 0.2 s: the slowest move some 10 GB/s, and
     /// an entry moves four bytes or less; a software rasteriser takes about a nanosecond an entry on two cores, ten
     /// on a slow one.

@@ -180,15 +180,7 @@ mod tests {
 
     /// What each submission of a solve is worth, and the most that one should be.
     fn submissions(plan: &Plan, dispatch_entries: u64) -> (Vec<u64>, u64) {
-        let limits = Limits {
-            device: String::new(),
-            binding_bytes: 1 << 30,
-            buffer_bytes: 1 << 30,
-            bindings: 16,
-            workgroups: 65_535,
-            memory_bytes: None,
-            dispatch_entries,
-        };
+        let limits = Limits { dispatch_entries, ..Limits::roomy() };
         let program = Program::new(plan, &limits).unwrap();
         let submitted = Arc::new(Mutex::new(Vec::new()));
         let counter = Counter {

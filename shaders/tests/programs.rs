@@ -6,18 +6,6 @@ use std::collections::HashMap;
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
 use bp_shaders::{Access, Command, Kernel, Limits, Parameters, Program};
 
-fn roomy() -> Limits {
-    Limits {
-        device: "a device".to_owned(),
-        binding_bytes: 1 << 32,
-        buffer_bytes: 1 << 32,
-        bindings: 16,
-        workgroups: 65_535,
-        memory_bytes: None,
-        dispatch_entries: 1 << 30,
-    }
-}
-
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
     Plan::new(size, Model::new(profile, 30).unwrap(), algorithm.settings(size, 20, 2, schedule)).unwrap()
 }
@@ -48,7 +36,7 @@ fn dispatches(program: &Program) -> impl Iterator<Item = Dispatch> {
 
 #[test]
 fn no_dispatch_and_no_buffer_passes_a_limit() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..roomy() };
+    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
     let mut cut = 0;
     for plan in plans() {
         let program = Program::new(&plan, &tight).unwrap();
@@ -102,8 +90,8 @@ fn expected(kernel: Kernel, schedule: Schedule, (row, colour): (u32, u32)) -> u3
 
 #[test]
 fn every_row_is_computed_as_often_as_it_should_be() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..roomy() };
-    for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), roomy()), (plan, tight.clone())]) {
+    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
+    for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), Limits::roomy()), (plan, tight.clone())]) {
         let rows = computed(&Program::new(&plan, &limits).unwrap());
         let (size, height) = (plan.image_size(), |grid: usize| plan.size(grid).height);
         let sum = |wanted| rows.iter().filter(|((kernel, ..), _)| *kernel == wanted).map(|(_, &n)| n as usize).sum();
@@ -127,25 +115,25 @@ fn what_no_device_can_run_is_refused() {
     let size = Size { width: 90, height: 70 };
     let bp = plan(size, Algorithm::Bp, Schedule::Sync, Profile::Thesis);
     let refusal = |plan: &Plan, limits: Limits| Program::new(plan, &limits).unwrap_err().to_string();
-    let error = refusal(&bp, Limits { bindings: 8, ..roomy() });
+    let error = refusal(&bp, Limits { bindings: 8, ..Limits::roomy() });
     assert!(error.starts_with("a device cannot run this plan: a kernel needs 10 buffers"), "{error}");
-    let error = refusal(&bp, Limits { workgroups: 1, ..roomy() });
+    let error = refusal(&bp, Limits { workgroups: 1, ..Limits::roomy() });
     assert!(error.contains("a row has 90 pixels and it computes at most 64"), "{error}");
-    let error = refusal(&bp, Limits { binding_bytes: 1000, ..roomy() });
+    let error = refusal(&bp, Limits { binding_bytes: 1000, ..Limits::roomy() });
     assert!(error.contains("at most 1000 bytes"), "{error}");
 
     let large = Size { width: 4096, height: 4096 };
     let settings = Settings { grids: 13, ..Algorithm::Cfbp.settings(large, 1, 1, Schedule::Checkerboard) };
     let sums = Plan::new(large, Model::new(Profile::Mrf, 2).unwrap(), settings).unwrap();
-    let error = refusal(&sums, roomy());
+    let error = refusal(&sums, Limits::roomy());
     assert!(error.contains("exceed 32 bits"), "{error}");
 }
 
 #[test]
 fn what_does_not_fit_is_refused_with_both_numbers() {
     let bp = plan(Size { width: 90, height: 70 }, Algorithm::Bp, Schedule::Sync, Profile::Thesis);
-    let needed = Program::new(&bp, &roomy()).unwrap().bytes();
-    let limits = |memory_bytes| Limits { memory_bytes: Some(memory_bytes), ..roomy() };
+    let needed = Program::new(&bp, &Limits::roomy()).unwrap().bytes();
+    let limits = |memory_bytes| Limits { memory_bytes: Some(memory_bytes), ..Limits::roomy() };
     assert!(Program::new(&bp, &limits(needed)).is_ok());
     let error = Program::new(&bp, &limits(needed - 1)).unwrap_err();
     assert_eq!(error, Error::OutOfMemory { what: "device buffers", needed, available: Some(needed - 1) });
@@ -192,8 +180,8 @@ fn may_meet(program: &Program, sweep: bool, a: Use, b: Use) -> bool {
 /// where it matters, this looks for it.
 #[test]
 fn commands_without_a_barrier_between_them_do_not_meet() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..roomy() };
-    for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), roomy()), (plan, tight.clone())]) {
+    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
+    for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), Limits::roomy()), (plan, tight.clone())]) {
         let program = Program::new(&plan, &limits).unwrap();
         let sweep = plan.settings().schedule == Schedule::Sweep;
         for segment in &program.segments {

@@ -68,15 +68,7 @@ mod tests {
     /// Every pipeline that plans of all profiles, schedules and algorithms ask for.
     fn pipelines() -> HashSet<Pipeline> {
         let size = Size { width: 90, height: 70 };
-        let limits = Limits {
-            device: String::new(),
-            binding_bytes: 1 << 30,
-            buffer_bytes: 1 << 30,
-            bindings: 16,
-            workgroups: 65_535,
-            memory_bytes: None,
-            dispatch_entries: 1 << 30,
-        };
+        let limits = Limits::roomy();
         let settings = Schedule::ALL.into_iter().flat_map(|s| Algorithm::ALL.map(|a| a.settings(size, 9, 2, s)));
         let plans = settings.flat_map(|settings| Profile::ALL.map(|profile| (profile, settings)));
         let plans = plans.map(|(profile, settings)| Plan::new(size, Model::new(profile, 20).unwrap(), settings));

@@ -28,8 +28,8 @@ Examples:
   bp reproduce --quick
   bp doctor
 
-Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable or unable to run the plan,
-6 out of memory, 130 interrupted.";
+Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable or unable
+to run the plan, 6 out of memory, 130 interrupted.";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
