@@ -1,15 +1,19 @@
 //! The command line.
 
+mod matching;
+mod measuring;
+mod records;
+
 use std::path::PathBuf;
 
-use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
-use bytesize::ByteSize;
 use clap::{
     Args, Parser, Subcommand,
-    builder::{NonEmptyStringValueParser, OsStringValueParser, PossibleValuesParser, TypedValueParser},
+    builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-use crate::{backends, export::Format, files::PixelLimit, speed::Problem};
+pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
+pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
+pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
@@ -28,8 +32,8 @@ Examples:
   bp reproduce --quick
   bp doctor
 
-Exit codes: 0 done, 1 other, 2 usage, 3 input, 5 backend or device unavailable or unable
-to run the plan, 6 out of memory, 130 interrupted.";
+Exit codes: 0 done, 1 other, 2 usage, 3 input, 4 the gate failed, 5 backend or device
+unavailable or unable to run the plan, 6 out of memory, 130 interrupted.";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -52,157 +56,12 @@ pub(crate) enum Command {
     Conform(ConformArgs),
     /// Time devices against each other on fixed problems, in turns and in one process.
     Speed(SpeedArgs),
+    /// Check that speed-ups, accuracy, energy and memory are still what committed baselines say; exit code 4 where not.
+    Gate(GateArgs),
     /// Set recorded runs of several machines, commits or backends beside one another.
     Compare(CompareArgs),
     /// Write a recorded run in the format of another program.
     Export(ExportArgs),
-}
-
-/// `bp match`.
-#[derive(Debug, Args)]
-pub(crate) struct MatchArgs {
-    /// The left image: PNG, PGM or PPM of 8 or 16 bits, grey or colour.
-    pub(crate) left: PathBuf,
-    /// The right image, of the same size; rows must correspond (a rectified pair).
-    pub(crate) right: PathBuf,
-    /// The disparity map to write: .pfm holds disparities in pixels, .png 256 times them in 16 bits (a disparity of
-    /// 0 as 1, since 0 is unknown).
-    #[arg(long, short, value_name = "MAP")]
-    pub(crate) output: PathBuf,
-    /// Also write the map as a coloured picture.
-    #[arg(long, value_name = "FILE.png")]
-    pub(crate) picture: Option<PathBuf>,
-    /// Print everything as JSON on standard output.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
-    #[arg(long)]
-    pub(crate) messages_hash: bool,
-    /// Refuse images of more megapixels.
-    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
-    pub(crate) max_megapixels: u32,
-    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given:
-    /// bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
-    #[arg(long, value_name = "SIZE")]
-    pub(crate) max_memory: Option<ByteSize>,
-    /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
-    /// later ones.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub(crate) repeat: u32,
-    /// Ground truth of the left image: errors are measured where it is given.
-    #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
-    pub(crate) ground_truth: Option<PathBuf>,
-    /// What to run.
-    #[command(flatten)]
-    pub(crate) plan: PlanArgs,
-    /// How ground truth is read.
-    #[command(flatten)]
-    pub(crate) truth: TruthArgs,
-}
-
-/// What to run.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Plan")]
-pub(crate) struct PlanArgs {
-    /// Algorithm: one of the thesis's five, or sweep, which is ours. [default: sweep]
-    #[arg(long, value_parser = named(&Algorithm::ALL, Algorithm::name))]
-    pub(crate) algorithm: Option<Algorithm>,
-    /// Data cost, with the smoothness that goes with it.
-    #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
-    pub(crate) profile: Profile,
-    /// Backend; NAME:DEVICE for another than its first device.
-    #[arg(long, default_value = backends::DEFAULT, value_name = "NAME")]
-    pub(crate) backend: String,
-    /// Device of the backend, as `bp devices` lists them: its index, a part of its name or the beginning of its UUID.
-    /// [default: its first]
-    #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new())]
-    pub(crate) device: Option<String>,
-    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
-    #[arg(long, value_name = "N", value_parser = threads())]
-    pub(crate) threads: Option<u16>,
-    /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
-    /// up to a multiple of 16]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
-    pub(crate) labels: Option<u16>,
-    /// Disparity of the first label in pixels; may be negative.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
-    pub(crate) min_disparity: i32,
-    /// Loops (k) that the algorithm derives its own from; with --grids or sweep, loops on each grid. [default: labels;
-    /// 1 for sweep]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(crate) loops: Option<u32>,
-    /// Half-steps on each grid, divided by nothing (schedule checkerboard).
-    #[arg(long, value_name = "N", conflicts_with = "loops", value_parser = clap::value_parser!(u32).range(1..=2_000_000))]
-    pub(crate) half_steps: Option<u32>,
-    /// Number of grids, coarse to fine; except for sweep it needs --loops or --half-steps, which then count on each
-    /// grid.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=bp_core::MAX_GRIDS as i64))]
-    pub(crate) grids: Option<u8>,
-    /// What cfcsbp and ctcsbp divide the loops by (Z'', Z''''). [default: 2]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) z: Option<u32>,
-    /// Order of message updates. [default: sync; checkerboard with --half-steps; algorithm sweep has its own]
-    #[arg(long, value_parser = named(&Schedule::ALL, Schedule::name))]
-    pub(crate) schedule: Option<Schedule>,
-    /// By which side finer grids take over messages. [default: receiver]
-    #[arg(long, value_parser = named(&MessageStart::ALL, MessageStart::name))]
-    pub(crate) message_start: Option<MessageStart>,
-    /// Whether the data costs of coarse grids are clipped at K + K div 2. [default: on for sweep, else off]
-    #[arg(long, value_parser = named(&[true, false], switch))]
-    pub(crate) coarse_clip: Option<bool>,
-    /// Whether the census match of the centre is a prior (ctbp, ctcsbp). [default: on]
-    #[arg(long, value_parser = named(&[true, false], switch))]
-    pub(crate) seed_start: Option<bool>,
-    /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
-    #[arg(long, value_name = "N")]
-    pub(crate) slope: Option<u8>,
-    /// Truncation K of the smoothness cost. [default: the profile's]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
-    pub(crate) truncation: Option<u8>,
-}
-
-impl PlanArgs {
-    /// The algorithm.
-    pub(crate) fn algorithm(&self) -> Algorithm {
-        self.algorithm.unwrap_or(Algorithm::Sweep)
-    }
-}
-
-/// How ground truth is read.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Ground truth")]
-pub(crate) struct TruthArgs {
-    /// Ground truth of the right image: tells which pixels both cameras see.
-    #[arg(long, value_name = "MAP", conflicts_with = "mask")]
-    pub(crate) ground_truth_right: Option<PathBuf>,
-    /// Pixels that both cameras see: an 8-bit image, 255 where they do.
-    #[arg(long, value_name = "MAP")]
-    pub(crate) mask: Option<PathBuf>,
-    /// What stored ground truth is divided by to give pixels; 0 is unknown. [default: PFM 1, 8 bits 1, 16 bits 256]
-    #[arg(long, value_name = "N", value_parser = positive)]
-    pub(crate) scale: Option<f32>,
-}
-
-/// `bp evaluate`.
-#[derive(Debug, Args)]
-pub(crate) struct EvaluateArgs {
-    /// The disparity map.
-    pub(crate) map: PathBuf,
-    /// Ground truth.
-    pub(crate) truth: PathBuf,
-    /// What the map's stored values are divided by to give pixels; 0 is unanswered. [default: as for --scale]
-    #[arg(long, value_name = "N", value_parser = positive)]
-    pub(crate) map_scale: Option<f32>,
-    /// Print JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Refuse images of more megapixels.
-    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
-    pub(crate) max_megapixels: u32,
-    /// How ground truth is read.
-    #[command(flatten)]
-    pub(crate) options: TruthArgs,
 }
 
 /// Which scenes.
@@ -215,44 +74,6 @@ pub(crate) struct DataArgs {
     /// Run the synthetic scenes although there is a data folder.
     #[arg(long)]
     pub(crate) synthetic: bool,
-}
-
-/// `bp reproduce`.
-#[derive(Debug, Args)]
-#[command(args_override_self = true)]
-pub(crate) struct ReproduceArgs {
-    /// Which scenes.
-    #[command(flatten)]
-    pub(crate) data: DataArgs,
-    /// Small images and few loops: within a minute on two cores. Says so in the output.
-    #[arg(long)]
-    pub(crate) quick: bool,
-    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device, by its index, a part of
-    /// its name or the beginning of its UUID.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
-    pub(crate) backend: Vec<String>,
-    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
-    #[arg(long, value_name = "N", value_parser = threads())]
-    pub(crate) threads: Option<u16>,
-    /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) samples: Option<u32>,
-    /// Folder for recorded runs; every run gets a new folder in it.
-    #[arg(long, default_value = "results", value_name = "DIR")]
-    pub(crate) results: PathBuf,
-    /// Name of this machine in that folder. [default: from its processor]
-    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
-    pub(crate) machine: Option<String>,
-}
-
-/// `bp report`.
-#[derive(Debug, Args)]
-pub(crate) struct ReportArgs {
-    /// A recorded run: the folder of a record.json.
-    pub(crate) run: PathBuf,
-    /// Instead of the report, write the run's chart and table between the markers of this file.
-    #[arg(long, value_name = "README.md")]
-    pub(crate) readme: Option<PathBuf>,
 }
 
 /// `bp scenes`.
@@ -282,67 +103,15 @@ pub(crate) struct DoctorArgs {
     pub(crate) json: bool,
 }
 
-/// `bp conform`.
-#[derive(Debug, Args)]
-pub(crate) struct ConformArgs {
-    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
-    pub(crate) backend: Vec<String>,
-}
-
-/// `bp speed`.
-#[derive(Debug, Args)]
-pub(crate) struct SpeedArgs {
-    /// Backends, separated by commas, the one first that the others are compared with; NAME:DEVICE for another than a
-    /// backend's first device.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
-    pub(crate) backend: Vec<String>,
-    /// Problems, separated by commas. [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = named(&Problem::ALL, Problem::name))]
-    pub(crate) problem: Vec<Problem>,
-    /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of
-    /// them. [default: 9, with --quick 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) rounds: Option<u32>,
-    /// Images of a third of the width and height, and one round unless --rounds says otherwise. Says so in the output.
-    #[arg(long)]
-    pub(crate) quick: bool,
-    /// Folder for speed.md and, with every sample, speed.json; neither may be there yet.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) output: Option<PathBuf>,
-    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
-    #[arg(long, value_name = "N", value_parser = threads())]
-    pub(crate) threads: Option<u16>,
-}
-
-/// `bp compare`.
-#[derive(Debug, Args)]
-pub(crate) struct CompareArgs {
-    /// Recorded runs of the same images, L and k: each a record.json or its folder. The others are compared with the
-    /// first.
-    #[arg(required = true, num_args = 2.., value_name = "RECORD")]
-    pub(crate) records: Vec<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// `bp export`.
-#[derive(Debug, Args)]
-pub(crate) struct ExportArgs {
-    /// A recorded run: a record.json or its folder.
-    pub(crate) record: PathBuf,
-    /// Format: input of github-action-benchmark (customSmallerIsBetter) or Bencher (Bencher Metric Format), a table
-    /// with a row for every sample, or a Vega-Lite chart.
-    #[arg(long, value_parser = named(&Format::ALL, Format::name))]
-    pub(crate) format: Format,
-    /// The file to write. [default: standard output]
-    #[arg(long, short, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
-}
-
 fn threads() -> impl TypedValueParser<Value = u16> {
     clap::value_parser!(u16).range(1..=1024)
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..100.0).contains(&value) => Ok(value),
+        _ => Err("must be a number from 0 to below 100".to_owned()),
+    }
 }
 
 fn positive(text: &str) -> Result<f32, String> {

@@ -16,6 +16,7 @@ enum Kind {
     Other,
     Usage,
     Input,
+    Gate,
     Unavailable,
     Unsupported,
     DeviceLost,
@@ -53,6 +54,11 @@ impl Failure {
         Self::other(format!("cannot write {}: {error}", path.display()))
     }
 
+    /// Something is worse than a baseline allows.
+    pub(crate) fn gate(message: impl Into<String>) -> Self {
+        Self::new(Kind::Gate, message)
+    }
+
     /// Too little memory.
     pub(crate) fn out_of_memory(message: impl Into<String>) -> Self {
         Self::new(Kind::OutOfMemory, message)
@@ -81,6 +87,7 @@ impl Failure {
             Kind::Other => 1,
             Kind::Usage => 2,
             Kind::Input => 3,
+            Kind::Gate => 4,
             Kind::Unavailable | Kind::Unsupported | Kind::DeviceLost => 5,
             Kind::OutOfMemory => 6,
             Kind::Interrupted => 130,

@@ -2,7 +2,7 @@
 //!
 //! `command` holds one file a command, `reproduce` runs the thesis's experiments and records them, `report` makes
 //! tables, charts and pages from records, `compare` and `export` set several beside one another and hand one to other
-//! programs. `backends` is the only file that lists backends.
+//! programs, `gate` holds speed-ups against committed baselines. `backends` is the only file that lists backends.
 
 mod args;
 mod backends;
@@ -11,6 +11,7 @@ mod compare;
 mod export;
 mod failure;
 mod files;
+mod gate;
 mod interrupt;
 mod machine;
 pub mod record;
@@ -53,6 +54,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Doctor(args) => threads::run_on(None, || command::doctor(args)),
         Command::Conform(args) => threads::run_on(None, || command::conform(args)),
         Command::Speed(args) => command::speed(args),
+        Command::Gate(args) => command::gate(args),
         Command::Compare(args) => command::compare(args),
         Command::Export(args) => command::export(args),
     }

@@ -1,7 +1,7 @@
 //! `bp reproduce`: the thesis's experiments, run and recorded.
 
 mod energies;
-mod plans;
+pub(crate) mod plans;
 mod run;
 mod storage;
 

@@ -134,7 +134,8 @@ fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<Ima
     }
 }
 
-fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
+/// Makes scene `index` of six with both sides divided by `divisor`.
+pub(crate) fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
     let synthetic::Scene { name, pair, truth_left, visible, .. } = synthetic::scene(index, divisor);
     let truth = GroundTruth::with_mask(truth_left, visible)?;
     let sum = |path: &str, image: &Image| ImageSum { path: path.to_owned(), sha256: pixels_sha256(image) };

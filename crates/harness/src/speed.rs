@@ -9,6 +9,7 @@ mod tables;
 use bp_core::{Error, synthetic};
 use jiff::Timestamp;
 
+pub(crate) use measure::milliseconds;
 pub(crate) use problems::Problem;
 pub(crate) use record::{Outcome, Speed};
 pub(crate) use tables::page;

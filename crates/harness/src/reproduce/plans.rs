@@ -2,8 +2,6 @@
 
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
 
-use crate::record::Run;
-
 /// Z'' and Z'''' where nothing else is said: the digit that the thesis lost is most likely this one.
 const Z: u32 = 2;
 
@@ -48,10 +46,11 @@ pub(crate) fn all() -> Vec<Planned> {
 pub(crate) const CENSUS: &str = "census";
 
 impl Planned {
-    /// The plan for images of `size`.
-    pub(crate) fn plan(&self, size: Size, run: &Run) -> Result<Plan, Error> {
-        let model = Model::new(self.profile, run.labels)?;
-        let settings = self.algorithm.settings(size, run.k, self.z.unwrap_or(1), self.schedule);
+    /// The plan for images of `size`, with so many labels; `k` loops are what its own are derived from, unless those are
+    /// fixed.
+    pub(crate) fn plan(&self, size: Size, labels: usize, k: u32) -> Result<Plan, Error> {
+        let model = Model::new(self.profile, labels)?;
+        let settings = self.algorithm.settings(size, k, self.z.unwrap_or(1), self.schedule);
         let settings = match self.fixed {
             Some((grids, steps)) => Settings { grids, steps, ..settings },
             None => settings,
@@ -60,7 +59,7 @@ impl Planned {
     }
 
     /// The loops that its own are derived from.
-    pub(crate) fn k(&self, run: &Run) -> Option<u32> {
-        self.fixed.is_none().then_some(run.k)
+    pub(crate) fn k(&self, k: u32) -> Option<u32> {
+        self.fixed.is_none().then_some(k)
     }
 }

@@ -85,7 +85,7 @@ fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Asked]) -> Result<
 fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<Vec<Cell>, Failure> {
     let mut cells = Vec::new();
     for planned in plans::all() {
-        let plan = planned.plan(scene.pair.size(), run)?;
+        let plan = planned.plan(scene.pair.size(), run.labels, run.k)?;
         cells.extend(devices.iter().map(|Asked { name, device }| {
             let opened = device.as_ref().ok();
             let device_of_plan = opened.map(|opened| opened.device.as_ref());
@@ -94,7 +94,7 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
                 plan: planned.name.to_owned(),
                 backend: name.clone(),
                 device: opened.map(|opened| (&opened.info).into()),
-                settings: Settings::new(&plan, device_of_plan, planned.algorithm, (planned.k(run), planned.z)),
+                settings: Settings::new(&plan, device_of_plan, planned.algorithm, (planned.k(run.k), planned.z)),
                 outcome: device.as_ref().map_or_else(|e| Outcome::Unavailable(e.clone()), |_| Outcome::Pending),
             }
         }));
@@ -170,7 +170,7 @@ fn solve(
     update: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Solved, Failure> {
     device.recover()?;
-    let plan = planned.plan(scene.pair.size(), run)?;
+    let plan = planned.plan(scene.pair.size(), run.labels, run.k)?;
     machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), None, "--quick needs less")?;
     let start = Instant::now();
     let mut matcher = Matcher::new(device.device.as_ref(), plan)?;

@@ -59,7 +59,7 @@ impl Work {
 }
 
 /// In milliseconds.
-pub(super) fn milliseconds(time: Duration) -> f64 {
+pub(crate) fn milliseconds(time: Duration) -> f64 {
     1000.0 * time.as_secs_f64()
 }
 

@@ -1,0 +1,95 @@
+//! Running experiments.
+
+use std::path::PathBuf;
+
+use clap::{Args, builder::NonEmptyStringValueParser};
+
+use super::{DataArgs, named, percent, threads};
+use crate::{backends, speed::Problem};
+
+/// `bp reproduce`.
+#[derive(Debug, Args)]
+#[command(args_override_self = true)]
+pub(crate) struct ReproduceArgs {
+    /// Which scenes.
+    #[command(flatten)]
+    pub(crate) data: DataArgs,
+    /// Small images and few loops: within a minute on two cores. Says so in the output.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device, by its index, a part of
+    /// its name or the beginning of its UUID.
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) threads: Option<u16>,
+    /// Samples of every cell that takes less than 5 s; longer ones get one. [default: 5, with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) samples: Option<u32>,
+    /// Folder for recorded runs; every run gets a new folder in it.
+    #[arg(long, default_value = "results", value_name = "DIR")]
+    pub(crate) results: PathBuf,
+    /// Name of this machine in that folder. [default: from its processor]
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    pub(crate) machine: Option<String>,
+}
+
+/// `bp conform`.
+#[derive(Debug, Args)]
+pub(crate) struct ConformArgs {
+    /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device.
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
+}
+
+/// `bp speed`.
+#[derive(Debug, Args)]
+pub(crate) struct SpeedArgs {
+    /// Backends, separated by commas, the one first that the others are compared with; NAME:DEVICE for another than a
+    /// backend's first device.
+    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    pub(crate) backend: Vec<String>,
+    /// Problems, separated by commas. [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = named(&Problem::ALL, Problem::name))]
+    pub(crate) problem: Vec<Problem>,
+    /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of
+    /// them. [default: 9, with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) rounds: Option<u32>,
+    /// Images of a third of the width and height, and one round unless --rounds says otherwise. Says so in the output.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Folder for speed.md and, with every sample, speed.json; neither may be there yet.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) threads: Option<u16>,
+}
+
+/// `bp gate`.
+#[derive(Debug, Args)]
+pub(crate) struct GateArgs {
+    /// A smaller image and fewer loops: half a minute on two cores. Has baselines of its own.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Rounds, each of which runs every plan on every backend once, in turns.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(10..=1000))]
+    pub(crate) rounds: u32,
+    /// How many percent of a speed-up may be lost.
+    #[arg(long, value_name = "PERCENT", default_value_t = 12.0, value_parser = percent)]
+    pub(crate) tolerance: f64,
+    /// The same of those in which several threads take part, which the machine's other work disturbs more.
+    #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = percent)]
+    pub(crate) tolerance_shared: f64,
+    /// Folder of the baselines: one file for each kind of machine, and one for all.
+    #[arg(long, value_name = "DIR", default_value = "bench-data/gate")]
+    pub(crate) baselines: PathBuf,
+    /// Measure three times and write new baselines instead of failing.
+    #[arg(long)]
+    pub(crate) update: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,117 @@
+//! What is guarded: which speed-ups, of whom over whom.
+
+use bp_core::Stage;
+
+use super::measure::Sample;
+
+/// The plans of the thesis that are held against its first.
+const AGAINST_BP: [&str; 4] = ["cfbp", "cfcsbp", "ctbp", "ctcsbp"];
+
+/// A plan on a runner.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Entrant {
+    /// Name of the runner.
+    pub(super) runner: String,
+    /// Name of the plan, as in the tables.
+    pub(super) plan: &'static str,
+}
+
+/// Which time of a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// From images to labels, by the wall clock.
+    Total,
+    /// First messages and their updates.
+    MessagePassing,
+    /// A kernel.
+    Kernel(Stage),
+}
+
+/// A speed-up: how many times as long as `of` it takes `over`.
+#[derive(Clone, Debug)]
+pub(super) struct Guarded {
+    pub(super) of: Entrant,
+    pub(super) over: Entrant,
+    pub(super) part: Part,
+    /// Whether threads that share the machine with others take part: such a time varies more than one thread's.
+    pub(super) is_shared: bool,
+}
+
+/// Those who run plans, by name.
+#[derive(Clone, Debug)]
+pub(super) struct Lineup {
+    /// The reference, of which times are taken as given.
+    pub(super) reference: String,
+    /// The fast processor backend on one thread.
+    pub(super) one_thread: String,
+    /// The same on all threads, where those are several.
+    pub(super) all_threads: Option<String>,
+    /// Devices that share no thread with us, software rasterisers among them.
+    pub(super) devices: Vec<String>,
+}
+
+/// Everything that is guarded.
+pub(super) fn all(lineup: &Lineup) -> Vec<Guarded> {
+    let Lineup { reference, one_thread, all_threads, devices } = lineup;
+    let against_bp = |runner: &String, plan, part| between((runner, plan), (runner, "bp"), part, false);
+    let mut all: Vec<_> = AGAINST_BP.map(|plan| against_bp(reference, plan, Part::MessagePassing)).into();
+    let ours = ["hierarchy", "sweep"];
+    all.extend(AGAINST_BP.into_iter().chain(ours).map(|plan| against_bp(one_thread, plan, Part::Total)));
+    let kernel = |runner, plan, stage: Stage, is_shared| {
+        between((runner, plan), (reference, plan), Part::Kernel(stage), is_shared)
+    };
+    // This backend refines while it updates messages.
+    let stages = Stage::ALL.into_iter().filter(|&stage| stage != Stage::Refine);
+    all.extend(stages.map(|stage| kernel(one_thread, "hierarchy", stage, false)));
+    all.push(kernel(one_thread, "bp", Stage::UpdateMessages, false));
+    all.push(between((one_thread, "sweep"), (reference, "sweep"), Part::Total, false));
+    if let Some(all_threads) = all_threads {
+        all.extend(ours.map(|plan| between((all_threads, plan), (one_thread, plan), Part::Total, true)));
+    }
+    for device in devices {
+        let stages = [Stage::MatchCost, Stage::UpdateMessages];
+        all.extend(stages.map(|stage| kernel(device, "hierarchy", stage, true)));
+        all.push(kernel(device, "bp", Stage::UpdateMessages, true));
+        all.push(between((device, "hierarchy"), (reference, "hierarchy"), Part::Total, true));
+    }
+    all
+}
+
+fn between(
+    (of, plan): (&String, &'static str),
+    (over, other): (&String, &'static str),
+    part: Part,
+    is_shared: bool,
+) -> Guarded {
+    let entrant = |runner: &String, plan| Entrant { runner: runner.clone(), plan };
+    Guarded { of: entrant(of, plan), over: entrant(over, other), part, is_shared }
+}
+
+impl Guarded {
+    /// Its name in tables and baselines.
+    pub(super) fn name(&self) -> String {
+        let Self { of, over, part, .. } = self;
+        let what = match part {
+            Part::Total => "total",
+            Part::MessagePassing => "message passing",
+            Part::Kernel(stage) => stage.name(),
+        };
+        if of.runner == over.runner {
+            format!("{}: {} over {}, {what}", of.runner, of.plan, over.plan)
+        } else {
+            format!("{} over {}: {}, {what}", of.runner, over.runner, of.plan)
+        }
+    }
+}
+
+impl Part {
+    /// This part of a solve, in milliseconds.
+    pub(super) fn ms(self, sample: &Sample) -> f64 {
+        let stage = |stage: Stage| sample.stages_ms[stage as usize];
+        match self {
+            Self::Total => sample.total_ms,
+            Self::MessagePassing => stage(Stage::Refine) + stage(Stage::UpdateMessages),
+            Self::Kernel(kernel) => stage(kernel),
+        }
+    }
+}

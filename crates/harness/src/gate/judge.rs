@@ -1,0 +1,166 @@
+//! What was measured beside what was expected.
+
+use serde::Serialize;
+
+use super::{
+    Gate,
+    baseline::{Baseline, Baselines, Expected},
+    guarded::Guarded,
+    measure::{Fact, Measured},
+    verdict::{Ratio, Verdict},
+};
+use crate::{
+    failure::Failure,
+    machine,
+    record::{Machine, Program},
+};
+
+/// The tolerance of speed-ups that have a baseline for all machines only, a fraction: how much work is saved does not
+/// depend on the machine, how fast its caches are does.
+const TOLERANCE_ANYWHERE: f64 = 0.4;
+
+/// What a gate found.
+#[derive(Serialize)]
+pub(crate) struct Judgement {
+    pub(super) program: Program,
+    pub(super) machine: Machine,
+    pub(super) quick: bool,
+    pub(super) rounds: u32,
+    /// The file of baselines for this kind of machine, and whether it expects anything of this run.
+    pub(super) baseline: String,
+    pub(super) has_baseline: bool,
+    /// Runners, each with its device.
+    pub(super) devices: Vec<(String, String)>,
+    /// Backends without a device, and why.
+    pub(super) unavailable: Vec<String>,
+    pub(super) speed_ups: Vec<SpeedUp>,
+    pub(super) facts: Vec<JudgedFact>,
+    /// Baselines that were written.
+    pub(crate) written: Vec<String>,
+}
+
+/// A guarded speed-up, judged.
+#[derive(Serialize)]
+pub(super) struct SpeedUp {
+    pub(super) name: String,
+    pub(super) first: Ratio,
+    /// Measured again, where one was worse at first.
+    pub(super) second: Option<Ratio>,
+    pub(super) baseline: Option<f64>,
+    /// How much of the baseline may be lost, a fraction.
+    pub(super) tolerance: f64,
+    pub(super) verdict: Verdict,
+}
+
+/// Something that does not vary, judged.
+#[derive(Serialize)]
+pub(super) struct JudgedFact {
+    pub(super) name: String,
+    pub(super) value: String,
+    /// What it was; none where nothing is known of it.
+    pub(super) baseline: Option<String>,
+}
+
+impl JudgedFact {
+    pub(super) fn has_changed(&self) -> bool {
+        self.baseline.as_ref().is_some_and(|baseline| *baseline != self.value)
+    }
+}
+
+impl SpeedUp {
+    fn is_worse(&self) -> bool {
+        self.verdict == Verdict::Worse
+    }
+}
+
+impl Judgement {
+    /// Judges a first measurement.
+    pub(super) fn new(gate: &Gate<'_>, baselines: &Baselines, measured: &Measured) -> Result<Self, Failure> {
+        let devices = gate.devices();
+        let known = Known { gate, baselines };
+        Ok(Self {
+            program: machine::program()?,
+            machine: gate.machine.clone(),
+            quick: gate.args.quick,
+            rounds: gate.args.rounds,
+            baseline: baselines.path_here().display().to_string(),
+            has_baseline: known.expected(baselines.here.as_ref()).is_some(),
+            devices: devices.into_iter().collect(),
+            unavailable: gate.runners.unavailable.clone(),
+            speed_ups: measured.ratios.iter().map(|(guarded, ratio)| known.speed_up(guarded, *ratio)).collect(),
+            facts: measured.facts.iter().map(|(name, fact)| known.fact(name, fact)).collect(),
+            written: Vec::new(),
+        })
+    }
+
+    /// Whether a speed-up is worse than the tolerance.
+    pub(super) fn is_any_worse(&self) -> bool {
+        self.speed_ups.iter().any(SpeedUp::is_worse)
+    }
+
+    /// Judges again what was worse: only what is worse both times fails.
+    pub(super) fn repeat(&mut self, measured: &Measured) {
+        for speed_up in self.speed_ups.iter_mut().filter(|speed_up| speed_up.is_worse()) {
+            let again = measured.ratios.iter().find(|(guarded, _)| guarded.name() == speed_up.name);
+            speed_up.second = again.map(|&(_, ratio)| ratio);
+            if let Some((second, baseline)) = speed_up.second.zip(speed_up.baseline) {
+                speed_up.verdict = second.judge(baseline, speed_up.tolerance);
+            }
+        }
+    }
+
+    /// What is worse than it may be, or not what it was, in words.
+    pub(crate) fn failures(&self) -> Vec<String> {
+        let worse = self.speed_ups.iter().filter(|speed_up| speed_up.is_worse()).map(|speed_up| {
+            let now = speed_up.second.unwrap_or(speed_up.first).median;
+            format!("{}: {now:.2} times, was {:.2}", speed_up.name, speed_up.baseline.unwrap_or(f64::NAN))
+        });
+        let changed =
+            self.facts.iter().filter(|fact| fact.has_changed()).map(|fact| {
+                format!("{}: {}, was {}", fact.name, fact.value, fact.baseline.as_deref().unwrap_or_default())
+            });
+        worse.chain(changed).collect()
+    }
+}
+
+/// What baselines say of a run.
+struct Known<'a> {
+    gate: &'a Gate<'a>,
+    baselines: &'a Baselines,
+}
+
+impl<'a> Known<'a> {
+    /// What a baseline expects of a run like this one.
+    fn expected(&self, baseline: Option<&'a Baseline>) -> Option<&'a Expected> {
+        baseline?.runs.get(self.gate.setting())
+    }
+
+    /// What this machine's baseline expects, where these runners were the same devices then.
+    fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
+        let here = self.baselines.here.as_ref();
+        let devices = self.gate.devices();
+        let same = |runner: &&String| here.is_some_and(|here| here.devices.get(*runner) == devices.get(*runner));
+        self.expected(here).filter(|_| runners.iter().all(same))
+    }
+
+    fn speed_up(&self, guarded: &Guarded, first: Ratio) -> SpeedUp {
+        let name = guarded.name();
+        let args = self.gate.args;
+        let percent = if guarded.is_shared { args.tolerance_shared } else { args.tolerance };
+        let of = |expected: Option<&Expected>, tolerance: f64| Some((*expected?.speed_ups.get(&name)?, tolerance));
+        let here = of(self.expected_here(&[&guarded.of.runner, &guarded.over.runner]), percent / 100.0);
+        let anywhere = of(self.expected(self.baselines.anywhere.as_ref()), TOLERANCE_ANYWHERE);
+        let (baseline, tolerance) = here.or(anywhere).unzip();
+        let verdict = baseline.zip(tolerance).map_or(Verdict::NoBaseline, |(b, tolerance)| first.judge(b, tolerance));
+        SpeedUp { name, first, second: None, baseline, tolerance: tolerance.unwrap_or(percent / 100.0), verdict }
+    }
+
+    fn fact(&self, name: &str, fact: &Fact) -> JudgedFact {
+        let expected = match &fact.runner {
+            Some(runner) => self.expected_here(&[runner]),
+            None => self.expected(self.baselines.anywhere.as_ref()),
+        };
+        let baseline = expected.and_then(|expected| expected.facts.get(name)).cloned();
+        JudgedFact { name: name.to_owned(), value: fact.value.clone(), baseline }
+    }
+}

@@ -1,0 +1,205 @@
+//! Takes the samples: every entrant in turns, so that whatever else the machine does meets all of them alike.
+
+use std::collections::BTreeMap;
+
+use bp_core::{Energy, Matcher, Stage};
+
+use super::{
+    guarded::{Entrant, Guarded},
+    runners::{Runner, Runners},
+    verdict::Ratio,
+};
+use crate::{
+    failure::Failure,
+    interrupt::{self, ProgressBar},
+    machine,
+    report::format::Spread,
+    reproduce::plans::{self, Planned},
+    scenes::Scene,
+    speed::milliseconds,
+};
+
+/// An entrant solves its problem again and again until a turn has taken so many milliseconds: the times of a short solve
+/// alone would mostly tell about what came before it.
+const TURN_MS: f64 = 20.0;
+
+/// The most solves of a turn.
+const MOST_SOLVES: u32 = 20;
+
+/// What is solved.
+pub(super) struct Problem {
+    pub(super) scene: Scene,
+    pub(super) labels: usize,
+    /// Loops of plain BP.
+    pub(super) k: u32,
+}
+
+/// Times of a solve, in milliseconds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// By the wall clock.
+    pub(super) total_ms: f64,
+    /// By the device's clock where it has one, in the order of [`Stage::ALL`].
+    pub(super) stages_ms: [f64; Stage::ALL.len()],
+}
+
+/// What was measured.
+pub(super) struct Measured {
+    /// Every guarded speed-up, in order, but those that could not be had.
+    pub(super) ratios: Vec<(Guarded, Ratio)>,
+    /// What does not vary, by name.
+    pub(super) facts: BTreeMap<String, Fact>,
+}
+
+/// Something that does not vary.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Fact {
+    pub(super) value: String,
+    /// Whose it is; none where it must be the same on every machine.
+    pub(super) runner: Option<String>,
+}
+
+/// An entrant ready to run.
+struct Ready<'a> {
+    entrant: &'a Entrant,
+    runner: &'a Runner,
+    matcher: Matcher,
+    solves: u32,
+    /// One a round.
+    turns: Vec<Sample>,
+}
+
+/// Measures everything that is guarded in so many rounds.
+pub(super) fn measure(
+    guarded: &[Guarded],
+    runners: &Runners,
+    problem: &Problem,
+    rounds: u32,
+) -> Result<Measured, Failure> {
+    let entrants = entrants(guarded);
+    let bar = ProgressBar::new(entrants.len() as u64 * u64::from(rounds + 1));
+    let mut facts = BTreeMap::new();
+    let mut ready = Vec::new();
+    for entrant in entrants {
+        bar.message(format!("{} {}", entrant.runner, entrant.plan));
+        ready.extend(enter(entrant, runners, problem, &mut facts)?);
+        let _ = bar.update(ready.len() as u64);
+    }
+    let mut done = ready.len() as u64;
+    for round in 1..=rounds {
+        bar.message(format!("round {round} of {rounds}"));
+        for entrant in &mut ready {
+            entrant.take_turn(problem)?;
+            done += 1;
+            let _ = bar.update(done);
+        }
+    }
+    bar.finish();
+    let ratios = guarded.iter().filter_map(|guarded| Some((guarded.clone(), ratio(guarded, &ready)?))).collect();
+    Ok(Measured { ratios, facts })
+}
+
+/// Everyone who is guarded, once.
+fn entrants(guarded: &[Guarded]) -> Vec<&Entrant> {
+    let mut entrants: Vec<&Entrant> = Vec::new();
+    for entrant in guarded.iter().flat_map(|guarded| [&guarded.over, &guarded.of]) {
+        if !entrants.contains(&entrant) {
+            entrants.push(entrant);
+        }
+    }
+    entrants
+}
+
+/// Makes an entrant ready, solves the problem once and adds what does not vary. The reference enters first: all others
+/// must answer as it did.
+fn enter<'a>(
+    entrant: &'a Entrant,
+    runners: &'a Runners,
+    problem: &Problem,
+    facts: &mut BTreeMap<String, Fact>,
+) -> Result<Option<Ready<'a>>, Failure> {
+    interrupt::check()?;
+    let planned = plans::all().into_iter().find(|planned| planned.name == entrant.plan);
+    let Some((runner, planned)) = runners.get(&entrant.runner).zip(planned) else { return Ok(None) };
+    let mut ready =
+        Ready { entrant, runner, matcher: prepare(runner, &planned, problem)?, solves: 1, turns: Vec::new() };
+    let first = ready.solve(problem)?;
+    ready.solves = ((TURN_MS / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
+    let Entrant { runner, plan } = entrant;
+    for (name, value) in answer(&ready.matcher, problem)? {
+        let known =
+            facts.entry(format!("{plan}: {name}")).or_insert_with(|| Fact { value: value.clone(), runner: None });
+        if known.value != value {
+            let what = format!("{name} is {value}, on the reference {}", known.value);
+            return Err(Failure::other(format!("{runner} answers {plan} otherwise: {what}")));
+        }
+    }
+    let owner = Some(runner.clone()).filter(|runner| *runner != runners.lineup.reference);
+    let allocated = Fact { value: ready.matcher.allocated_bytes().to_string(), runner: owner };
+    facts.insert(format!("{runner}: {plan}, bytes allocated"), allocated);
+    Ok(Some(ready))
+}
+
+fn prepare(runner: &Runner, planned: &Planned, problem: &Problem) -> Result<Matcher, Failure> {
+    let plan = planned.plan(problem.scene.pair.size(), problem.labels, problem.k)?;
+    let device = runner.opened.device.as_ref();
+    let prepared = runner.run(|| {
+        let needed = device.planned_bytes(&plan);
+        machine::check_memory(runner.opened.info.kind, needed, None, "--quick needs less")?;
+        Ok(Matcher::new(device, plan)?)
+    });
+    prepared.map_err(|failure: Failure| failure.of(&runner.name))
+}
+
+/// What every backend must answer, by name.
+fn answer(matcher: &Matcher, problem: &Problem) -> Result<[(&'static str, String); 5], Failure> {
+    let (scene, plan) = (&problem.scene, matcher.plan());
+    let errors = scene.truth.errors(&matcher.disparities())?;
+    let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
+    let energy = Energy::of(&scene.pair, plan.model(), matcher.labels())?.total();
+    Ok([
+        ("message entries", plan.message_updates().to_string()),
+        ("energy", energy.to_string()),
+        ("wrong by > 1 px, visible, %", format!("{:.4}", visible.bad_or_unanswered[1])),
+        ("wrong by > 1 px, all, %", format!("{:.4}", errors.all.bad_or_unanswered[1])),
+        ("RMSE, px", format!("{:.4}", errors.all.rmse)),
+    ])
+}
+
+impl Ready<'_> {
+    fn solve(&mut self, problem: &Problem) -> Result<Sample, Failure> {
+        let Self { runner, matcher, .. } = self;
+        let times =
+            runner.run(|| matcher.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
+        let stages = times.device.unwrap_or(times.wall);
+        Ok(Sample { total_ms: milliseconds(times.total), stages_ms: stages.map(milliseconds) })
+    }
+
+    /// Solves the problem as often as a turn takes.
+    fn take_turn(&mut self, problem: &Problem) -> Result<(), Failure> {
+        interrupt::check()?;
+        let solves = (0..self.solves).map(|_| self.solve(problem)).collect::<Result<Vec<_>, _>>()?;
+        self.turns.push(Sample::median(&solves));
+        Ok(())
+    }
+}
+
+impl Sample {
+    /// The median of each time.
+    fn median(samples: &[Self]) -> Self {
+        let median =
+            |ms: &dyn Fn(&Self) -> f64| Spread::of(samples.iter().map(ms)).map_or(f64::NAN, |spread| spread.median);
+        let mut stages_ms = [0.0; Stage::ALL.len()];
+        for (stage, ms) in stages_ms.iter_mut().enumerate() {
+            *ms = median(&|sample| sample.stages_ms[stage]);
+        }
+        Self { total_ms: median(&|sample| sample.total_ms), stages_ms }
+    }
+}
+
+/// A speed-up, from the two times of each round; `None` where one of its entrants did not run.
+fn ratio(guarded: &Guarded, ready: &[Ready<'_>]) -> Option<Ratio> {
+    let turns = |entrant: &Entrant| Some(&ready.iter().find(|ready| ready.entrant == entrant)?.turns);
+    let ratios = turns(&guarded.over)?.iter().zip(turns(&guarded.of)?);
+    Ratio::of(&ratios.map(|(over, of)| guarded.part.ms(over) / guarded.part.ms(of)).collect::<Vec<_>>())
+}

@@ -1,0 +1,90 @@
+//! Who runs plans: devices, and the threads that they run in.
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::guarded::Lineup;
+use crate::{
+    backends::{self, Opened},
+    failure::Failure,
+};
+
+/// The backend whose one thread is held against the reference's, and all of its threads against one.
+const THREADED: &str = "rayon";
+
+/// A device in its pool of threads.
+pub(super) struct Runner {
+    pub(super) name: String,
+    pub(super) opened: Opened,
+    /// Where it runs; none for a device that does not ask.
+    pool: Option<ThreadPool>,
+}
+
+/// All that this machine has.
+pub(super) struct Runners {
+    pub(super) all: Vec<Runner>,
+    pub(super) lineup: Lineup,
+    /// Backends without a device, and why.
+    pub(super) unavailable: Vec<String>,
+}
+
+impl Runner {
+    fn new(name: &str, backend: &str, threads: Option<usize>) -> Result<Self, Failure> {
+        let failed = |error| Failure::other(format!("cannot start the threads: {error}"));
+        let pool = threads.map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().map_err(failed));
+        let pool = pool.transpose()?;
+        let opened = within(pool.as_ref(), || backends::open(backend, None))?;
+        Ok(Self { name: name.to_owned(), opened, pool })
+    }
+
+    /// Runs some work where the device's threads are.
+    pub(super) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        within(self.pool.as_ref(), work)
+    }
+
+    /// What its times depend on: the device and its driver.
+    pub(super) fn device(&self) -> String {
+        let info = &self.opened.info;
+        [Some(&info.name), info.driver.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn within<T: Send>(pool: Option<&ThreadPool>, work: impl FnOnce() -> T + Send) -> T {
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
+
+impl Runners {
+    /// Opens the first device of every backend of this build.
+    pub(super) fn open() -> Result<Self, Failure> {
+        let (mut all, mut devices, mut unavailable) = (Vec::new(), Vec::new(), Vec::new());
+        let threads = rayon::current_num_threads();
+        let reference = backends::ALL[0].name();
+        all.push(Runner::new(reference, reference, None)?);
+        let one_thread = format!("{THREADED} on 1 thread");
+        all.push(Runner::new(&one_thread, THREADED, Some(1))?);
+        let all_threads = (threads > 1).then(|| format!("{THREADED} on {threads} threads"));
+        if let Some(name) = &all_threads {
+            all.push(Runner::new(name, THREADED, Some(threads))?);
+        }
+        for name in
+            backends::ALL.iter().map(|backend| backend.name()).filter(|name| ![reference, THREADED].contains(name))
+        {
+            match Runner::new(name, name, None) {
+                Ok(runner) => {
+                    devices.push(runner.name.clone());
+                    all.push(runner);
+                }
+                Err(failure) => unavailable.push(failure.to_string()),
+            }
+        }
+        let lineup = Lineup { reference: reference.to_owned(), one_thread, all_threads, devices };
+        Ok(Self { all, lineup, unavailable })
+    }
+
+    /// The runner of a name.
+    pub(super) fn get(&self, name: &str) -> Option<&Runner> {
+        self.all.iter().find(|runner| runner.name == name)
+    }
+}

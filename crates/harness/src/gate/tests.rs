@@ -1,0 +1,101 @@
+//! From a measurement to a verdict, on an image so small that only what is exact means anything.
+
+use std::{fs, path::Path};
+
+use super::*;
+
+/// The processor's backends on a tiny scene.
+fn gate(args: &GateArgs) -> Gate<'_> {
+    let runners = Runners::open().unwrap();
+    let lineup = guarded::Lineup { devices: Vec::new(), ..runners.lineup.clone() };
+    let problem = Problem { scene: scenes::made_up(0, 12).unwrap(), labels: 12, k: 18 };
+    Gate { args, guarded: guarded::all(&lineup), problem, runners, machine: machine::machine(None) }
+}
+
+fn args(baselines: &Path) -> GateArgs {
+    GateArgs {
+        quick: true,
+        rounds: 10,
+        tolerance: 12.0,
+        tolerance_shared: 20.0,
+        baselines: baselines.to_owned(),
+        update: false,
+        json: false,
+    }
+}
+
+fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
+    let baselines = Baselines::read(&gate.args.baselines, &machine::machine(None)).unwrap();
+    Judgement::new(gate, &baselines, measured).unwrap()
+}
+
+/// Changes a file as a person would.
+fn edit(path: &Path, change: impl FnOnce(&mut serde_json::Value)) {
+    let mut json = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    change(&mut json);
+    fs::write(path, json.to_string()).unwrap();
+}
+
+#[test]
+fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = args(folder.path());
+    let gate = gate(&args);
+    let measured = gate.measure().unwrap();
+    let first = judge(&gate, &measured);
+    assert!(first.failures().is_empty() && page(&first).contains("There is no baseline"), "{}", page(&first));
+
+    let mut baselines = Baselines::read(folder.path(), &machine::machine(None)).unwrap();
+    gate.renew(&mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let same = judge(&gate, &measured);
+    let text = page(&same);
+    assert!(same.failures().is_empty() && !text.contains("There is no baseline"), "{text}");
+    assert!(!text.contains("no baseline |") && text.contains("0 changed, 0 without one"), "{text}");
+
+    let [speed_up, energy] = ["rayon on 1 thread: sweep over bp, total", "sweep: energy"];
+    edit(&baselines.path_here(), |json| json["runs"]["quick"]["speed_ups"][speed_up] = 1e9.into());
+    edit(&baselines.path_anywhere(), |json| json["runs"]["quick"]["facts"][energy] = "7".into());
+    let mut other = judge(&gate, &measured);
+    assert!(other.is_any_worse() && page(&other).contains("WORSE"), "{}", page(&other));
+    other.repeat(&measured);
+    let failures = other.failures();
+    assert!(failures.len() == 2 && failures[0].contains(speed_up) && failures[1].contains(energy), "{failures:?}");
+    assert!(page(&other).contains("measured again") && page(&other).contains("| sweep: energy |"), "{}", page(&other));
+}
+
+#[test]
+fn other_devices_and_other_settings_have_no_baseline() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut args = args(folder.path());
+    let (measured, path) = {
+        let gate = gate(&args);
+        let measured = gate.measure().unwrap();
+        let mut baselines = Baselines::read(folder.path(), &machine::machine(None)).unwrap();
+        gate.renew(&mut baselines, std::slice::from_ref(&measured)).unwrap();
+        (measured, baselines.path_here())
+    };
+    edit(&path, |json| json["devices"]["rayon on 1 thread"] = "another".into());
+    let told = page(&judge(&gate(&args), &measured));
+    assert!(told.lines().filter(|line| line.contains("no baseline |")).all(|line| line.contains("rayon on 1 thread")));
+    assert!(told.contains("no baseline |"), "{told}");
+    args.quick = false;
+    let told = page(&judge(&gate(&args), &measured));
+    assert!(told.contains("There is no baseline") && !told.contains("as before"), "{told}");
+}
+
+#[test]
+fn a_baseline_of_another_processor_or_version_is_not_taken_for_this_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (machine, path) = (machine::machine(None), folder.path().to_owned());
+    let mut baselines = Baselines::read(&path, &machine).unwrap();
+    baselines.here = Some(Baseline::new(Some(&machine), BTreeMap::new()));
+    baselines.write().unwrap();
+    assert!(Baselines::read(&path, &machine).unwrap().here.is_some());
+    edit(&baselines.path_here(), |json| json["cores"] = 1000.into());
+    assert!(Baselines::read(&path, &machine).unwrap().here.is_none());
+    edit(&baselines.path_here(), |json| json["schema_version"] = 99.into());
+    let told = Baselines::read(&path, &machine).unwrap_err().to_string();
+    assert!(told.contains("version 99") && told.contains("--update"), "{told}");
+    let told = Baselines::read(&path.join("none"), &machine).unwrap_err().to_string();
+    assert!(told.contains("none") && told.contains("--baselines"), "{told}");
+}
