@@ -1,8 +1,10 @@
 //! `bp gate`: speed-ups measured in turns and in one process, held against committed baselines; and held against them
-//! exactly, what does not vary.
+//! exactly, what does not vary. `instructions` counts instructions instead of taking times.
 
 mod baseline;
+mod callgrind;
 mod guarded;
+mod instructions;
 mod judge;
 mod measure;
 mod runners;
@@ -15,7 +17,9 @@ use std::collections::BTreeMap;
 
 use crate::{args::GateArgs, failure::Failure, machine, record::Machine, report::format::Spread, scenes};
 use baseline::{Baseline, Baselines, Expected};
+pub(crate) use callgrind::Solve;
 use guarded::Guarded;
+pub(crate) use instructions::instructions;
 pub(crate) use judge::Judgement;
 use measure::{Measured, Problem, measure};
 use runners::Runners;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
 use super::{DataArgs, named, percent, threads};
-use crate::{backends, speed::Problem};
+use crate::{backends, gate::Solve, speed::Problem};
 
 /// `bp reproduce`.
 #[derive(Debug, Args)]
@@ -86,10 +86,16 @@ pub(crate) struct GateArgs {
     /// Folder of the baselines: one file for each kind of machine, and one for all.
     #[arg(long, value_name = "DIR", default_value = "bench-data/gate")]
     pub(crate) baselines: PathBuf,
+    /// Count the instructions of the processor backends' kernels under valgrind, in place of taking times.
+    #[arg(long, conflicts_with_all = ["quick", "rounds", "tolerance", "tolerance_shared"])]
+    pub(crate) instructions: bool,
     /// Measure three times and write new baselines instead of failing.
     #[arg(long)]
     pub(crate) update: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// What valgrind runs: solves this once on one thread.
+    #[arg(long, hide = true, value_name = "SOLVE", value_parser = Solve::parse)]
+    pub(crate) counted: Option<Solve>,
 }

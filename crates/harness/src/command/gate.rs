@@ -1,29 +1,39 @@
-//! `bp gate`: whether speed-ups, accuracy, energy and memory are still what they were.
+//! `bp gate`: whether speed-ups, accuracy, energy, memory and instruction counts are still what they were.
 
 use std::io::Write;
+
+use serde::Serialize;
 
 use super::print_json;
 use crate::{args::GateArgs, failure::Failure, gate, interrupt, tell, threads};
 
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
+    if let Some(solve) = args.counted {
+        return solve.run();
+    }
     interrupt::listen()?;
+    if args.instructions {
+        let judgement = threads::run_on(None, || gate::instructions(args))?;
+        print(args, &judgement, &judgement.page())?;
+        return if args.update { written(&judgement.update()?) } else { conclude(&judgement.failures()) };
+    }
     let judgement = threads::run_on(None, || gate::gate(args))?;
-    if args.json {
-        print_json(&judgement)?;
-    } else {
-        write!(std::io::stdout(), "{}", gate::page(&judgement))?;
-    }
-    if !judgement.written.is_empty() {
-        tell(&format!("written: {}", judgement.written.join(" and ")));
-        return Ok(());
-    }
-    let failures = judgement.failures();
-    match &failures[..] {
-        [] => Ok(()),
-        [first, ..] => {
-            let advice = "if that is meant, `bp gate --update` writes new baselines";
-            Err(Failure::gate(format!("the gate failed in {} places, such as {first}; {advice}", failures.len())))
-        }
-    }
+    print(args, &judgement, &gate::page(&judgement))?;
+    if args.update { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
+}
+
+fn print(args: &GateArgs, judgement: &impl Serialize, page: &str) -> Result<(), Failure> {
+    if args.json { print_json(judgement) } else { Ok(write!(std::io::stdout(), "{page}")?) }
+}
+
+fn written(files: &str) -> Result<(), Failure> {
+    tell(&format!("written: {files}"));
+    Ok(())
+}
+
+fn conclude(failures: &[String]) -> Result<(), Failure> {
+    let Some(first) = failures.first() else { return Ok(()) };
+    let advice = "if that is meant, the same command with --update writes new baselines";
+    Err(Failure::gate(format!("the gate failed in {} places, such as {first}; {advice}", failures.len())))
 }

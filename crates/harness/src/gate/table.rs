@@ -80,7 +80,7 @@ fn figures(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-fn table(columns: &[&str], rows: Vec<Vec<String>>) -> String {
+pub(super) fn table(columns: &[&str], rows: Vec<Vec<String>>) -> String {
     let columns: Vec<_> = columns.iter().map(|&column| column.to_owned()).collect();
     lines(&columns, &rows)
 }

@@ -15,12 +15,14 @@ fn gate(args: &GateArgs) -> Gate<'_> {
 fn args(baselines: &Path) -> GateArgs {
     GateArgs {
         quick: true,
-        rounds: 10,
+        rounds: 3,
         tolerance: 12.0,
         tolerance_shared: 20.0,
         baselines: baselines.to_owned(),
+        instructions: false,
         update: false,
         json: false,
+        counted: None,
     }
 }
 

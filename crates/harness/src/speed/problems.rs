@@ -54,7 +54,7 @@ impl Problem {
     }
 
     /// Its plan for images whose sides are divided by `divisor`, rounded up.
-    pub(super) fn plan(self, divisor: usize) -> Result<Plan, Error> {
+    pub(crate) fn plan(self, divisor: usize) -> Result<Plan, Error> {
         let [width, height] = self.size.map(|side| side.div_ceil(divisor));
         let size = Size { width, height };
         let settings = |loops, schedule| self.algorithm().settings(size, loops, 1, schedule);

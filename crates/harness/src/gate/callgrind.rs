@@ -1,0 +1,284 @@
+//! Instructions that kernels take, counted by valgrind's callgrind: where times vary by percents, these vary by nothing.
+//!
+//! They are no times. A kernel that waits for memory takes no more of them, and one of fewer, slower instructions looks
+//! better than it is. But whoever adds work to a kernel is found out, on any machine and however busy it is.
+//!
+//! Every solve has a process of its own, which valgrind runs on a processor that it makes up. That one has no AVX-512,
+//! so that a count is of another device than the times are, and says which.
+
+use std::{
+    fs,
+    io::Write,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use bp_core::{Error, Image, Matcher, Plan, Size, Stage, StereoPair};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{backends, failure::Failure, interrupt, speed::Problem, threads};
+
+/// What the sides of the problems' images are divided by: valgrind takes some fifty times as long as the processor.
+const DIVISOR: usize = 6;
+
+/// Disparity of all pixels.
+const SHIFT: usize = 20;
+
+/// A stage of less than this part of its solve's instructions is not told: it hardly does anything.
+const TOLD_FROM: f64 = 0.001;
+
+/// What was counted, and with what: counts of other compilers, flags or valgrinds do not compare.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Counts {
+    /// The compiler.
+    pub(crate) rustc: String,
+    /// Its flags.
+    pub(crate) flags: String,
+    /// Name and version of valgrind.
+    pub(crate) valgrind: String,
+    /// One a solve and stage.
+    pub(crate) counts: Vec<Count>,
+}
+
+/// Instructions of a stage.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Count {
+    /// Problem, backend, its device and the stage.
+    pub(crate) name: String,
+    /// How many it took, over all grids.
+    pub(crate) instructions: u64,
+}
+
+impl Counts {
+    /// What counts of the same program depend on, in words.
+    pub(super) fn tools(&self) -> String {
+        format!("{}, {}, {}", self.rustc, self.flags, self.valgrind)
+    }
+
+    /// A count by its name.
+    pub(super) fn get(&self, name: &str) -> Option<u64> {
+        self.counts.iter().find(|count| count.name == name).map(|count| count.instructions)
+    }
+}
+
+/// A problem of `bp speed`, in small, on a backend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Solve {
+    backend: &'static str,
+    problem: Problem,
+}
+
+impl Solve {
+    /// The CPU backends on the update alone and on our two plans.
+    fn all() -> impl Iterator<Item = Self> {
+        let problems = Problem::ALL.into_iter().take(3);
+        problems.flat_map(|problem| ["scalar", "rayon"].map(|backend| Self { backend, problem }))
+    }
+
+    /// Its name in the hidden option.
+    fn name(self) -> String {
+        format!("{}:{}", self.problem.name(), self.backend)
+    }
+
+    /// What the hidden option says.
+    ///
+    /// # Errors
+    /// Where there is no such solve.
+    pub(crate) fn parse(name: &str) -> Result<Self, String> {
+        Self::all().find(|solve| solve.name() == name).ok_or_else(|| "not counted".to_owned())
+    }
+
+    /// Solves it on one thread and prints the device's name: what `bp gate --counted` does, in the process that
+    /// valgrind runs.
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let device = solve(self.backend, self.problem.plan(DIVISOR)?)?;
+        Ok(writeln!(std::io::stdout(), "{device}")?)
+    }
+
+    /// Counts it.
+    fn count(self, program: &Path) -> Result<Vec<Count>, Failure> {
+        let counted = callgrind(program, &["gate", "--counted", &self.name()]).map_err(|e| e.of(&self.name()))?;
+        let whole: u64 = counted.instructions.iter().sum();
+        let told = |count: &Count| count.instructions as f64 >= TOLD_FROM * whole as f64;
+        let (problem, device) = (self.problem.name(), counted.printed.trim_end());
+        let count = |(stage, instructions): (Stage, u64)| Count {
+            name: format!("{problem}, {} on {device}, {}", self.backend, stage.name()),
+            instructions,
+        };
+        Ok(Stage::ALL.into_iter().zip(counted.instructions).map(count).filter(told).collect())
+    }
+}
+
+/// Solves a plan once on one thread; the device's name.
+fn solve(backend: &str, plan: Plan) -> Result<String, Failure> {
+    threads::run_on(Some(1), || {
+        let opened = backends::open(backend, None)?;
+        let pair = pair(plan.image_size())?;
+        Matcher::new(opened.device.as_ref(), plan)?.solve(&pair)?;
+        Ok(opened.info.name)
+    })
+}
+
+/// Noise, seen from two places: valgrind would take longer to render a scene than for all kernels.
+fn pair(size: Size) -> Result<StereoPair, Error> {
+    let mut random = fastrand::Rng::with_seed(1);
+    let noise: Vec<u8> = std::iter::repeat_with(|| random.u8(..)).take(size.pixels() + SHIFT).collect();
+    let view = |from: usize| Image::from_grey(size.width, size.height, &noise[from..][..size.pixels()]);
+    StereoPair::new(view(0)?, view(SHIFT)?)
+}
+
+/// Name and version of valgrind; `None` where there is none.
+pub(crate) fn valgrind() -> Option<String> {
+    let output = Command::new("valgrind").arg("--version").stdin(Stdio::null()).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+}
+
+/// Counts all solves with this valgrind, several at once: they do not disturb one another.
+pub(crate) fn count(valgrind: String) -> Result<Counts, Failure> {
+    let failed = |error| Failure::other(format!("cannot find this program's own file: {error}"));
+    let program = std::env::current_exe().map_err(failed)?;
+    let solves: Vec<_> = Solve::all().collect();
+    let counts = solves.par_iter().map(|solve| solve.count(&program)).collect::<Result<Vec<_>, _>>()?.concat();
+    Ok(Counts { rustc: env!("BP_RUSTC").to_owned(), flags: env!("BP_FLAGS").to_owned(), valgrind, counts })
+}
+
+/// A program that ran under callgrind.
+struct Counted {
+    /// Its standard output.
+    printed: String,
+    /// Instructions of the solver's kernels and of all that they call, in the order of [`Stage::ALL`].
+    instructions: [u64; Stage::ALL.len()],
+}
+
+/// Runs a program that solves something.
+fn callgrind(program: &Path, arguments: &[&str]) -> Result<Counted, Failure> {
+    let failed = |what: &dyn std::fmt::Display| Failure::other(format!("valgrind: {what}"));
+    let folder = tempfile::tempdir().map_err(|e| failed(&format!("no temporary folder: {e}")))?;
+    // Its own settings, for profiles that are plain to read, and none of the user's.
+    let options = "--command-line-only=yes --quiet --tool=callgrind --callgrind-out-file=profile --demangle=no \
+        --compress-strings=no --compress-pos=no";
+    let mut command = Command::new("valgrind");
+    command.args(options.split_whitespace()).arg(program).args(arguments);
+    let output = command.current_dir(&folder).stdin(Stdio::null()).output().map_err(|e| failed(&e))?;
+    if !output.status.success() {
+        interrupt::check()?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(&format!("{}: {}", output.status, said.trim_end())));
+    }
+    let profile = fs::read_to_string(folder.path().join("profile")).map_err(|e| failed(&format!("profile: {e}")))?;
+    let instructions = of_stages(&profile);
+    if instructions[Stage::UpdateMessages as usize] == 0 {
+        return Err(failed(&"its profile does not name the kernels; a stripped program cannot be counted"));
+    }
+    Ok(Counted { printed: String::from_utf8_lossy(&output.stdout).into_owned(), instructions })
+}
+
+/// Instructions of the kernels in a profile. There, `cfn=` names a function that is called, and the line after `calls=`
+/// ends with what those calls took, all included.
+fn of_stages(profile: &str) -> [u64; Stage::ALL.len()] {
+    let mut sums = [0; Stage::ALL.len()];
+    let (mut called, mut lines) = (None, profile.lines());
+    while let Some(line) = lines.next() {
+        if let Some(symbol) = line.strip_prefix("cfn=") {
+            called = stage(symbol);
+        } else if line.starts_with("calls=") {
+            let cost = lines.next().and_then(|line| line.split_whitespace().last()?.parse::<u64>().ok());
+            if let (Some(stage), Some(cost)) = (called, cost) {
+                sums[stage as usize] += cost;
+            }
+        }
+    }
+    sums
+}
+
+/// The kernel that a symbol is of, as the trait `Solver` names it: not what it calls, be it of the same name. Either way
+/// of mangling names a function by its length and name, and ends there but for a hash.
+fn stage(symbol: &str) -> Option<Stage> {
+    let (symbol, _) = symbol.split_once(".llvm.").unwrap_or((symbol, ""));
+    let ends = |name: &str| match symbol.rsplit_once(name) {
+        Some((path, hash)) => path.contains("Solver") && (hash.is_empty() || hash.starts_with("17h")),
+        None => false,
+    };
+    Stage::ALL.into_iter().find(|stage| ends(&format!("{}{}", stage.name().len(), stage.name())))
+}
+
+#[cfg(test)]
+mod tests {
+    use bp_core::{Algorithm, Model, Profile, Schedule, Settings};
+
+    use super::*;
+
+    #[test]
+    fn symbols_of_both_manglings_are_understood() {
+        let scalar = "_RNvXs_NtCsabc_13bp_cpu_scalar6solverNtB4_12ScalarSolverNtNtCs1_7bp_core7backend6Solver";
+        let rayon = "_ZN87_$LT$bp_cpu_rayon..solver..RayonSolver$u20$as$u20$bp_core..backend..Solver$GT$";
+        for (symbol, expected) in [
+            (format!("{scalar}15update_messages"), Some(Stage::UpdateMessages)),
+            (format!("{scalar}6refine.llvm.123"), Some(Stage::Refine)),
+            (format!("{rayon}7coarsen17h0123456789abcdefE"), Some(Stage::Coarsen)),
+            (format!("{rayon}10match_cost17h0123456789abcdefE"), Some(Stage::MatchCost)),
+            (format!("{rayon}13read_messages17h0123456789abcdefE"), None),
+            (format!("{rayon}15update_messages28_$u7b$$u7b$closure$u7d$$u7d$17h0123456789abcdefE"), None),
+            ("_ZN13bp_cpu_scalar15update_messages15update_messages17h0123456789abcdefE".to_owned(), None),
+        ] {
+            assert_eq!(stage(&symbol), expected, "{symbol}");
+        }
+    }
+
+    #[test]
+    fn calls_are_added_up_with_all_that_they_include() {
+        let kernel = |name: &str| format!("cfn=_RNvXs_6solverNtB4_12ScalarSolverNtNtCs1_7bp_core7backend6Solver{name}");
+        let (update, refine) = (kernel("15update_messages"), kernel("6refine"));
+        let profile = format!(
+            "events: Ir\nfn=driver\n0 7\n{update}\ncalls=2 0 \n0 1000\n{refine}\ncalls=1 0 \n0 30\ncfn=other\n\
+            calls=9 0\n0 5\n\nfn=closure\n0 1\n{update}\ncalls=1 0 \n0 500\n"
+        );
+        assert_eq!(of_stages(&profile), [0, 0, 30, 1500, 0]);
+        assert_eq!(of_stages("calls=1 0"), [0; 5]);
+    }
+
+    #[test]
+    fn names_lead_back_to_solves() {
+        assert_eq!(Solve::all().count(), 6);
+        assert!(Solve::all().all(|solve| Solve::parse(&solve.name()) == Ok(solve)));
+        assert!(Solve::parse("sweep:vulkan").is_err());
+    }
+
+    fn solve_loops(loops: u32) {
+        let size = Size { width: 60, height: 40 };
+        let settings = Settings { steps: loops, ..Algorithm::Bp.settings(size, 1, 1, Schedule::Sync) };
+        solve("rayon", Plan::new(size, Model::new(Profile::Thesis, 16).unwrap(), settings).unwrap()).unwrap();
+    }
+
+    #[test]
+    #[ignore = "what the next test counts"]
+    fn five_loops() {
+        solve_loops(5);
+    }
+
+    #[test]
+    #[ignore = "what the next test counts"]
+    fn ten_loops() {
+        solve_loops(10);
+    }
+
+    #[test]
+    fn counts_do_not_vary_and_grow_with_the_work() {
+        if valgrind().is_none() {
+            return eprintln!("skipped: no valgrind");
+        }
+        let program = std::env::current_exe().unwrap();
+        let count = |test: &str| {
+            let test = format!("gate::callgrind::tests::{test}");
+            callgrind(&program, &["--ignored", "--exact", &test]).unwrap().instructions
+        };
+        let [five, again, ten] = ["five_loops", "five_loops", "ten_loops"].map(count);
+        assert_eq!(five, again);
+        let update = Stage::UpdateMessages as usize;
+        let ratio = ten[update] as f64 / five[update] as f64;
+        assert!((1.9..2.1).contains(&ratio), "{five:?} {ten:?}");
+        assert_eq!(five[Stage::MatchCost as usize], ten[Stage::MatchCost as usize]);
+    }
+}

@@ -1,0 +1,124 @@
+//! `bp gate --instructions`: counts beside those that were recorded.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{callgrind, callgrind::Counts, table::table};
+use crate::{
+    args::GateArgs,
+    failure::Failure,
+    files::{create_folder, write_text},
+    report::format::whole,
+};
+
+/// Version of the file; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
+
+/// Name of the file.
+const FILE: &str = "instructions.json";
+
+/// A count may differ by this fraction. The same program takes the same instructions; what is built anew from the same
+/// sources may differ by a few.
+const TOLERANCE: f64 = 0.01;
+
+/// The counts of one compiler and valgrind.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Recorded {
+    schema_version: u32,
+    counts: Counts,
+}
+
+/// What was counted, judged.
+#[derive(Serialize)]
+pub(crate) struct CountJudgement {
+    #[serde(skip)]
+    baselines: PathBuf,
+    counts: Counts,
+    /// Counts of the same tools; none where there are none, or of others only.
+    recorded: Option<Counts>,
+    /// Why none is compared.
+    unlike: Option<String>,
+}
+
+/// Counts, and holds against the file what is comparable.
+pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
+    let missing = "--instructions needs valgrind; install it, or leave the option out";
+    let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
+    let recorded = read(&args.baselines.join(FILE))?;
+    let counts = callgrind::count(valgrind)?;
+    let unlike = match &recorded {
+        None => Some(format!("there is no {}", args.baselines.join(FILE).display())),
+        Some(recorded) if recorded.tools() != counts.tools() => Some(format!("it is of {}", recorded.tools())),
+        Some(_) => None,
+    };
+    let recorded = recorded.filter(|_| unlike.is_none());
+    Ok(CountJudgement { baselines: args.baselines.clone(), counts, recorded, unlike })
+}
+
+/// Reads the file, where it is there.
+fn read(path: &Path) -> Result<Option<Counts>, Failure> {
+    let text = match fs::read_to_string(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(|error| Failure::reading(path, &error))?,
+    };
+    let recorded: Recorded = serde_json::from_str(&text).map_err(|error| Failure::reading(path, &error))?;
+    if recorded.schema_version != SCHEMA_VERSION {
+        let what = format!("version {} of counts, this program has {SCHEMA_VERSION}", recorded.schema_version);
+        return Err(Failure::reading(path, &format!("{what}; make it anew by --instructions --update")));
+    }
+    Ok(Some(recorded.counts))
+}
+
+impl CountJudgement {
+    /// Each count with its name, what it was, and by what fraction it is more.
+    fn rows(&self) -> impl Iterator<Item = (&str, u64, Option<(u64, f64)>)> {
+        self.counts.counts.iter().map(|count| {
+            let before = self.recorded.as_ref().and_then(|recorded| recorded.get(&count.name));
+            let more = before.map(|before| (before, count.instructions as f64 / before as f64 - 1.0));
+            (count.name.as_str(), count.instructions, more)
+        })
+    }
+
+    /// Counts that grew beyond the tolerance, in words.
+    pub(crate) fn failures(&self) -> Vec<String> {
+        let grown = self.rows().filter_map(|(name, now, before)| {
+            let (before, more) = before.filter(|&(_, more)| more > TOLERANCE)?;
+            let percent = 100.0 * more;
+            Some(format!("{name}: {} instructions, was {} (+{percent:.1} %)", whole(now), whole(before)))
+        });
+        grown.collect()
+    }
+
+    /// The page.
+    pub(crate) fn page(&self) -> String {
+        let mut text = format!("# Instructions\n\n* Counted by {}.\n", self.counts.tools());
+        if let Some(unlike) = &self.unlike {
+            let advice = "`bp gate --instructions --update` writes one";
+            let _ = writeln!(text, "* Nothing to compare with: {unlike}; {advice}.");
+        }
+        let rows = self.rows().map(|(name, now, before)| {
+            let before_text = before.map_or_else(|| "-".to_owned(), |(before, _)| whole(before));
+            let more = before.map_or_else(|| "-".to_owned(), |(_, more)| format!("{:+.2} %", 100.0 * more));
+            vec![name.to_owned(), whole(now), before_text, more]
+        });
+        let columns = ["solve and kernel", "instructions", "baseline", "difference"];
+        let _ = write!(text, "\nMore than {} % more fails.\n\n{}", 100.0 * TOLERANCE, table(&columns, rows.collect()));
+        text
+    }
+
+    /// Writes the counts as the new baseline; the file's name.
+    pub(crate) fn update(&self) -> Result<String, Failure> {
+        let path = self.baselines.join(FILE);
+        create_folder(&self.baselines)?;
+        let recorded = Recorded { schema_version: SCHEMA_VERSION, counts: self.counts.clone() };
+        let json = serde_json::to_string_pretty(&recorded).map_err(|error| Failure::writing(&path, &error))?;
+        write_text(&path, &(json + "\n"))?;
+        Ok(path.display().to_string())
+    }
+}
