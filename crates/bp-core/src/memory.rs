@@ -1,4 +1,6 @@
-//! Allocation that fails with an error instead of ending the program.
+//! Allocation that fails with an error instead of ending the program, and how fast memory is copied.
+
+use std::{hint::black_box, time::Instant};
 
 use crate::Error;
 
@@ -18,4 +20,29 @@ pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<
 #[must_use]
 pub fn bytes<T>(values: &Vec<T>) -> u64 {
     (values.capacity() * size_of::<T>()) as u64
+}
+
+/// Bytes copied at a time: more than any cache holds.
+const COPIED: usize = 256 << 20;
+
+/// Copies of which the median is taken, after one that is not timed.
+const COPIES: usize = 9;
+
+/// Bytes a second, read and written ones together, at which `copy` copies one buffer in main memory to another: what
+/// [`crate::Device::copy_rate`] is for a processor.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn copy_rate(copy: impl Fn(&[u8], &mut [u8])) -> Result<f64, Error> {
+    let from = filled("a buffer to copy", COPIED, 1)?;
+    let mut to = filled("its copy", COPIED, 0)?;
+    let mut time = || {
+        let start = Instant::now();
+        copy(black_box(&from), black_box(&mut to));
+        start.elapsed()
+    };
+    time();
+    let mut times = [(); COPIES].map(|()| time());
+    times.sort_unstable();
+    Ok(2.0 * COPIED as f64 / times[COPIES / 2].as_secs_f64().max(f64::MIN_POSITIVE))
 }

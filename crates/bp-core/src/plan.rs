@@ -1,5 +1,7 @@
 //! One plan for every algorithm: what is run, and what it will cost in work and memory, known before anything runs.
 
+mod traffic;
+
 use crate::{BAND_ROWS, Error, MessageStart, Model, Profile, Schedule, Settings, Side, Size};
 
 /// Most grids of a plan: the longest side allowed, [`crate::image::MAX_SIDE`], halves to 1 in as many.

@@ -24,8 +24,9 @@ mod sweep;
 mod update_messages;
 mod wavefront;
 
-use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver, memory};
 use fearless_simd::Level;
+use rayon::prelude::*;
 
 /// The backend.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,5 +93,14 @@ impl Device for RayonDevice {
 
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         solver::planned_bytes(plan)
+    }
+
+    fn copy_rate(&self) -> Result<Option<f64>, Error> {
+        let threads = rayon::current_num_threads();
+        let copy = |from: &[u8], to: &mut [u8]| {
+            let part = from.len().div_ceil(threads);
+            to.par_chunks_mut(part).zip(from.par_chunks(part)).for_each(|(to, from)| to.copy_from_slice(from));
+        };
+        memory::copy_rate(copy).map(Some)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, StereoPair, memory};
+use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, memory};
 use fearless_simd::Level;
 
 use crate::{
@@ -292,6 +292,13 @@ impl Solver for RayonSolver {
             Schedule::Sweep => u32::MAX,
             Schedule::Sync | Schedule::Checkerboard => steps_at_a_time(&self.layouts[0]) as u32,
         }
+    }
+
+    /// Refining is part of updating: the first step on a grid reads the coarser grid's messages in place of its own, which
+    /// over all grids leaves out one step's messages of the finest.
+    fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        let [match_cost, coarsen, _, update_messages, select_labels] = self.plan.moved_bytes()?;
+        Some([match_cost, coarsen, 0, update_messages - self.plan.updates_per_step(0), select_labels])
     }
 
     fn allocated_bytes(&self) -> u64 {

@@ -16,7 +16,7 @@ mod sums;
 mod sweep;
 mod update_messages;
 
-use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver, memory};
 
 /// The backend, and its one device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,5 +52,9 @@ impl Device for Scalar {
         let sweep = plan.settings().schedule == Schedule::Sweep;
         let messages = plan.buffers().into_iter().filter(|buffer| sweep && buffer.name == "messages");
         messages.fold(plan.bytes(), |bytes, buffer| bytes.saturating_add(buffer.bytes))
+    }
+
+    fn copy_rate(&self) -> Result<Option<f64>, Error> {
+        memory::copy_rate(|from, to| to.copy_from_slice(from)).map(Some)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{DataCost, Error, Plan, Seed, Side, Solver, StereoPair, memory};
+use bp_core::{DataCost, Error, Plan, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
     coarsen::coarsen, costs::Costs, match_cost::match_cost, messages::Messages, refine::refine,
@@ -75,6 +75,10 @@ impl Solver for ScalarSolver {
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         messages.copy_from_slice(self.messages[0].all_received(side));
         Ok(())
+    }
+
+    fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        self.plan.moved_bytes()
     }
 
     fn allocated_bytes(&self) -> u64 {

@@ -23,7 +23,7 @@ pub(crate) use export::export;
 pub(crate) use gate::gate;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
-pub(crate) use speed::speed;
+pub(crate) use speed::{check_speed, speed, write_speed};
 
 use crate::failure::Failure;
 

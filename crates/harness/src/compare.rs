@@ -1,10 +1,12 @@
 //! Several records beside one another: what `bp compare` prints.
 
+mod speed_ups;
 mod tables;
 
 use std::{collections::HashMap, path::Path};
 
 use serde::Serialize;
+use speed_ups::SpeedUps;
 pub(crate) use tables::page;
 
 use crate::{
@@ -23,6 +25,7 @@ pub(crate) struct Comparison<'a> {
     scenes: Vec<&'a str>,
     records: Vec<Source<'a>>,
     rows: Vec<Row<'a>>,
+    speed_ups: SpeedUps<'a>,
     /// How the numbers are to be read.
     note: &'static str,
 }
@@ -103,30 +106,21 @@ impl<'a> Comparison<'a> {
         let Some(((first_path, first), others)) = records.split_first() else {
             return Err(Failure::usage("no record to compare"));
         };
-        check_full(first_path, first)?;
-        others.iter().try_for_each(|(path, record)| {
-            check_full(path, record)?;
-            check_same(path, record, first_path, first)
-        })?;
+        others.iter().try_for_each(|(path, record)| check_same(path, record, first_path, first))?;
+        let scenes: Vec<_> = first.scenes.iter().map(|scene| scene.name.as_str()).collect();
+        let rows = rows(records);
+        let all: Vec<_> = records.iter().map(|(_, record)| record).collect();
         Ok(Self {
             data: &first.run.data,
             labels: first.run.labels,
             k: first.run.k,
-            scenes: first.scenes.iter().map(|scene| scene.name.as_str()).collect(),
             records: records.iter().map(|(path, record)| Source::new(path, record)).collect(),
-            rows: rows(records),
+            speed_ups: SpeedUps::new(&all, &rows, &scenes),
+            scenes,
+            rows,
             note: NOTE,
         })
     }
-}
-
-/// A quick run's times are of small images, and too few to stand in a table.
-fn check_full(path: &Path, record: &Record) -> Result<(), Failure> {
-    if !record.run.quick {
-        return Ok(());
-    }
-    let how = "a quick run, whose times are not to be compared; run `bp reproduce` without --quick";
-    Err(Failure::reading(path, &how))
 }
 
 /// Fails where numbers of two records would stand in one table without being of the same problem.
@@ -137,6 +131,10 @@ fn check_same(path: &Path, record: &Record, first_path: &Path, first: &Record) -
         let why = format!("{what} {here}, but {there} in {first}; compare records of the same images, L and k");
         Err(Failure::reading(path, &why))
     };
+    if run.quick != other.quick {
+        let kind = |quick| if quick { "a quick run (--quick)" } else { "a full one" }.to_owned();
+        return differs("it is", kind(run.quick), kind(other.quick));
+    }
     if run.data != other.data {
         return differs("its data set is", run.data.clone(), other.data.clone());
     }

@@ -2,10 +2,12 @@
 //!
 //! `command` holds one file a command, `reproduce` runs the thesis's experiments and records them, `report` makes
 //! tables, charts and pages from records, `compare` and `export` set several beside one another and hand one to other
-//! programs, `gate` holds speed-ups against committed baselines. `backends` is the only file that lists backends.
+//! programs, `gate` holds speed-ups against committed baselines. `bench` is what `cargo bench` runs. `backends` is the
+//! only file that lists backends.
 
 mod args;
 mod backends;
+pub mod bench;
 mod command;
 mod compare;
 mod export;

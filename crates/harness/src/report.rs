@@ -16,6 +16,7 @@ use std::path::Path;
 
 pub(crate) use escape::{markdown as markdown_escaped, printable};
 pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
+pub(crate) use tables::of_times as table_of_times;
 
 use crate::{
     args::ReportArgs,

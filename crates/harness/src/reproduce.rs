@@ -5,13 +5,16 @@ pub(crate) mod plans;
 mod run;
 mod storage;
 
+pub(crate) use plans::all as plans;
 pub use run::ONE_SAMPLE_ABOVE_MS;
+pub(crate) use run::run;
+pub(crate) use storage::{Storage, begin};
 
 use std::{ops::ControlFlow, path::Path};
 
 use crate::{
     args::ReproduceArgs,
-    backends,
+    backends::{self, Asked},
     failure::Failure,
     interrupt, machine,
     record::{Cell, Labelling, Outcome, Record, Run},
@@ -48,20 +51,13 @@ fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     let mut devices = backends::open_all(&args.backend)?;
     let opened: Vec<_> = devices.iter().filter_map(|asked| asked.device.as_ref().ok()).collect();
     threads::check(args.threads, &opened)?;
-    let settings = Run {
-        data: source.set.name.to_owned(),
-        quick: args.quick,
-        labels: source.set.labels,
-        k: if args.quick { QUICK_LOOPS } else { source.set.labels as u32 },
-        samples: args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES }),
-        backends: devices.iter().map(|asked| asked.name.clone()).collect(),
-        threads: Some(rayon::current_num_threads()),
-    };
+    let samples = args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES });
+    let settings = settings(&source, &devices, args.quick, samples);
     tell(&format!("scenes: {}", source.set.described));
     source.check()?;
     let machine = machine::machine(args.machine.as_deref());
     let mut storage = storage::open(&args.results, machine, settings)?;
-    let outcome = run::run(&source, &mut devices, &mut storage);
+    let outcome = run(&source, &mut devices, &mut storage, &|_| true);
     if outcome.as_ref().is_err_and(Failure::is_interrupted) {
         tell(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
     }
@@ -71,8 +67,21 @@ fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     check_cells(storage.record(), late)
 }
 
+/// What a run on these scenes and devices asks for.
+pub(crate) fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
+    Run {
+        data: source.set.name.to_owned(),
+        quick,
+        labels: source.set.labels,
+        k: if quick { QUICK_LOOPS } else { source.set.labels as u32 },
+        samples,
+        backends: devices.iter().map(|asked| asked.name.clone()).collect(),
+        threads: Some(rayon::current_num_threads()),
+    }
+}
+
 /// Fails where a cell failed, be it `late`, after samples that are kept, or where none could be run at all.
-fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
+pub(crate) fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
     let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
     let failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
         Outcome::Error(error) => Some(format!("{}: {error}", such_as(cell))),

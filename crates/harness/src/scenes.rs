@@ -103,6 +103,11 @@ impl Source {
         self.folder.as_deref()
     }
 
+    /// The names of the six scenes, in order.
+    pub(crate) fn names(&self) -> [&'static str; 6] {
+        if self.folder.is_some() { THESIS_SCENES } else { synthetic::NAMES }
+    }
+
     /// Fails where a file of the six scenes is missing or not the one listed; for telling so before a run begins.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };

@@ -31,7 +31,12 @@ pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
         files.write(&speed, &page)?;
     }
     write!(std::io::stdout(), "{page}")?;
-    check(&speed)
+    check_speed(&speed)
+}
+
+/// Writes the page and the record to a folder that holds neither yet.
+pub(crate) fn write_speed(folder: &Path, speed: &Speed) -> Result<(), Failure> {
+    Files::new(folder)?.write(speed, &speed::page(speed))
 }
 
 /// What is written, both new.
@@ -67,7 +72,7 @@ impl Files {
 }
 
 /// Fails where a device failed, or where none could run anything.
-fn check(speed: &Speed) -> Result<(), Failure> {
+pub(crate) fn check_speed(speed: &Speed) -> Result<(), Failure> {
     let entries =
         || speed.contests.iter().flat_map(|contest| contest.entries.iter().map(move |entry| (contest, entry)));
     let mut failed = entries().filter_map(|(contest, entry)| match &entry.outcome {

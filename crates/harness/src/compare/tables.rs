@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Comparison, Means, Row, Source, Time, Value};
+use super::{Comparison, Means, Row, Source, Time, Value, speed_ups};
 use crate::{
     report::{
         device_fact,
@@ -26,6 +26,7 @@ pub(crate) fn page(comparison: &Comparison<'_>) -> String {
     text += "\n## Errors and energy\n\nMeans over the scenes. Labels are held against those of the first column, or \
              row, that has the plan: all backends and commits should give the same.\n\n";
     text += &results(comparison);
+    text += &speed_ups::section(&comparison.speed_ups);
     text += &alone(comparison);
     text
 }

@@ -68,17 +68,25 @@ pub(super) const CTCSBP: [Named; 3] = [
     Named { plan: "ctcsbp-z4", title: "CTCSBP, Z''''=4", printed: Some("ctcsbp") },
 ];
 
+/// The tables of one algorithm: its plans, and the numbers of its speed, memory and reliability.
+const SINGLE: [(&[Named], [&str; 3]); 5] = [
+    (&[BP], ["3.3", "3.4", "3.5"]),
+    (&[CFBP], ["3.6", "3.7", "3.8"]),
+    (&[CFCSBP], ["3.9", "3.10", "3.11"]),
+    (&[CTBP], ["3.12", "3.13", "3.14"]),
+    (&CTCSBP, ["3.15", "3.16", "3.17"]),
+];
+
+/// The table that the times of a plan stand in: its number, and what is measured there.
+pub(crate) fn of_times(plan: &str) -> (&'static str, &'static str) {
+    let single = SINGLE.iter().find(|(plans, _)| plans.iter().any(|named| named.plan == plan));
+    single.map_or((ours::PROFILES, "ours"), |&(plans, [speed, ..])| (speed, family(plans)))
+}
+
 /// All tables, in order.
 pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
     let mut tables = vec![setting::computer(results), setting::images(results)];
-    let single: [(&[Named], [&str; 3]); 5] = [
-        (&[BP], ["3.3", "3.4", "3.5"]),
-        (&[CFBP], ["3.6", "3.7", "3.8"]),
-        (&[CFCSBP], ["3.9", "3.10", "3.11"]),
-        (&[CTBP], ["3.12", "3.13", "3.14"]),
-        (&CTCSBP, ["3.15", "3.16", "3.17"]),
-    ];
-    for (plans, [speed, memory, reliability]) in single {
+    for (plans, [speed, memory, reliability]) in SINGLE {
         tables.push(measured::speed(results, speed, plans));
         tables.push(measured::memory(results, memory, plans));
         tables.push(measured::reliability(results, reliability, plans));

@@ -27,16 +27,22 @@ pub const ONE_SAMPLE_ABOVE_MS: f64 = 5000.0;
 /// Nanoseconds a message entry, to guess before the first sample which cells will get others.
 const GUESSED_NS: f64 = 2.5;
 
-/// Runs all cells that the record does not hold yet, on these devices. What failed after other samples of its cell, which
-/// are kept, is returned: no outcome tells it.
-pub(crate) fn run(source: &Source, devices: &mut [Asked], storage: &mut Storage) -> Result<Vec<String>, Failure> {
+/// Runs all cells that the record does not hold yet, on these devices and the scenes that are asked for. What failed
+/// after other samples of its cell, which are kept, is returned: no outcome tells it.
+pub(crate) fn run(
+    source: &Source,
+    devices: &mut [Asked],
+    storage: &mut Storage,
+    is_asked: &dyn Fn(&str) -> bool,
+) -> Result<Vec<String>, Failure> {
     let bar = ProgressBar::new(1);
+    bar.message("loading the scenes".to_owned());
+    let mut scenes = (0..source.names().len()).map(|index| source.load(index)).collect::<Result<Vec<_>, _>>()?;
+    scenes.iter().try_for_each(|scene| add_scene(storage, scene, devices))?;
+    scenes.retain(|scene| is_asked(&scene.record.name));
     let mut failed = Vec::new();
-    for index in 0..crate::scenes::THESIS_SCENES.len() {
-        bar.message(format!("scene {} of 6", index + 1));
-        let scene = source.load(index)?;
-        add_scene(storage, &scene, devices)?;
-        bar.set_total(work(storage.record(), index));
+    for scene in scenes {
+        bar.set_total(work(storage.record(), is_asked));
         bar.resume_at(done(storage.record()));
         for round in 0..storage.record().run.samples {
             for planned in plans::all() {
@@ -53,7 +59,8 @@ pub(crate) fn run(source: &Source, devices: &mut [Asked], storage: &mut Storage)
         storage.record_mut().labellings = energies::compare(folder, &mut |_| bar.update(done))?;
     }
     bar.finish();
-    storage.record_mut().complete = true;
+    let record = storage.record_mut();
+    record.complete = record.cells.iter().all(|cell| cell.outcome != Outcome::Pending);
     storage.save()?;
     Ok(failed)
 }
@@ -236,9 +243,8 @@ fn done(record: &Record) -> u64 {
     record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum()
 }
 
-/// Message entries of the whole run, as far as can be told once the scenes up to `index` are known: those to come are
-/// taken to be like these.
-fn work(record: &Record, index: usize) -> u64 {
+/// Message entries of the whole run, as far as can be told: cells to come are taken to be as fast as guessed.
+fn work(record: &Record, is_asked: &dyn Fn(&str) -> bool) -> u64 {
     let samples = |cell: &Cell| {
         let first = cell.measured().and_then(|measurement| measurement.samples.first());
         let guess = cell.settings.message_updates as f64 * GUESSED_NS / 1e6;
@@ -249,8 +255,8 @@ fn work(record: &Record, index: usize) -> u64 {
             _ => u64::from(record.run.samples),
         }
     };
-    let known: u64 = record.cells.iter().map(|cell| samples(cell) * cell.settings.message_updates).sum();
-    known * 6 / (index as u64 + 1)
+    let asked = record.cells.iter().filter(|cell| is_asked(&cell.scene));
+    asked.map(|cell| samples(cell) * cell.settings.message_updates).sum()
 }
 
 #[cfg(test)]

@@ -50,7 +50,8 @@ fn is_unfinished(folder: &Path, record: &Record) -> bool {
     !record.complete || !folder.join(PAGE_FILE).exists()
 }
 
-fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
+/// Begins a run.
+pub(crate) fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let folder = new_folder(results, &machine, &run)?;
     let lock = lock(&folder)?.ok_or_else(|| Failure::writing(&folder, &"another process took it"))?;
     let now = Timestamp::now().to_string();

@@ -141,6 +141,12 @@ impl StageBytes {
 }
 
 impl Contestant {
+    /// Whether its stages are timed: a processor's take as long as their calls, of a GPU only its own clock tells.
+    pub(crate) fn times_stages(&self, samples: &[Sample]) -> bool {
+        let waits = self.device.as_ref().is_some_and(|device| device.api.is_none());
+        waits || samples.iter().all(|sample| sample.device_stages().is_some())
+    }
+
     /// Its name; what is no GPU says so wherever its times may stand.
     pub(crate) fn label(&self) -> String {
         let software = self.device.as_ref().is_some_and(|device| device.software_rasteriser);

@@ -183,8 +183,8 @@ fn ratio(measured: &Measurement, base: &Measurement, ms: impl Fn(&Sample) -> f64
 /// A table of stages for every problem.
 fn stages(speed: &Speed) -> String {
     let mut text = "## Stages\n\nGB/s are the bytes that a stage has to read and write at least, each value of a step \
-                    counted once, over its time; caches may serve some of them. They stand beside the rate at which \
-                    the device copies its memory.\n\n"
+                    counted once, over its time. They stand beside the rate at which the device copies its memory: \
+                    more than that says that some stayed in caches.\n\n"
         .to_owned();
     let columns = ["backend", "stage", "clock", "ms", "GB/s", "% of copying"];
     for contest in &speed.contests {
@@ -200,8 +200,8 @@ fn stages_of(speed: &Speed, entry: &Entry) -> Vec<Vec<String>> {
     let contestant = speed.contestants.iter().find(|contestant| contestant.name == entry.contestant);
     let copying = contestant.and_then(|contestant| contestant.copy_gb_per_s);
     let has_clock = measured.samples.iter().all(|sample| sample.device_ms().is_some());
-    // Without its clock the times of a device's stages are those of asking for them.
-    let bytes = measured.moved_bytes.as_ref().filter(|_| has_clock);
+    let is_timed = contestant.is_some_and(|contestant| contestant.times_stages(&measured.samples));
+    let bytes = measured.moved_bytes.as_ref().filter(|_| is_timed);
     let row = |stage: Stage| {
         let index = stage as usize;
         let ms = Spread::of(measured.samples.iter().map(|sample| sample.stages_ms()[index]))?;

@@ -112,6 +112,36 @@ fn a_slower_record_with_other_labels_is_told() {
     assert!(words.iter().all(|word| page.contains(word)) && !page.contains('\u{1b}'), "{page}");
 }
 
+/// A record agrees with itself; one whose BP took twice as long has other speed-ups throughout, but not of one plan that
+/// took twice as long too.
+#[test]
+fn speed_ups_of_two_records_are_counted_where_they_overlap() {
+    let folder = Folder::new();
+    let rayon = run(RAYON);
+    changed(&folder, RAYON, "same.json", |_| ());
+    changed(&folder, RAYON, "slow.json", |record| {
+        let cells = record["cells"].as_array_mut().unwrap().iter_mut();
+        for cell in cells.filter(|cell| cell["plan"] == "bp" || cell["plan"] == "ctbp") {
+            for sample in cell["outcome"]["measured"]["samples"].as_array_mut().unwrap() {
+                sample["total_ms"] = json!(2.0 * sample["total_ms"].as_f64().unwrap());
+            }
+        }
+    });
+    let report = folder.json(&format!("compare {rayon} same.json slow.json --json"));
+    let speed_ups = &report["speed_ups"];
+    let intervals = 2 * 9 * 6;
+    let agreement = |overlapping: usize| json!({ "intervals": intervals, "overlapping": overlapping });
+    assert_eq!(speed_ups["agreement"], json!([agreement(intervals), agreement(intervals - 8 * 6)]));
+    assert_eq!(speed_ups["rows"].as_array().unwrap().len(), 9 * 6);
+    let ratio = |record: usize| speed_ups["rows"][0]["total"][record]["median"].as_f64().unwrap();
+    assert!((ratio(2) / ratio(0) - 2.0).abs() < 1e-9, "{speed_ups}");
+    let page = text(&folder.run(&format!("compare {rayon} same.json slow.json")).stdout);
+    for words in ["* Record 2: 108 of 108 intervals (100.0 %) overlap", "* Record 3: 60 of 108", "message passing only"]
+    {
+        assert!(page.contains(words), "{page}");
+    }
+}
+
 #[test]
 fn records_of_other_problems_are_refused_side_by_side() {
     let folder = Folder::new();

@@ -6,6 +6,9 @@ use crate::report::{
     results::{Part, Results, Row},
 };
 
+/// Number of the table of means, the only one with times of plans that the thesis has not.
+pub(super) const PROFILES: &str = "A.1";
+
 /// Our plan with census costs.
 pub(in crate::report) const CENSUS: Named =
     Named { plan: "census", title: "ours: census cost, 5 grids x 2 loops", printed: None };
@@ -45,7 +48,7 @@ pub(super) fn profiles(results: &Results<'_>) -> Table {
                 difference; ours use the 3x3 census transform that CTBP computes for one pixel as the data cost of all. \
                 Energies of one data cost can be compared, those of the two cannot. On the backend rayon, message \
                 passing of a sweep includes computing its data costs again and deciding its labels.";
-    Table::new("A.1", "Accuracy and time, means (ours)", &columns).note(note).rows(rows)
+    Table::new(PROFILES, "Accuracy and time, means (ours)", &columns).note(note).rows(rows)
 }
 
 /// Mean energy of a plan's labels.

@@ -1,0 +1,73 @@
+//! Bytes that the stages of a plan move.
+
+use super::Plan;
+use crate::{Schedule, Stage};
+
+impl Plan {
+    /// Bytes that each stage has to read and write at least, each value of a step counted once, where every stage finds
+    /// what it reads in memory and leaves what it makes there, in the order of [`Stage::ALL`]. `None` under
+    /// [`Schedule::Sweep`], whose stages share what they read in ways that differ between backends.
+    #[must_use]
+    pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        let (grids, settings, pixels) = (self.grids(), self.settings(), self.image_size().pixels() as u64);
+        let costs_of_step = |grid: usize| match settings.schedule {
+            Schedule::Sync => Some(self.volume(grid) as u64),
+            Schedule::Checkerboard => Some(self.volume(grid) as u64 / 2),
+            Schedule::Sweep => None,
+        };
+        let images: u64 =
+            self.buffers().iter().filter(|buffer| buffer.name == "images").map(|buffer| buffer.bytes).sum();
+        let messages = |grid: usize| 2 * self.edges(grid) * self.model().labels() as u64;
+        let coarsen = (1..grids).map(|grid| self.summed_bytes(grid - 1) + self.written_bytes(grid)).sum();
+        // The coarsest grid's first messages are zeros, which nothing is read for.
+        let refine =
+            (0..grids).map(|grid| messages(grid) + if grid + 1 < grids { messages(grid + 1) } else { 0 }).sum();
+        let step = |grid| Some(costs_of_step(grid)? + 2 * self.updates_per_step(grid));
+        let steps = (0..grids).map(step).sum::<Option<u64>>()? * u64::from(settings.steps);
+        let select_labels = self.volume(0) as u64 + messages(0) + 2 * pixels;
+        Some([images + self.written_bytes(0), coarsen, refine, steps, select_labels])
+    }
+
+    /// Bytes of a grid's costs that the next coarser one's are summed from.
+    fn summed_bytes(&self, grid: usize) -> u64 {
+        let bytes = if self.keeps_sums(grid) { self.sum_bytes(grid) } else { 1 };
+        (self.volume(grid) * bytes) as u64
+    }
+
+    /// Bytes of a grid's costs, its sums included where it keeps some.
+    fn written_bytes(&self, grid: usize) -> u64 {
+        let sums = if self.keeps_sums(grid) { self.summed_bytes(grid) } else { 0 };
+        self.volume(grid) as u64 + sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Model, Plan, Profile, Schedule, Settings, Size};
+
+    fn moved(schedule: Schedule, grids: usize, steps: u32) -> Option<[u64; 5]> {
+        let size = Size { width: 4, height: 2 };
+        let settings = crate::Algorithm::Bp.settings(size, 1, 1, schedule);
+        let model = Model::new(Profile::Thesis, 3).unwrap();
+        Plan::new(size, model, Settings { grids, steps, schedule, ..settings }).unwrap().moved_bytes()
+    }
+
+    /// Counted by hand: 4x2 nodes have 10 edges, and 2x1 one; each holds 3 labels a node or message.
+    #[test]
+    fn every_value_of_a_step_is_counted_once() {
+        let [images, costs, messages, labels] = [2 * 8, 8 * 3, 2 * 10 * 3, 2 * 8];
+        let select_labels = costs + messages + labels;
+        let sync = [images + costs, 0, messages, 5 * (costs + 2 * messages), select_labels];
+        assert_eq!(moved(Schedule::Sync, 1, 5), Some(sync));
+        let checkerboard = [images + costs, 0, messages, 5 * (costs / 2 + messages), select_labels];
+        assert_eq!(moved(Schedule::Checkerboard, 1, 5), Some(checkerboard));
+        let (coarse_costs, coarse_messages) = (2 * 3, 2 * 3);
+        let steps = costs + 2 * messages + coarse_costs + 2 * coarse_messages;
+        let refine = messages + 2 * coarse_messages;
+        assert_eq!(
+            moved(Schedule::Sync, 2, 1),
+            Some([images + costs, costs + coarse_costs, refine, steps, select_labels])
+        );
+        assert_eq!(moved(Schedule::Sweep, 1, 1), None);
+    }
+}

@@ -1,0 +1,72 @@
+//! The thesis's tables by `cargo bench`: every algorithm on every scene and backend, and kernels.
+//!
+//! `[BP_BENCH=quick] [BP_BENCH_BACKEND=NAMES] [BP_DATA=DIR] cargo bench [-- FILTER]`
+//!
+//! Criterion would measure bench after bench, so that minutes of a machine that is never quiet lay between two algorithms
+//! whose ratio is the result. So everything is measured beforehand, in turns and by the code of `bp reproduce` and `bp
+//! speed`, and criterion is handed the samples: what it says of warming up, iterations and estimated times is about
+//! that. A scene is measured where criterion's filter leaves one of its benches. Criterion shows means with their
+//! intervals and what changed since the last run; the tables and charts, of medians, are made of our own records and
+//! written to a new folder in `bench-results` of the target folder.
+//!
+//! Groups are called after the tables that show their times. Totals go from images to labels by the wall clock, waiting
+//! for the device included; a device with a clock of its own has a bench by that one beside it.
+//!
+//! `BP_BENCH` is `full`, the default, or `quick`: small images and few loops, on every backend. A full run leaves out
+//! the reference and software rasterisers unless `BP_BENCH_BACKEND` names them.
+
+mod replay;
+
+use std::{
+    collections::HashSet,
+    path::Path,
+    process::{Command, ExitCode},
+};
+
+use criterion::Criterion;
+use harness::bench;
+
+fn main() -> ExitCode {
+    match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<(), String> {
+    let has = |option: &str| arguments.iter().any(|argument| argument == option);
+    let mut criterion = Criterion::default().without_plots().configure_from_args();
+    if has("--list") {
+        replay::list(&mut criterion, &bench::possible()?);
+        return Ok(());
+    }
+    // As criterion tells a test of benches from a run.
+    if has("--test") || !has("--bench") {
+        eprintln!("nothing is measured: run it by cargo bench");
+        return Ok(());
+    }
+    let asked = asked(arguments)?;
+    if asked.is_empty() {
+        eprintln!("nothing is measured: no bench is called so; cargo bench -- --list shows their names");
+        return Ok(());
+    }
+    let results = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("bench-results");
+    bench::run(&|id| asked.contains(id), &results, |benches| replay::replay(&mut criterion, benches))?;
+    criterion.final_summary();
+    Ok(())
+}
+
+/// The benches that criterion would run. It alone knows which its options leave, and tells when it is asked for a list.
+fn asked(arguments: &[String]) -> Result<HashSet<String>, String> {
+    let failed = |error: &dyn std::fmt::Display| format!("cannot list the benches: {error}");
+    let program = std::env::current_exe().map_err(|error| failed(&error))?;
+    let output = Command::new(program).args(arguments).arg("--list").output().map_err(|error| failed(&error))?;
+    if !output.status.success() {
+        return Err(failed(&String::from_utf8_lossy(&output.stderr)));
+    }
+    let lines = String::from_utf8_lossy(&output.stdout);
+    Ok(lines.lines().filter_map(|line| line.strip_suffix(": benchmark")).map(str::to_owned).collect())
+}

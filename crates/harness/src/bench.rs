@@ -1,0 +1,144 @@
+//! What `cargo bench` measures: the cells of the thesis's tables and some kernels, each by the same code as `bp
+//! reproduce` and `bp speed`. Criterion itself would measure one contestant after another, with the machine's drift
+//! between them; here they take turns first, and criterion is handed the samples.
+
+mod list;
+mod settings;
+
+use std::{collections::HashSet, path::Path, time::Duration};
+
+use list::Of;
+use settings::Settings;
+
+use crate::{
+    args::{DataArgs, SpeedArgs},
+    backends::{self, Asked},
+    command::{check_speed, write_speed},
+    failure::Failure,
+    interrupt, machine, report, reproduce,
+    scenes::Source,
+    speed::{self, Problem, Speed},
+    tell, threads,
+};
+
+/// One time of one contestant, as criterion is to know it.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// The table, or the kernel, that it belongs to.
+    pub group: String,
+    /// Its name in the group.
+    pub name: String,
+    /// Message entries that a sample computes, where the time is that of computing them.
+    pub entries: Option<u64>,
+    /// Bytes that a sample reads and writes at least, where they are counted.
+    pub bytes: Option<u64>,
+    /// Every sample in the order taken; none of what was not asked for or cannot be measured.
+    pub samples: Vec<Duration>,
+    of: Of,
+}
+
+impl Bench {
+    /// The name that criterion gives it, and filters by.
+    #[must_use]
+    pub fn id(&self) -> String {
+        format!("{}/{}", self.group, self.name)
+    }
+}
+
+/// All benches that there may be, without samples: whether a device has a clock shows when it is used.
+///
+/// # Errors
+/// A message that names the variable of the environment that cannot be followed.
+pub fn possible() -> Result<Vec<Bench>, String> {
+    let settings = Settings::read(|name| std::env::var_os(name));
+    let job = settings.and_then(Job::new).map_err(|failure| failure.to_string())?;
+    Ok(job.possible)
+}
+
+/// Measures every scene and problem that a bench whose name `is_asked` is of, writes records, tables and charts to a new
+/// folder in `results`, and lets `show` have all benches.
+///
+/// # Errors
+/// A message that says what could not be measured or written.
+pub fn run(
+    is_asked: &(dyn Fn(&str) -> bool + Sync),
+    results: &Path,
+    show: impl FnOnce(&[Bench]),
+) -> Result<(), String> {
+    let measure = || {
+        let job = Job::new(Settings::read(|name| std::env::var_os(name))?)?;
+        let asked = job.possible.iter().filter(|bench| is_asked(&bench.id())).map(|bench| bench.of).collect();
+        job.measure(&asked, results)
+    };
+    let measured = interrupt::listen().and_then(|()| threads::run_on(None, measure));
+    measured.and_then(|measured| measured.shown(show)).map_err(|failure| failure.to_string())
+}
+
+/// What can be measured.
+struct Job {
+    settings: Settings,
+    source: Source,
+    backends: Vec<String>,
+    possible: Vec<Bench>,
+}
+
+/// What was.
+struct Measured {
+    storage: reproduce::Storage,
+    /// Whether any scene was.
+    scenes: bool,
+    late: Vec<String>,
+    speed: Option<Speed>,
+    benches: Vec<Bench>,
+}
+
+impl Job {
+    fn new(settings: Settings) -> Result<Self, Failure> {
+        let source = Source::new(&DataArgs { data: settings.data.clone(), synthetic: false }, settings.quick)?;
+        let backends = settings.backends()?;
+        let possible = list::benches(&source.names(), &backends, None);
+        Ok(Self { settings, source, backends, possible })
+    }
+
+    fn measure(&self, asked: &HashSet<Of>, results: &Path) -> Result<Measured, Failure> {
+        let Self { settings, source, backends, .. } = self;
+        let mut devices = backends::open_all(backends).map_err(|failure| failure.of(settings::BACKEND))?;
+        tell(&format!("scenes: {}", source.set.described));
+        source.check()?;
+        let run = reproduce::settings(source, &devices, settings.quick, settings.rounds());
+        let mut storage = reproduce::begin(results, machine::program()?, machine::machine(None), run)?;
+        let is_asked = |name: &str| asked.iter().any(|of| matches!(of, Of::Scene(scene) if *scene == name));
+        let late = reproduce::run(source, &mut devices, &mut storage, &is_asked)?;
+        let scenes = source.names().into_iter().any(is_asked);
+        if scenes {
+            report::write(storage.folder(), storage.record())?;
+        }
+        let is_asked = |problem: &Problem| asked.contains(&Of::Problem(problem.name()));
+        let speed = kernels(settings, Problem::ALL.into_iter().filter(is_asked).collect(), &mut devices)?;
+        speed.as_ref().map_or(Ok(()), |speed| write_speed(storage.folder(), speed))?;
+        let benches = list::benches(&source.names(), backends, Some((storage.record(), speed.as_ref())));
+        Ok(Measured { storage, scenes, late, speed, benches })
+    }
+}
+
+/// Measures problems, if there are any.
+fn kernels(settings: &Settings, problem: Vec<Problem>, devices: &mut [Asked]) -> Result<Option<Speed>, Failure> {
+    if problem.is_empty() {
+        return Ok(None);
+    }
+    let (backend, rounds) = (Vec::new(), Some(settings.rounds()));
+    let args = SpeedArgs { backend, problem, rounds, quick: settings.quick, output: None, threads: None };
+    speed::measure(&args, devices).map(Some)
+}
+
+impl Measured {
+    /// Shows the benches and tells where the tables and charts are; fails where something could not be measured.
+    fn shown(self, show: impl FnOnce(&[Bench])) -> Result<(), Failure> {
+        show(&self.benches);
+        if self.scenes {
+            tell(&format!("tables and charts: {}", self.storage.folder().join(report::PAGE_FILE).display()));
+            reproduce::check_cells(self.storage.record(), self.late)?;
+        }
+        self.speed.as_ref().map_or(Ok(()), check_speed)
+    }
+}

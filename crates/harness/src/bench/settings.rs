@@ -1,0 +1,128 @@
+//! What is asked for by variables of the environment: the command line of a bench is criterion's.
+
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
+
+use bp_core::{Backend, DeviceKind};
+
+use crate::{backends, failure::Failure, tell};
+
+/// How much is measured: "quick" or "full".
+const SIZE: &str = "BP_BENCH";
+
+/// On which backends, separated by commas.
+pub(super) const BACKEND: &str = "BP_BENCH_BACKEND";
+
+/// The folder of public data, as for the program.
+const DATA: &str = "BP_DATA";
+
+/// Rounds of a quick run: as many as criterion takes samples at least.
+const QUICK_ROUNDS: u32 = 10;
+
+/// Rounds of a full run.
+const ROUNDS: u32 = 20;
+
+/// What is asked for.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Settings {
+    /// Small images and few loops, on every backend.
+    pub(super) quick: bool,
+    /// The backends, where they are named.
+    named: Option<Vec<String>>,
+    /// The folder of public data; cargo runs benches in their package's folder, so it is taken from the workspace's.
+    pub(super) data: Option<PathBuf>,
+}
+
+impl Settings {
+    /// Reads them; a variable that is empty is none.
+    pub(super) fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, Failure> {
+        let value = |name| variable(name).filter(|value| !value.is_empty());
+        let text = |name| value(name).map(|value| value.to_string_lossy().into_owned());
+        let quick = match text(SIZE).as_deref() {
+            None | Some("full") => false,
+            Some("quick") => true,
+            Some(other) => return Err(Failure::usage(format!("{SIZE}={other}: it is quick or full"))),
+        };
+        let named = text(BACKEND).map(|names| names.split(',').map(str::to_owned).collect());
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        Ok(Self { quick, named, data: value(DATA).map(|folder| workspace.join(folder)) })
+    }
+
+    /// Rounds, in each of which every contestant takes its turn.
+    pub(super) fn rounds(&self) -> u32 {
+        if self.quick { QUICK_ROUNDS } else { ROUNDS }
+    }
+
+    /// The backends as records name them: those asked for, else all; in a full run only those whose times matter.
+    pub(super) fn backends(&self) -> Result<Vec<String>, Failure> {
+        let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend));
+        let names =
+            self.named.clone().unwrap_or_else(|| by_default().map(|backend| backend.name().to_owned()).collect());
+        let chosen = |name: &String| Ok(backends::choose(name, None).map_err(|failure| failure.of(BACKEND))?.name);
+        names.iter().map(chosen).collect()
+    }
+}
+
+/// Whether a full run has the backend without being asked: the reference and software rasterisers would make an hour of
+/// minutes, and tell nothing of the algorithms that the quick run does not.
+fn matters(backend: &dyn Backend) -> bool {
+    let name = backend.name();
+    let software = backend.devices().into_iter().next().filter(|info| info.kind == DeviceKind::SoftwareRasteriser);
+    let why = match software {
+        Some(info) => format!("{} is a software rasteriser", info.name),
+        None if name == backends::ALL[0].name() => "it is the reference, and slow".to_owned(),
+        None => return true,
+    };
+    tell(&format!("{name}: left out of a full run: {why}; {BACKEND}={name} asks for it"));
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(variables: &[(&str, &str)]) -> Result<Settings, Failure> {
+        Settings::read(|name| Some(variables.iter().find(|(known, _)| *known == name)?.1.into()))
+    }
+
+    #[test]
+    fn variables_are_followed_and_empty_ones_are_none() {
+        let full = Settings { quick: false, named: None, data: None };
+        assert_eq!(read(&[]).unwrap(), full);
+        assert_eq!(read(&[(SIZE, ""), (BACKEND, ""), (DATA, "")]).unwrap(), full);
+        assert_eq!(read(&[(SIZE, "full")]).unwrap(), full);
+        let quick = read(&[(SIZE, "quick"), (BACKEND, "rayon,scalar"), (DATA, "/data")]).unwrap();
+        assert_eq!(quick.data, Some(PathBuf::from("/data")));
+        assert_eq!(quick.backends().unwrap(), ["rayon", "scalar"]);
+        assert!(quick.rounds() < full.rounds());
+    }
+
+    #[test]
+    fn a_folder_of_data_is_taken_from_the_workspace_s() {
+        let data = read(&[(DATA, "crates/harness/src")]).unwrap().data.unwrap();
+        assert!(data.join("bench/settings.rs").exists(), "{}", data.display());
+    }
+
+    #[test]
+    fn every_backend_is_in_a_quick_run_and_the_slow_reference_not_in_a_full_one() {
+        let backends = |size| read(&[(SIZE, size)]).unwrap().backends().unwrap();
+        let [quick, full] = ["quick", "full"].map(backends);
+        assert_eq!(quick.len(), backends::ALL.len());
+        assert!(full.contains(&"rayon".to_owned()) && !full.contains(&"scalar".to_owned()), "{full:?}");
+    }
+
+    #[test]
+    fn what_a_variable_must_not_say_is_refused_by_its_name() {
+        let told = |variables: &[(&str, &str)]| {
+            read(variables).and_then(|settings| settings.backends()).unwrap_err().to_string()
+        };
+        let size = told(&[(SIZE, "fast")]);
+        assert!(size.contains("BP_BENCH=fast") && size.contains("quick or full"), "{size}");
+        for names in ["magic", "rayon,", "rayon,magic"] {
+            let backend = told(&[(BACKEND, names)]);
+            assert!(backend.contains(BACKEND) && backend.contains("scalar"), "{backend}");
+        }
+    }
+}
