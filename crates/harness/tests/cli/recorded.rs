@@ -9,12 +9,13 @@ use serde_json::{Value, json};
 
 use crate::folder::{Folder, text};
 
-const SCALAR: &str = "2026-11-21-amd-epyc-2-cores-middlebury2006";
-const RAYON: &str = "2026-11-21-amd-epyc-2-cores-rayon-middlebury2006";
+const EVERY: &str = "2026-11-21-amd-epyc-2-cores-every-backend-middlebury2006";
 const SYNTHETIC: &str = "2026-11-21-amd-epyc-2-cores-synthetic";
+const SCALAR: &str = "scalar";
+const RAYON: &str = "rayon";
 
 /// The folder of a committed run.
-fn run(name: &str) -> String {
+fn committed(name: &str) -> String {
     fs::canonicalize(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results").join(name))
         .unwrap()
         .to_str()
@@ -22,15 +23,27 @@ fn run(name: &str) -> String {
         .to_owned()
 }
 
-fn record(name: &str) -> Value {
-    serde_json::from_slice(&fs::read(Path::new(&run(name)).join("record.json")).unwrap()).unwrap()
+/// What a committed run has of a backend.
+fn record(backend: &str) -> Value {
+    let file = Path::new(&committed(EVERY)).join("record.json");
+    let mut record: Value = serde_json::from_slice(&fs::read(file).unwrap()).unwrap();
+    record["cells"].as_array_mut().unwrap().retain(|cell| cell["backend"] == backend);
+    record["run"]["backends"] = json!([backend]);
+    record
 }
 
-/// A copy of a committed record in which something was changed.
-fn changed(folder: &Folder, name: &str, file: &str, change: impl FnOnce(&mut Value)) {
-    let mut record = record(name);
+/// The same, with a change, as a file.
+fn changed(folder: &Folder, backend: &str, file: &str, change: impl FnOnce(&mut Value)) {
+    let mut record = record(backend);
     change(&mut record);
     fs::write(folder.path(file), record.to_string()).unwrap();
+}
+
+/// The same without a change; its name.
+fn run(folder: &Folder, backend: &str) -> String {
+    let file = format!("{backend}.json");
+    changed(folder, backend, &file, |_| ());
+    file
 }
 
 /// A file, how it differs from a committed record, and a word of why it is refused.
@@ -66,8 +79,8 @@ fn close(found: &Value, expected: f64) {
 #[test]
 fn backends_of_two_records_stand_in_one_table_and_give_the_same_labels() {
     let folder = Folder::new();
-    let (scalar, rayon) = (run(SCALAR), run(RAYON));
-    let output = folder.run(&format!("compare {scalar} {rayon}/record.json"));
+    let (scalar, rayon) = (run(&folder, SCALAR), run(&folder, RAYON));
+    let output = folder.run(&format!("compare {scalar} {rayon}"));
     assert!(output.status.success(), "{}", text(&output.stderr));
     let page = text(&output.stdout);
     let words = [
@@ -78,7 +91,7 @@ fn backends_of_two_records_stand_in_one_table_and_give_the_same_labels() {
         "in turns",
     ];
     assert!(words.iter().all(|word| page.contains(word)), "{page}");
-    let again = folder.run(&format!("compare {scalar} {rayon}/record.json"));
+    let again = folder.run(&format!("compare {scalar} {rayon}"));
     assert_eq!(text(&again.stdout), page, "the intervals are the same every time");
 }
 
@@ -92,7 +105,7 @@ fn a_slower_record_with_other_labels_is_told() {
         record["cells"].as_array_mut().unwrap().retain(|cell| cell["plan"] != "sweep");
         record["machine"]["cpu"] = json!("a | b <script>\u{1b}[2J");
     });
-    let arguments = format!("compare {} slow.json", run(RAYON));
+    let arguments = format!("compare {} slow.json", run(&folder, RAYON));
     let report = folder.json(&format!("{arguments} --json"));
     assert_eq!((&report["rows"][0]["plan"], &report["rows"][1]["plan"]), (&json!("bp"), &json!("cfbp")));
     let row = |plan: &str| report["rows"].as_array().unwrap().iter().find(|row| row["plan"] == plan).unwrap();
@@ -117,7 +130,7 @@ fn a_slower_record_with_other_labels_is_told() {
 #[test]
 fn speed_ups_of_two_records_are_counted_where_they_overlap() {
     let folder = Folder::new();
-    let rayon = run(RAYON);
+    let rayon = run(&folder, RAYON);
     changed(&folder, RAYON, "same.json", |_| ());
     changed(&folder, RAYON, "slow.json", |record| {
         let cells = record["cells"].as_array_mut().unwrap().iter_mut();
@@ -145,8 +158,8 @@ fn speed_ups_of_two_records_are_counted_where_they_overlap() {
 #[test]
 fn records_of_other_problems_are_refused_side_by_side() {
     let folder = Folder::new();
-    let rayon = run(RAYON);
-    folder.fails(&format!("compare {rayon} {}", run(SYNTHETIC)), 3, &[SYNTHETIC, "data set", "synthetic", RAYON]);
+    let rayon = run(&folder, RAYON);
+    folder.fails(&format!("compare {rayon} {}", committed(SYNTHETIC)), 3, &[SYNTHETIC, "data set", "synthetic", "rayon.json"]);
     let changes: [Change; 4] = [
         ("quick.json", |record| record["run"]["quick"] = json!(true), "--quick"),
         ("labels.json", |record| record["run"]["labels"] = json!(64), "L = 64, but 112"),
@@ -164,7 +177,7 @@ fn records_of_other_problems_are_refused_side_by_side() {
 #[test]
 fn what_is_no_record_of_ours_is_refused_by_name() {
     let folder = Folder::new();
-    let rayon = run(RAYON);
+    let rayon = run(&folder, RAYON);
     fs::write(folder.path("broken.json"), "{\"schema_version\": 1").unwrap();
     File::create(folder.path("huge.json")).unwrap().set_len(1 << 40).unwrap();
     changed(&folder, RAYON, "version.json", |record| *record = json!({ "schema_version": 2, "new": [] }));
@@ -196,7 +209,7 @@ fn what_is_no_record_of_ours_is_refused_by_name() {
 #[test]
 fn every_format_is_read_again_and_holds_what_was_measured() {
     let folder = Folder::new();
-    let export = |format: &str| folder.json(&format!("export --format {format} {}", run(RAYON)));
+    let export = |format: &str| folder.json(&format!("export --format {format} {}", run(&folder, RAYON)));
     let entries = export("github-action-benchmark");
     let name = "middlebury2006/cfbp/rayon: total";
     let entry = entries.as_array().unwrap().iter().find(|entry| entry["name"] == name).unwrap();
@@ -217,7 +230,7 @@ fn every_format_is_read_again_and_holds_what_was_measured() {
 #[test]
 fn csv_has_a_row_for_every_sample() {
     let folder = Folder::new();
-    let output = folder.run(&format!("export --format csv {} --output out.csv", run(RAYON)));
+    let output = folder.run(&format!("export --format csv {} --output out.csv", run(&folder, RAYON)));
     assert!(output.status.success() && text(&output.stderr).contains("out.csv"));
     let mut reader = csv::Reader::from_path(folder.path("out.csv")).unwrap();
     let columns = reader.headers().unwrap().clone();
