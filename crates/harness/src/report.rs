@@ -1,6 +1,5 @@
 //! Tables, charts and pages, made from a record and from nothing else.
 
-mod chart;
 mod diagrams;
 mod escape;
 mod figures;
@@ -11,8 +10,11 @@ mod readme;
 mod results;
 mod tables;
 mod thesis;
+mod tradeoffs;
 
 use std::path::Path;
+
+use bp_charts::png;
 
 pub(crate) use escape::{markdown as markdown_escaped, printable};
 pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
@@ -20,7 +22,7 @@ pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
 use crate::{
     args::ReportArgs,
     failure::Failure,
-    files::write_text,
+    files::{write_text, write_whole},
     record::{RECORD_FILE, Record, load},
     tell,
 };
@@ -49,7 +51,10 @@ struct Report<'a> {
     results: Results<'a>,
     tables: Vec<tables::Table>,
     figures: Vec<Drawing>,
+    /// Those of the thesis.
     diagrams: Vec<Drawing>,
+    /// Ours.
+    tradeoffs: Vec<Drawing>,
 }
 
 impl<'a> Report<'a> {
@@ -59,16 +64,29 @@ impl<'a> Report<'a> {
             tables: tables::all(&results),
             figures: figures::all(folder, &results)?,
             diagrams: diagrams::all(&results)?,
+            tradeoffs: tradeoffs::all(&results)?,
             results,
         })
+    }
+
+    fn charts(&self) -> impl Iterator<Item = &Drawing> {
+        self.diagrams.iter().chain(&self.tradeoffs)
+    }
+
+    fn drawings(&self) -> impl Iterator<Item = &Drawing> {
+        self.figures.iter().chain(self.charts())
     }
 }
 
 /// Writes REPORT.md, report.html and the drawings beside a record.
 pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
     let report = Report::new(folder, record)?;
-    for drawing in report.figures.iter().chain(&report.diagrams) {
+    for drawing in report.drawings() {
         write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
+    }
+    for chart in report.charts() {
+        let picture = png(&chart.svg).map_err(|error| Failure::other(format!("{}: {error}", chart.name)))?;
+        write_whole(&folder.join(format!("{}.png", chart.name)), |file| file.write_all(&picture))?;
     }
     write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
     write_text(&folder.join(PAGE_FILE), &html::page(&report))

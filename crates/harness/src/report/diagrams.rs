@@ -1,8 +1,9 @@
 //! The 14 diagrams of the thesis.
 
+use bp_charts::{Axis, DotChart, Level, Series, Style, Value};
+
 use super::{
     Drawing,
-    chart::{Chart, Point, Series},
     format::{Spread, mebibytes, number},
     results::{Part, Results, Row},
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family},
@@ -11,6 +12,9 @@ use crate::{
     failure::Failure,
     record::{Device, Measurement},
 };
+
+/// A value a scene.
+type PerScene = Series<Option<Value>>;
 
 /// Number of a diagram, and of the table that it belongs to.
 type Numbers = (&'static str, &'static str);
@@ -81,19 +85,18 @@ fn speed_ups(
 }
 
 /// The printed speed-ups of some plans; their styles are numbered from `style` on.
-fn printed(results: &Results<'_>, plans: &[Named], style: usize) -> Vec<Series> {
+fn printed(results: &Results<'_>, plans: &[Named], style: usize) -> Vec<PerScene> {
     // The same numbers are printed for every digit that CTCSBP's coefficient may have had.
     let mut plans: Vec<Named> = plans.to_vec();
     plans.dedup_by_key(|plan| plan.printed);
     let value = |plan: &Named, index| {
         let algorithm = plan.printed?;
         let value = results.thesis.time_ms("bp", index)? / results.thesis.time_ms(algorithm, index)?;
-        Some(Point { value, low: value, high: value })
+        Some(value.into())
     };
     let series = |(i, plan): (usize, &Named)| Series {
         name: format!("{}: printed in the thesis", family(&[*plan])),
-        printed: true,
-        style: style + i,
+        style: Style::numbered(style + i).hollow(),
         points: results.scenes().map(|(index, _)| value(plan, index)).collect(),
     };
     plans.iter().enumerate().map(series).collect()
@@ -113,7 +116,7 @@ fn errors(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) 
 }
 
 /// A series a backend of one value of each plan's measurement.
-fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<Series> {
+fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<PerScene> {
     let of = |(i, plan): (usize, &Named)| {
         ours(results, plan.title, i * results.devices().len(), |row| {
             let value = value(row.measured(plan.plan)?);
@@ -125,34 +128,33 @@ fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement)
 
 /// A series a backend that has a device, named after it where there are several or it only seems a GPU; their styles are
 /// numbered from `style` on.
-fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<Series> {
+fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<PerScene> {
     let devices = results.devices();
     let named = |device: &Device| results.backends().count() > 1 || device.software_rasteriser;
     let series = |(i, &(backend, device)): (usize, &(&str, &Device))| Series {
         name: if named(device) { format!("{name}, {}", results.label(backend)) } else { name.to_owned() },
-        printed: false,
-        style: style + i,
+        style: Style::numbered(style + i),
         points: (results.rows().filter(|row| row.backend == backend))
-            .map(|row| value(&row).map(|Spread { median, low, high, .. }| Point { value: median, low, high }))
+            .map(|row| value(&row).map(|Spread { median, low, high, .. }| Value { value: median, low, high }))
             .collect(),
     };
     devices.iter().enumerate().map(series).collect()
 }
 
-fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series>, reference: Option<f64>) -> Chart {
+fn chart(results: &Results<'_>, title: String, name: &str, series: Vec<PerScene>, reference: Option<f64>) -> DotChart {
     let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
-    Chart {
+    let level = |value| Level { name: format!("reference: {value}"), value, colour: None };
+    DotChart {
         description: format!("{title}, on {}. Series: {}.", results.data(), names.join("; ")),
-        y_label: format!("{y_label}; {}", results.setting()),
-        logarithmic: reference.is_some(),
-        reference,
+        axis: Axis { logarithmic: reference.is_some(), ..Axis::linear(format!("{name}; {}", results.setting())) },
+        levels: reference.into_iter().map(level).collect(),
         categories: results.scenes().map(|(_, scene)| scene.name.clone()).collect(),
         series,
         title,
     }
 }
 
-fn drawing((number, table): Numbers, chart: Chart, caption: &str) -> Result<Drawing, Failure> {
+fn drawing((number, table): Numbers, chart: DotChart, caption: &str) -> Result<Drawing, Failure> {
     let svg = chart.svg().map_err(|error| Failure::other(format!("diagram {number}: {error}")))?;
     Ok(Drawing {
         name: format!("diagram-{number}"),
@@ -164,18 +166,18 @@ fn drawing((number, table): Numbers, chart: Chart, caption: &str) -> Result<Draw
 }
 
 /// What a chart shows, in numbers: a row a scene.
-fn data_table(chart: &Chart) -> Table {
+fn data_table(chart: &DotChart) -> Table {
     let columns: Vec<&str> =
         std::iter::once("").chain(chart.series.iter().map(|series| series.name.as_str())).collect();
     let rows = chart.categories.iter().enumerate().map(|(i, category)| {
-        let value = |series: &Series| match series.points.get(i).copied().flatten() {
+        let value = |series: &PerScene| match series.points.get(i).copied().flatten() {
             None => "-".to_owned(),
-            Some(Point { value, low, high }) if low < high => {
+            Some(Value { value, low, high }) if low < high => {
                 format!("{} ({} to {})", number(value, 2), number(low, 2), number(high, 2))
             }
-            Some(Point { value, .. }) => number(value, 2),
+            Some(Value { value, .. }) => number(value, 2),
         };
         std::iter::once(category.clone()).chain(chart.series.iter().map(value)).collect()
     });
-    Table::new("", chart.y_label.clone(), &columns).rows(rows.collect::<Vec<_>>())
+    Table::new("", chart.axis.name.clone(), &columns).rows(rows.collect::<Vec<_>>())
 }
