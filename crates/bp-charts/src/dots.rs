@@ -3,10 +3,9 @@
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use crate::{
-    Axis, Error, Level, Series, Value,
-    legend::MARKER_UNIT,
+    Axis, Error, Key, Level, Series, Value, entries,
     sheet::{Canvas, Drawn, INK, MARGIN, Parts, ROW, Room, Sheet, TEXT_SIZE, WIDTH, text, widest},
-    style::{colour, draw_marker, draw_path, draw_whisker},
+    style::{MARKER_UNIT, colour, draw_marker, draw_path, draw_whisker},
 };
 
 /// A dot chart: categories from left to right and, within each, one marker a series.
@@ -20,9 +19,11 @@ pub struct DotChart {
     pub axis: Axis,
     /// Values to compare with.
     pub levels: Vec<Level>,
+    /// What the legend holds besides the levels; where empty, the series.
+    pub keys: Vec<Key>,
     /// The names along the horizontal axis.
     pub categories: Vec<String>,
-    /// In the order of the markers and of the legend: a point a category, `None` where there is no value. Lines are not
+    /// In the order of the markers: a point a category, `None` where there is no value. Lines are not
     /// drawn.
     pub series: Vec<Series<Option<Value>>>,
 }
@@ -51,7 +52,7 @@ impl DotChart {
             axis: &self.axis,
             scale: self.axis.scale(ends.iter().copied().chain(levels)),
             levels: &self.levels,
-            series: self.series.iter().map(|series| (series.name.as_str(), series.style)).collect(),
+            entries: entries(&self.keys, &self.series),
         };
         Sheet::new(parts, Room { right: RIGHT, plot_height: 260.0 }, |left| self.name_rows(left))
     }

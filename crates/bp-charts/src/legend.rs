@@ -5,30 +5,27 @@ use plotters::style::text_anchor::HPos;
 use crate::{
     Level, Style,
     sheet::{Canvas, Drawn, ROW, TEXT_SIZE, level_colour, text, widest},
-    style::{draw_dashes, draw_line, draw_marker},
+    style::{MARKER_UNIT, draw_dashes, draw_line, draw_marker},
 };
 
-/// The pixels of a marker's radius of 1 where there is room.
-pub(crate) const MARKER_UNIT: f64 = 4.8;
-
 /// What an entry shows beside its name.
-pub(crate) enum Key<'a> {
-    Series(Style),
+pub(crate) enum Look<'a> {
+    Of(Style),
     Level(&'a Level),
 }
 
 /// Entries in columns of one width.
 pub(crate) struct Legend<'a> {
-    entries: Vec<(&'a str, Key<'a>)>,
+    entries: Vec<(&'a str, Look<'a>)>,
     /// The width of an entry.
     entry: f64,
     pub(crate) rows: usize,
 }
 
 impl<'a> Legend<'a> {
-    /// The legend of what has a name, in this width.
-    pub(crate) fn new(entries: impl IntoIterator<Item = (&'a str, Key<'a>)>, width: f64) -> Self {
-        let entries: Vec<_> = entries.into_iter().filter(|(name, _)| !name.is_empty()).collect();
+    /// The legend of these in this width.
+    pub(crate) fn new(entries: impl IntoIterator<Item = (&'a str, Look<'a>)>, width: f64) -> Self {
+        let entries: Vec<_> = entries.into_iter().collect();
         let entry = widest(entries.iter().map(|(name, _)| name)) + 50.0;
         let rows = entries.len().div_ceil(((width / entry) as usize).max(1)).max(1);
         Self { entries, entry, rows }
@@ -41,8 +38,8 @@ impl<'a> Legend<'a> {
             let x = left + self.entry * (place % columns) as f64;
             let y = top + ROW * ((place / columns) as f64 + 0.5);
             match key {
-                Key::Level(level) => draw_dashes(canvas, x, x + 24.0, y, level_colour(level))?,
-                Key::Series(style) => {
+                Look::Level(level) => draw_dashes(canvas, x, x + 24.0, y, level_colour(level))?,
+                Look::Of(style) => {
                     draw_line(canvas, vec![(x, y), (x + 24.0, y)], *style)?;
                     draw_marker(canvas, (x + 12.0, y), *style, MARKER_UNIT)?;
                 }

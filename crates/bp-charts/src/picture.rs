@@ -1,11 +1,12 @@
 //! Charts as pictures of pixels.
 
-use std::sync::{Arc, LazyLock};
-
-use image::{
-    ExtendedColorType, ImageEncoder,
-    codecs::png::{CompressionType, FilterType, PngEncoder},
+use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
+    sync::{Arc, LazyLock},
 };
+
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
 use resvg::{
     render,
     tiny_skia::{Pixmap, Transform},
@@ -40,10 +41,48 @@ pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
     let [width, height] = [tree.size().width(), tree.size().height()].map(|side| (SCALE as f32 * side) as u32);
     let mut pixmap = Pixmap::new(width, height).ok_or_else(|| failed(&"it has no size"))?;
     render(&tree, Transform::from_scale(SCALE as f32, SCALE as f32), &mut pixmap.as_mut());
-    // The sheet is white and opaque all over.
-    let pixels: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|pixel| &pixel[..3]).copied().collect();
     let mut file = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive);
-    encoder.write_image(&pixels, width, height, ExtendedColorType::Rgb8).map_err(|error| failed(&error))?;
+    encode(&mut file, &pixmap).map_err(|error| failed(&error))?;
     Ok(file)
+}
+
+/// Red, green and blue.
+type Colour = [u8; 3];
+
+/// Writes a PNG of 256 colours: a third of the bytes, as charts have few colours and the edges of shapes between them.
+fn encode(file: &mut Vec<u8>, pixmap: &Pixmap) -> Result<(), EncodingError> {
+    // The sheet is white and opaque all over.
+    let pixels: Vec<Colour> = pixmap.data().chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    let (palette, indices) = palette(&pixels);
+    let mut encoder = Encoder::new(file, pixmap.width(), pixmap.height());
+    encoder.set_color(ColorType::Indexed);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_palette(palette.concat());
+    encoder.set_compression(Compression::High);
+    encoder.set_filter(Filter::NoFilter);
+    let mut writer = encoder.write_header()?;
+    let run = |run: &[Colour]| std::iter::repeat_n(indices[&run[0]], run.len());
+    writer.write_image_data(&runs(&pixels).flat_map(run).collect::<Vec<u8>>())?;
+    writer.finish()
+}
+
+/// Neighbours of one colour, which most pixels are: few colours are looked up.
+fn runs(pixels: &[Colour]) -> impl Iterator<Item = &[Colour]> {
+    pixels.chunk_by(|a, b| a == b)
+}
+
+/// The 256 most frequent of some colours, and where in them each of the colours, or the one most like it, is.
+fn palette(pixels: &[Colour]) -> (Vec<Colour>, BTreeMap<Colour, u8>) {
+    let mut counts: BTreeMap<Colour, usize> = BTreeMap::new();
+    runs(pixels).for_each(|run| *counts.entry(run[0]).or_default() += run.len());
+    let mut palette: Vec<Colour> = counts.keys().copied().collect();
+    palette.sort_by_key(|colour| Reverse(counts[colour]));
+    palette.truncate(256);
+    let distance = |a: Colour, b: Colour| -> u32 { (0..3).map(|i| u32::from(a[i].abs_diff(b[i])).pow(2)).sum() };
+    let index = |&colour: &Colour| {
+        let nearest = (0u8..=255).zip(&palette).min_by_key(|&(_, &other)| distance(colour, other));
+        (colour, nearest.map_or(0, |(index, _)| index))
+    };
+    let indices = counts.keys().map(index).collect();
+    (palette, indices)
 }

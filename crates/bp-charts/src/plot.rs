@@ -3,12 +3,12 @@
 use plotters::style::text_anchor::HPos;
 
 use crate::{
-    Axis, Error, Level, Line, Series, Value,
+    Axis, Error, Key, Level, Line, Series, Value,
     axis::Scale,
-    legend::MARKER_UNIT,
+    entries,
     number::in_full,
     sheet::{At, Canvas, Drawn, GRID, INK, MARGIN, Parts, ROW, Room, Sheet, TEXT_SIZE, WIDTH, text, widest},
-    style::{colour, draw_line, draw_marker, draw_path, draw_whisker},
+    style::{MARKER_UNIT, colour, draw_line, draw_marker, draw_path, draw_whisker},
 };
 
 /// Values against values.
@@ -24,7 +24,9 @@ pub struct Plot {
     pub y: Axis,
     /// Values to compare with.
     pub levels: Vec<Level>,
-    /// In the order in which they are drawn and of the legend.
+    /// What the legend holds besides the levels; where empty, the series.
+    pub keys: Vec<Key>,
+    /// In the order in which they are drawn.
     pub series: Vec<Series<Point>>,
 }
 
@@ -67,7 +69,7 @@ impl Plot {
             axis: &self.y,
             scale: self.y.scale(ends(|point| point.y).into_iter().chain(levels)),
             levels: &self.levels,
-            series: self.series.iter().map(|series| (series.name.as_str(), series.style)).collect(),
+            entries: entries(&self.keys, &self.series),
         };
         // The marks of the horizontal axis and its name.
         let sheet = Sheet::new(parts, Room { right: RIGHT, plot_height: 380.0 }, |_| 2);

@@ -9,7 +9,7 @@ use plotters::{
 use crate::{
     Axis, Error, Level, Style,
     axis::Scale,
-    legend::{Key, Legend},
+    legend::{Legend, Look},
     number::in_full,
     style::{colour, draw_dashes, draw_path},
 };
@@ -39,8 +39,8 @@ pub(crate) struct Parts<'a> {
     /// None where there are no values.
     pub(crate) scale: Option<Scale>,
     pub(crate) levels: &'a [Level],
-    /// The names and looks of the series.
-    pub(crate) series: Vec<(&'a str, Style)>,
+    /// What the legend holds besides the levels.
+    pub(crate) entries: Vec<(&'a str, Style)>,
 }
 
 /// The room that a kind of chart needs.
@@ -71,8 +71,8 @@ impl<'a> Sheet<'a> {
     pub(crate) fn new(parts: Parts<'a>, Room { right, plot_height }: Room, rows: impl Fn(f64) -> usize) -> Self {
         let levels: Vec<_> = parts.levels.iter().filter(|level| parts.axis.shows(level.value)).collect();
         let left = MARGIN + widest(parts.scale.iter().flat_map(|scale| &scale.ticks).map(|&tick| in_full(tick))) + 8.0;
-        let series = parts.series.iter().map(|&(name, style)| (name, Key::Series(style)));
-        let entries = series.chain(levels.iter().map(|&level| (level.name.as_str(), Key::Level(level))));
+        let entries = parts.entries.iter().map(|&(name, style)| (name, Look::Of(style)));
+        let entries = entries.chain(levels.iter().map(|&level| (level.name.as_str(), Look::Level(level))));
         let legend = Legend::new(entries, right - left);
         let top = MARGIN + 2.0 * ROW + 8.0;
         let rows = ROW * rows(left) as f64 + MARGIN;

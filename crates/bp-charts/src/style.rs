@@ -45,8 +45,13 @@ impl Style {
     /// that follow.
     #[must_use]
     pub fn numbered(number: usize) -> Self {
-        let shape = number + number / COLOURS.len();
-        Self { colour: number, marker: Some(Marker { shape, hollow: false }), line: None }
+        Self::marked(number, number + number / COLOURS.len())
+    }
+
+    /// A marker of this colour and shape.
+    #[must_use]
+    pub fn marked(colour: usize, shape: usize) -> Self {
+        Self { colour, marker: Some(Marker { shape, hollow: false }), line: None }
     }
 
     /// A line without markers.
@@ -104,6 +109,9 @@ const SHAPES: [Shape; 12] = [
     (4, &[(0.0, 2.0), (45.0, 0.6)]),
 ];
 
+/// The pixels of a marker's radius of 1 where there is room.
+pub(crate) const MARKER_UNIT: f64 = 4.8;
+
 /// The colour of a number.
 pub(crate) fn colour(number: usize) -> RGBColor {
     COLOURS[number % COLOURS.len()]
@@ -120,7 +128,9 @@ pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f
     // One arm more than there are closes the line, with a join instead of two ends.
     let outline: Vec<At> = (0..=arms).flat_map(|arm| corners.iter().map(move |&c| corner(arm, c))).collect();
     canvas.draw(&Polygon::new(outline.as_slice(), if hollow { WHITE } else { colour }))?;
-    draw_path(canvas, &outline, colour)
+    // Small markers have a thinner outline, which would fill them else.
+    let width = f64::from(THIN) * (unit / MARKER_UNIT).min(1.0);
+    canvas.draw(&PathElement::new(outline, colour.stroke_width(width as u32)))
 }
 
 /// A series' line along a path; nothing where it has none.
@@ -136,7 +146,7 @@ pub(crate) fn draw_line(canvas: &Canvas<'_>, path: Vec<At>, style: Style) -> Dra
 
 /// A thin line, as of outlines, whiskers and axes.
 pub(crate) fn draw_path(canvas: &Canvas<'_>, points: &[At], colour: RGBColor) -> Drawn {
-    canvas.draw(&PathElement::new(points, colour.stroke_width(15)))
+    canvas.draw(&PathElement::new(points, colour.stroke_width(THIN)))
 }
 
 /// The whisker between the ends of an interval, which lie side by side or one above the other.
@@ -149,8 +159,11 @@ pub(crate) fn draw_whisker(canvas: &Canvas<'_>, [from, to]: [At; 2], colour: RGB
 
 /// A thin dashed line from left to right.
 pub(crate) fn draw_dashes(canvas: &Canvas<'_>, left: f64, right: f64, y: f64, colour: RGBColor) -> Drawn {
-    canvas.draw(&DashedPathElement::new([(left, y), (right, y)], DASH, GAP, colour.stroke_width(15)))
+    canvas.draw(&DashedPathElement::new([(left, y), (right, y)], DASH, GAP, colour.stroke_width(THIN)))
 }
+
+/// Width of thin lines.
+const THIN: u32 = 15;
 
 /// Lengths of dashes and of what is between them.
 const DASH: u32 = 6 * FINE as u32;

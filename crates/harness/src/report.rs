@@ -5,6 +5,7 @@ mod escape;
 mod figures;
 pub(crate) mod format;
 mod html;
+mod legend;
 mod markdown;
 mod readme;
 mod results;

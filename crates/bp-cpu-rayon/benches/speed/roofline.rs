@@ -270,6 +270,7 @@ fn chart(title: String, roofs: &Roofs, limits: &[Limit], count: usize) -> Plot {
         x: Axis::logarithmic("operations on a byte per byte moved"),
         y: Axis::logarithmic("10^9 operations on a byte per second"),
         levels: vec![],
+        keys: vec![],
         series: own().enumerate().map(point).chain(roofs).collect(),
     }
 }

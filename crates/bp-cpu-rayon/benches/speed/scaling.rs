@@ -31,9 +31,8 @@ pub(crate) fn labels(bench: &Bench) -> Result<Group, Failure> {
     let compare = |labels, asked| ratio(&measured, &name(labels), &name(128), asked);
     let within = Some("at most 1.5");
     let ratios = [compare(2, None), compare(16, within), compare(300, within), compare(512, None)];
-    let point = |(labels, m): (usize, &Measured)| {
-        Point::new(labels as f64, Value { value: m.median, low: m.min, high: m.max })
-    };
+    let point =
+        |(labels, m): (usize, &Measured)| Point::new(labels as f64, Value { value: m.median, low: m.min, high: m.max });
     let points = LABELS.into_iter().zip(&measured).map(point).collect();
     let title = format!("Time of a message entry: {}x{}, census, 1 thread", size.width, size.height);
     let chart = Plot {
@@ -41,6 +40,7 @@ pub(crate) fn labels(bench: &Bench) -> Result<Group, Failure> {
         x: Axis { ticks: LABELS.map(|labels| labels as f64).into(), ..Axis::logarithmic("labels") },
         y: Axis::linear("nanoseconds per message entry"),
         levels: vec![],
+        keys: vec![],
         series: vec![Series {
             name: "update_messages".into(),
             style: Style::numbered(0).with_line(Line::Solid),
@@ -166,6 +166,7 @@ fn chart(measured: &[Measured]) -> Plot {
         x: Axis { ticks, ..Axis::logarithmic("megapixels") },
         y: Axis::logarithmic("milliseconds"),
         levels: vec![],
+        keys: vec![],
         series: Run::ALL.into_iter().filter_map(|run| run.series(measured)).flatten().collect(),
     }
 }

@@ -1,10 +1,11 @@
 //! Diagrams that the thesis has no counterpart of: what every plan costs on every backend, and what it gives for that.
 
-use bp_charts::{Axis, BLACK, Line, Marker, Plot, Point, Series, Style, Value, number};
+use bp_charts::{Axis, Key, Line, Plot, Point, Series, Style, Value, number};
 
 use super::{
     Drawing,
     format::mebibytes,
+    legend,
     results::Results,
     tables::{Named, Table, ours::all_plans},
 };
@@ -55,7 +56,7 @@ fn error() -> Quantity {
         title: "Error against time".to_owned(),
         axis: Axis::linear("visible pixels wrong by more than 1 px, %"),
         value: |measured| measured.visible.bad[1],
-        note: "All backends give the same labels, so that those of a plan stand in a row.",
+        note: "Backends give the same labels, so that those of a plan stand in a row.",
         compares: Box::new(|_| true),
     }
 }
@@ -65,7 +66,7 @@ fn memory() -> Quantity {
         title: "Memory against time".to_owned(),
         axis: Axis::logarithmic("MiB allocated"),
         value: |measured| mebibytes(measured.allocated_bytes),
-        note: "Bytes allocated, counted, without the images.",
+        note: "Bytes allocated, counted.",
         compares: Box::new(|_| true),
     }
 }
@@ -121,7 +122,8 @@ impl<'a> Field<'a> {
         let members = format!("Pareto front, nothing else being both faster and lower: {}.", members.join("; "));
         let chart = self.chart(quantity, &members, &entrants, &points, &front);
         let svg = chart.svg().map_err(|error| Failure::other(format!("diagram A.{number}: {error}")))?;
-        let caption = [Some(READING.to_owned()), Some(quantity.note.to_owned()), Some(members), self.short_names()];
+        let caption =
+            [Some(READING.to_owned()), Some(quantity.note.to_owned()), Some(members), self.short_names(&entrants)];
         let caption: Vec<_> = caption.into_iter().chain([self.results.unavailable()]).flatten().collect();
         Ok(Drawing {
             name: format!("diagram-A.{number}"),
@@ -140,22 +142,17 @@ impl<'a> Field<'a> {
         points: &[Point],
         front: &[usize],
     ) -> Plot {
-        let marker = |shape| Some(Marker { shape, hollow: false });
-        let is_shown = |plan| entrants.iter().any(|entrant| entrant.plan == plan);
-        let plans = (0..self.plans.len()).filter(|&plan| is_shown(plan)).map(|plan| {
-            Series::key(short(&self.plans[plan]), Style { colour: BLACK, marker: marker(plan), line: None })
-        });
-        let devices = self.results.devices().into_iter().enumerate().map(|(i, (backend, _))| {
-            Series::key(self.results.label(backend), Style::line(i, Line::Solid))
-        });
+        let is_shown = |plan: &usize| entrants.iter().any(|entrant| entrant.plan == *plan);
+        let plans = (0..self.plans.len()).filter(is_shown).map(|plan| (plan, short(&self.plans[plan])));
         let stairs = Series {
             name: "Pareto front".to_owned(),
-            style: Style::line(BLACK, Line::Stairs),
+            style: Style::line(GREY, Line::Stairs),
             points: front.iter().map(|&i| points[i]).collect(),
         };
+        let front = Key { name: stairs.name.clone(), style: stairs.style };
         let point = |(entrant, &point): (&&Entrant<'_>, &Point)| Series {
-            name: String::new(),
-            style: Style { colour: entrant.backend, marker: marker(entrant.plan), line: None },
+            name: self.name(entrant),
+            style: legend::style(entrant.plan, entrant.backend),
             points: vec![point],
         };
         let data = self.results.data();
@@ -165,7 +162,8 @@ impl<'a> Field<'a> {
             x: Axis::logarithmic("milliseconds from images to labels"),
             y: Axis { name: format!("{}; {}", quantity.axis.name, self.results.setting()), ..quantity.axis.clone() },
             levels: Vec::new(),
-            series: (plans.chain(devices).chain([stairs])).chain(entrants.iter().zip(points).map(point)).collect(),
+            keys: legend::keys(self.results, plans).into_iter().chain([front]).collect(),
+            series: [stairs].into_iter().chain(entrants.iter().zip(points).map(point)).collect(),
         }
     }
 
@@ -188,13 +186,18 @@ impl<'a> Field<'a> {
         format!("{} on {}", short(&self.plans[entrant.plan]), self.label(entrant))
     }
 
-    /// What the short names of our plans mean.
-    fn short_names(&self) -> Option<String> {
-        let own = self.plans.iter().filter(|plan| plan.printed.is_none());
-        let names: Vec<_> = own.map(|plan| format!("{} is {}", plan.plan, plan.title)).collect();
-        (!names.is_empty()).then(|| format!("Of the plans, {}.", names.join("; ")))
+    /// What the short names of our plans mean, as far as they are shown.
+    fn short_names(&self, entrants: &[&Entrant<'_>]) -> Option<String> {
+        let is_shown = |plan: usize| entrants.iter().any(|entrant| entrant.plan == plan);
+        let own = self.plans.iter().enumerate().filter(|&(i, plan)| plan.printed.is_none() && is_shown(i));
+        let meaning = |plan: &Named| format!("\"{}\" is {}", short(plan), plan.title.trim_start_matches("ours: "));
+        let names: Vec<_> = own.map(|(_, plan)| meaning(plan)).collect();
+        (!names.is_empty()).then(|| format!("{}.", names.join("; ")))
     }
 }
+
+/// The colour of the front.
+const GREY: usize = 7;
 
 /// How to read all of these diagrams.
 const READING: &str = "Lower left is better. Means over the scenes; times are medians by the wall clock, whiskers 95 % \

@@ -1,6 +1,6 @@
 //! What `bp speed` found as charts, made from the record alone.
 
-use bp_charts::{Axis, BLACK, Level, Line, Marker, Plot, Point, Series, Style, Value};
+use bp_charts::{Axis, BLACK, Key, Level, Line, Plot, Point, Series, Style, Value};
 use bp_core::Stage;
 
 use super::record::{Contestant, Entry, Family, Speed, StageTime};
@@ -48,6 +48,7 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
         x: Axis { ticks, ..Axis::logarithmic(family.name()) },
         y: Axis::logarithmic("milliseconds from images to labels"),
         levels: Vec::new(),
+        keys: Vec::new(),
         series,
         title,
     };
@@ -59,12 +60,11 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
 pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
     let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
-    let marker = |stage: Stage| Some(Marker { shape: stage as usize, hollow: false });
-    let keys = Stage::ALL.map(|stage| Series::key(stage.name(), Style { colour: BLACK, marker: marker(stage), line: None }));
-    let points = devices.iter().enumerate().flat_map(|(colour, (_, rates))| {
+    let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
+    let points = devices.iter().enumerate().flat_map(|(colour, (device, rates))| {
         rates.iter().map(move |&(stage, point)| Series {
-            name: String::new(),
-            style: Style { colour, marker: marker(stage), line: None },
+            name: format!("{}: {}", device.label(), stage.name()),
+            style: Style::marked(colour, stage as usize),
             points: vec![point],
         })
     });
@@ -81,7 +81,8 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
         x: Axis::logarithmic("MB that a stage has to read and write"),
         y: Axis::logarithmic("GB/s"),
         levels: devices.iter().enumerate().filter_map(level).collect(),
-        series: keys.into_iter().chain(points).collect(),
+        keys: Stage::ALL.map(key).into(),
+        series: points.collect(),
     };
     let caption = format!(
         "A point a stage of a problem. Bytes are the least that it has to read and write, each value of a step counted \

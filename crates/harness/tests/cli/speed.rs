@@ -39,7 +39,8 @@ fn families_of_problems_are_drawn() {
     let output = folder.run(run);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let page = text(&output.stdout);
-    let words = ["| problem | loops | scalar, ms | rayon, ms |", "| labels-256 | 256 | ", "![Time against loops](loops.svg)"];
+    let words =
+        ["| problem | loops | scalar, ms | rayon, ms |", "| labels-256 | 256 | ", "![Time against loops](loops.svg)"];
     assert!(words.iter().all(|word| page.contains(word)) && !page.contains("## Times"), "{page}");
     for name in ["loops", "labels"] {
         let svg = fs::read_to_string(folder.path(&format!("out/{name}.svg"))).unwrap();
