@@ -17,7 +17,7 @@ use crate::{
     failure::Failure,
     interrupt, machine, report, reproduce,
     scenes::Source,
-    speed::{self, Problem, Speed},
+    speed::{self, Speed},
     tell, threads,
 };
 
@@ -113,8 +113,8 @@ impl Job {
         if scenes {
             report::write(storage.folder(), storage.record())?;
         }
-        let is_asked = |problem: &Problem| asked.contains(&Of::Problem(problem.name()));
-        let speed = kernels(settings, Problem::ALL.into_iter().filter(is_asked).collect(), &mut devices)?;
+        let problem = |of: &Of| if let Of::Problem(name) = of { Some((*name).to_owned()) } else { None };
+        let speed = kernels(settings, asked.iter().filter_map(problem).collect(), &mut devices)?;
         speed.as_ref().map_or(Ok(()), |speed| write_speed(storage.folder(), speed))?;
         let benches = list::benches(&source.names(), backends, Some((storage.record(), speed.as_ref())));
         Ok(Measured { storage, scenes, late, speed, benches })
@@ -122,7 +122,7 @@ impl Job {
 }
 
 /// Measures problems, if there are any.
-fn kernels(settings: &Settings, problem: Vec<Problem>, devices: &mut [Asked]) -> Result<Option<Speed>, Failure> {
+fn kernels(settings: &Settings, problem: Vec<String>, devices: &mut [Asked]) -> Result<Option<Speed>, Failure> {
     if problem.is_empty() {
         return Ok(None);
     }

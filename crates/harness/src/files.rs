@@ -80,9 +80,9 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_whole(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// Writes text to a new file, whole or not at all; one that is there already stays as it is.
-pub(crate) fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
-    let file = filled_beside(path, |file| file.write_all(text.as_bytes()))?;
+/// Writes a new file, whole or not at all; one that is there already stays as it is.
+pub(crate) fn write_new(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
+    let file = filled_beside(path, |file| file.write_all(contents.as_ref()))?;
     file.persist_noclobber(path).map_err(|error| Failure::writing(path, &error.error))?;
     Ok(())
 }

@@ -1,18 +1,21 @@
 //! Tables, charts and pages, made from a record and from nothing else.
 
-mod chart;
 mod diagrams;
 mod escape;
 mod figures;
 pub(crate) mod format;
 mod html;
+mod legend;
 mod markdown;
 mod readme;
 mod results;
 mod tables;
 mod thesis;
+mod tradeoffs;
 
 use std::path::Path;
+
+use bp_charts::png;
 
 pub(crate) use escape::{markdown as markdown_escaped, printable};
 pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
@@ -21,7 +24,7 @@ pub(crate) use tables::of_times as table_of_times;
 use crate::{
     args::ReportArgs,
     failure::Failure,
-    files::write_text,
+    files::{write_text, write_whole},
     record::{RECORD_FILE, Record, load},
     tell,
 };
@@ -50,7 +53,10 @@ struct Report<'a> {
     results: Results<'a>,
     tables: Vec<tables::Table>,
     figures: Vec<Drawing>,
+    /// Those of the thesis.
     diagrams: Vec<Drawing>,
+    /// Ours.
+    tradeoffs: Vec<Drawing>,
 }
 
 impl<'a> Report<'a> {
@@ -60,16 +66,29 @@ impl<'a> Report<'a> {
             tables: tables::all(&results),
             figures: figures::all(folder, &results)?,
             diagrams: diagrams::all(&results)?,
+            tradeoffs: tradeoffs::all(&results)?,
             results,
         })
+    }
+
+    fn charts(&self) -> impl Iterator<Item = &Drawing> {
+        self.diagrams.iter().chain(&self.tradeoffs)
+    }
+
+    fn drawings(&self) -> impl Iterator<Item = &Drawing> {
+        self.figures.iter().chain(self.charts())
     }
 }
 
 /// Writes REPORT.md, report.html and the drawings beside a record.
 pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
     let report = Report::new(folder, record)?;
-    for drawing in report.figures.iter().chain(&report.diagrams) {
+    for drawing in report.drawings() {
         write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
+    }
+    for chart in report.charts() {
+        let picture = png(&chart.svg).map_err(|error| Failure::other(format!("{}: {error}", chart.name)))?;
+        write_whole(&folder.join(format!("{}.png", chart.name)), |file| file.write_all(&picture))?;
     }
     write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
     write_text(&folder.join(PAGE_FILE), &html::page(&report))

@@ -1,6 +1,7 @@
 //! `bp speed`: devices measured against each other on fixed problems, in turns and in one process, from the program
 //! alone.
 
+mod charts;
 mod measure;
 mod problems;
 mod record;
@@ -9,6 +10,7 @@ mod tables;
 use bp_core::{Error, synthetic};
 use jiff::Timestamp;
 
+pub(crate) use charts::{CHART_NAMES, Chart, charts};
 pub(crate) use measure::milliseconds;
 pub(crate) use problems::Problem;
 pub(crate) use record::{Outcome, Speed};
@@ -43,7 +45,7 @@ pub(crate) fn measure(args: &SpeedArgs, asked: &mut [Asked]) -> Result<Speed, Fa
         contests: Vec::new(),
     };
     let mut opened: Vec<&mut Opened> = asked.iter_mut().filter_map(|asked| asked.device.as_mut().ok()).collect();
-    let is_asked = |problem: &Problem| args.problem.is_empty() || args.problem.contains(problem);
+    let is_asked = |problem: &Problem| args.problem.is_empty() || problem.is_asked(&args.problem);
     let divisor = if args.quick { QUICK_DIVISOR } else { 1 };
     let with_plan = |problem: Problem| Ok((problem, problem.plan(divisor)?));
     let problems: Vec<_> = Problem::ALL.into_iter().filter(is_asked).map(with_plan).collect::<Result<_, Error>>()?;

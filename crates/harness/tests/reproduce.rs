@@ -117,8 +117,14 @@ fn check_report(folder: &Path) {
         assert!(markdown.contains(&format!("### Table {number}: ")), "Table {number}");
         assert!(html.contains(&format!("Table {number}: ")), "Table {number}");
     }
-    let diagrams = (1..=14).map(|i| format!("diagram-4.{i}"));
-    for name in diagrams.chain((2..=6).map(|i| format!("figure-3.{i}"))) {
+    // Ours are error, memory, and the energies of two profiles.
+    let diagrams = (1..=14).map(|i| format!("diagram-4.{i}")).chain((1..=4).map(|i| format!("diagram-A.{i}")));
+    let diagrams: Vec<_> = diagrams.collect();
+    for name in &diagrams {
+        let (width, height) = image::image_dimensions(folder.join(format!("{name}.png"))).unwrap();
+        assert!(width == 1800 && height >= 960, "{name}");
+    }
+    for name in diagrams.into_iter().chain((2..=6).map(|i| format!("figure-3.{i}"))) {
         let svg = fs::read_to_string(folder.join(format!("{name}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("<title"), "{name}");
         assert!(markdown.contains(&format!("({name}.svg)")) && html.contains(&format!("id=\"{name}\"")), "{name}");
@@ -131,5 +137,6 @@ fn check_report(folder: &Path) {
     assert!(markdown.contains("all share the whole image"), "how parts share several workers");
     assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
     assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
+    assert!(markdown.contains("Pareto front, nothing else being both faster and lower: "));
     assert!(!html.contains("src=\"http") && !html.contains("<script"), "one self-contained page");
 }

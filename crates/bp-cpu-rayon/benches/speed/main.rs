@@ -3,14 +3,13 @@
 //! `cargo bench -p bp-cpu-rayon --bench speed -- [GROUP ...] [--quick] [--output DIR] [--data DIR]`
 //!
 //! Without groups it measures all of them. The report goes to stdout; `--output` also writes it to DIR as `speed.md`,
-//! with every sample in `speed.json` and charts as SVG. Real pairs come from `--data`, else the folder in the
+//! with every sample in `speed.json` and charts as SVG and PNG. Real pairs come from `--data`, else the folder in the
 //! environment variable `BP_DATA`; without either, made-up ones of the same sizes take their place. Folders are
 //! relative to the workspace.
 //!
 //! The contestants of a group take turns: a round runs each of them once, so that whatever else the machine does
 //! meanwhile meets them alike. What compares two of them is the median of the ratios within a round.
 
-mod chart;
 mod kernels;
 mod machine;
 mod matching;

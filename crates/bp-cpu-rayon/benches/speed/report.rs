@@ -2,10 +2,11 @@
 
 use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 
+use bp_charts::{Plot, png};
 use bp_core::Stage;
 use serde::Serialize;
 
-use crate::{Failure, chart::Chart, machine::Machine};
+use crate::{Failure, machine::Machine};
 
 /// Of the JSON; a change of what a field means changes it.
 pub(crate) const VERSION: u32 = 1;
@@ -43,7 +44,7 @@ pub(crate) struct Group {
     pub(crate) limits: Vec<Limit>,
     /// File names, without ending, and charts.
     #[serde(skip)]
-    pub(crate) charts: Vec<(String, Chart)>,
+    pub(crate) charts: Vec<(String, Plot)>,
 }
 
 /// A contestant's samples and what they come to.
@@ -123,7 +124,9 @@ impl Report {
         fs::write(folder.join("speed.md"), self.markdown())?;
         fs::write(folder.join("speed.json"), serde_json::to_string_pretty(self)? + "\n")?;
         for (name, chart) in self.groups.iter().flat_map(|group| &group.charts) {
-            fs::write(folder.join(format!("{name}.svg")), chart.svg()?)?;
+            let svg = chart.svg()?;
+            fs::write(folder.join(format!("{name}.png")), png(&svg)?)?;
+            fs::write(folder.join(format!("{name}.svg")), svg)?;
         }
         Ok(())
     }

@@ -2,12 +2,12 @@
 
 use std::{cell::RefCell, collections::BTreeMap};
 
+use bp_charts::{Axis, BLACK, Line, Plot, Point, Series, Style};
 use bp_core::{Backend, Error, Plan, Profile, Stage};
 use bp_cpu_rayon::Rayon;
 
 use crate::{
     Bench, Failure, THREADS,
-    chart::{Axis, Chart, Mark, Series},
     kernels::{Access, arithmetic, bandwidth},
     machine::caches,
     report::{Group, Limit, Measured, Ratio},
@@ -241,36 +241,36 @@ fn limit(measured: &[Measured], (case, threads): (&str, usize), roofs: &Roofs, w
 }
 
 /// Operations a second against operations a byte: roofs as lines, stages as points.
-fn chart(title: String, roofs: &Roofs, limits: &[Limit], count: usize) -> Chart {
+fn chart(title: String, roofs: &Roofs, limits: &[Limit], count: usize) -> Plot {
     // Of a single grid, the other stages do the same work.
     let shown = |limit: &&Limit| limit.case == HIERARCHY || limit.stage == Stage::UpdateMessages.name();
     let own = || limits.iter().filter(|limit| limit.threads == count).filter(shown);
     let reach = own().map(|limit| limit.operations / limit.bytes);
     let (low, high) = reach.fold((1.0, 100.0), |(low, high): (f64, f64), x| (low.min(0.7 * x), high.max(1.4 * x)));
-    let roof = |name: &str, bandwidth: f64, mark| {
-        let y = |x: f64| (x * bandwidth).min(roofs.arithmetic) / 1e9;
-        let points = [low, (roofs.arithmetic / bandwidth).clamp(low, high), high].map(|x| [x, y(x), y(x), y(x)]);
-        Series { name: name.to_owned(), mark, style: BLACK, points: points.into() }
+    let roof = |name: &str, bandwidth: f64, line| {
+        let point = |x: f64| Point::new(x, (x * bandwidth).min(roofs.arithmetic) / 1e9);
+        let points = [low, (roofs.arithmetic / bandwidth).clamp(low, high), high].map(point);
+        Series { name: name.to_owned(), style: Style::line(BLACK, line), points: points.into() }
     };
-    let point = |(style, limit): (usize, &Limit)| {
+    let point = |(number, limit): (usize, &Limit)| {
         let [x, y] = [limit.operations / limit.bytes, limit.operations / limit.ms / 1e6];
         let name = format!("{}: {}", limit.case, limit.stage);
         // Black is for the roofs.
-        Series { name, mark: Mark::Points, style: style + usize::from(style >= BLACK), points: vec![[x, y, y, y]] }
+        let style = Style::numbered(number + usize::from(number >= BLACK));
+        Series { name, style, points: vec![Point::new(x, y)] }
     };
     let roofs = [
-        roof("reading from memory; arithmetic", roofs.memory[0], Mark::Line),
-        roof("in place in memory; arithmetic", roofs.memory[2], Mark::Dashes),
-        roof("in place in the third cache; arithmetic", roofs.third_cache[2], Mark::Dots),
+        roof("reading from memory; arithmetic", roofs.memory[0], Line::Solid),
+        roof("in place in memory; arithmetic", roofs.memory[2], Line::Dashes),
+        roof("in place in the third cache; arithmetic", roofs.third_cache[2], Line::Dots),
     ];
-    Chart {
+    Plot {
         title,
         description: "What memory and arithmetic allow, and what each stage reaches.".to_owned(),
-        x: Axis { name: "operations on a byte per byte moved", logarithmic: true, ticks: vec![] },
-        y: Axis { name: "10^9 operations on a byte per second", logarithmic: true, ticks: vec![] },
+        x: Axis::logarithmic("operations on a byte per byte moved"),
+        y: Axis::logarithmic("10^9 operations on a byte per second"),
+        levels: vec![],
+        keys: vec![],
         series: own().enumerate().map(point).chain(roofs).collect(),
     }
 }
-
-/// The style of roofs.
-const BLACK: usize = 4;

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use bp_charts::{Axis, Line, Plot, Point, Series, Style, Value};
 use bp_core::{Backend, Profile, Size, Stage};
 use bp_cpu_rayon::Rayon;
 
 use crate::{
     Bench, Failure,
-    chart::{Axis, Chart, Mark, Series},
     machine::available_memory,
     pairs::{Scene, noise},
     report::{Group, Measured, number},
@@ -31,13 +31,21 @@ pub(crate) fn labels(bench: &Bench) -> Result<Group, Failure> {
     let compare = |labels, asked| ratio(&measured, &name(labels), &name(128), asked);
     let within = Some("at most 1.5");
     let ratios = [compare(2, None), compare(16, within), compare(300, within), compare(512, None)];
-    let points = LABELS.into_iter().zip(&measured).map(|(labels, m)| [labels as f64, m.median, m.min, m.max]);
+    let point =
+        |(labels, m): (usize, &Measured)| Point::new(labels as f64, Value { value: m.median, low: m.min, high: m.max });
+    let points = LABELS.into_iter().zip(&measured).map(point).collect();
     let title = format!("Time of a message entry: {}x{}, census, 1 thread", size.width, size.height);
-    let chart = Chart {
+    let chart = Plot {
         description: "Median, least and greatest time over rounds at each number of labels.".to_owned(),
-        x: Axis { name: "labels", logarithmic: true, ticks: LABELS.map(|labels| labels as f64).into() },
-        y: Axis { name: "nanoseconds per message entry", logarithmic: false, ticks: vec![] },
-        series: vec![Series { name: "update_messages".into(), mark: Mark::Both, style: 0, points: points.collect() }],
+        x: Axis { ticks: LABELS.map(|labels| labels as f64).into(), ..Axis::logarithmic("labels") },
+        y: Axis::linear("nanoseconds per message entry"),
+        levels: vec![],
+        keys: vec![],
+        series: vec![Series {
+            name: "update_messages".into(),
+            style: Style::numbered(0).with_line(Line::Solid),
+            points,
+        }],
         title,
     };
     let title = format!("Message update of {}, census, 1 grid, 10 checkerboard half-steps, 1 thread.", scene.name);
@@ -148,46 +156,50 @@ fn entrant<'a>(bench: &'a Bench, run: Run, megapixels: f64, scene: &'a Scene) ->
 const MEGAPIXELS: &str = "megapixels";
 
 /// Milliseconds against pixels, and lines of what would be proportional to pixels.
-fn chart(measured: &[Measured]) -> Chart {
+fn chart(measured: &[Measured]) -> Plot {
     let mut ticks: Vec<f64> = measured.iter().map(|m| (10.0 * m.facts[MEGAPIXELS]).round() / 10.0).collect();
     ticks.sort_by(f64::total_cmp);
     ticks.dedup();
-    Chart {
+    Plot {
         title: format!("Time against pixels: {LABELS} labels, census, 2 threads"),
         description: "Median, least and greatest time over rounds at each size.".to_owned(),
-        x: Axis { name: "megapixels", logarithmic: true, ticks },
-        y: Axis { name: "milliseconds", logarithmic: true, ticks: vec![] },
+        x: Axis { ticks, ..Axis::logarithmic("megapixels") },
+        y: Axis::logarithmic("milliseconds"),
+        levels: vec![],
+        keys: vec![],
         series: Run::ALL.into_iter().filter_map(|run| run.series(measured)).flatten().collect(),
     }
 }
 
 impl Run {
     /// Its times, and a line through the one next to 1 megapixel.
-    fn series(self, measured: &[Measured]) -> Option<[Series; 2]> {
-        let (names, style) = match self {
+    fn series(self, measured: &[Measured]) -> Option<[Series<Point>; 2]> {
+        let (names, number) = match self {
             Self::Sweep => (["sweep, whole match", "proportional to pixels (sweep)"], 0),
             Self::Update => (["message updates, 10 half-steps", "proportional to pixels (updates)"], 1),
         };
         let own = measured.iter().filter(|m| m.unit == self.unit());
-        let points: Vec<[f64; 4]> = own.map(|m| self.point(m)).collect();
-        let [x, y, ..] = points.iter().copied().min_by(|a, b| a[0].ln().abs().total_cmp(&b[0].ln().abs()))?;
-        let line = points.iter().map(|&[at, ..]| [at, y * at / x, y * at / x, y * at / x]).collect();
+        let points: Vec<Point> = own.map(|m| self.point(m)).collect();
+        let from_one = |point: &Point| point.x.value.ln().abs();
+        let next = points.iter().copied().min_by(|a, b| from_one(a).total_cmp(&from_one(b)))?;
+        let slope = next.y.value / next.x.value;
+        let line = points.iter().map(|point| Point::new(point.x, slope * point.x.value)).collect();
         let [name, proportional] = names.map(str::to_owned);
         Some([
-            Series { name, mark: Mark::Points, style, points },
-            Series { name: proportional, mark: Mark::Dashes, style, points: line },
+            Series { name, style: Style::numbered(number), points },
+            Series { name: proportional, style: Style::line(number, Line::Dashes), points: line },
         ])
     }
 
     /// Megapixels and milliseconds.
-    fn point(self, measured: &Measured) -> [f64; 4] {
+    fn point(self, measured: &Measured) -> Point {
         let megapixels = measured.facts[MEGAPIXELS];
         let times: Vec<f64> = match self {
             Self::Sweep => measured.samples.iter().map(|sample| sample * megapixels).collect(),
             Self::Update => measured.stages_ms.iter().map(|stages| stages[Stage::UpdateMessages as usize]).collect(),
         };
         let [low, high] = range(&times);
-        [megapixels, median(&times), low, high]
+        Point::new(megapixels, Value { value: median(&times), low, high })
     }
 
     fn unit(self) -> &'static str {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{DataArgs, named, percent, threads};
+use super::{DataArgs, percent, threads};
 use crate::{backends, gate::Solve, speed::Problem};
 
 /// `bp reproduce`.
@@ -50,9 +50,10 @@ pub(crate) struct SpeedArgs {
     /// backend's first device.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
-    /// Problems, separated by commas. [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = named(&Problem::ALL, Problem::name))]
-    pub(crate) problem: Vec<Problem>,
+    /// Problems, separated by commas; pixels, labels and loops are families of problems in which that number grows.
+    /// [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = Problem::ASKED)]
+    pub(crate) problem: Vec<String>,
     /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of
     /// them. [default: 9, with --quick 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -60,7 +61,7 @@ pub(crate) struct SpeedArgs {
     /// Images of a third of the width and height, and one round unless --rounds says otherwise. Says so in the output.
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Folder for speed.md and, with every sample, speed.json; neither may be there yet.
+    /// Folder for speed.md, its charts and, with every sample, speed.json; none may be there yet.
     #[arg(long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]

@@ -113,7 +113,7 @@ fn kernel(stage: Stage, problem: &'static str, backend: &str, speed: Option<&Spe
     let entries = contest.filter(|_| stage == Stage::UpdateMessages).map(|contest| contest.settings.message_updates);
     let contestant = speed.and_then(|speed| speed.contestants.iter().find(|contestant| contestant.name == backend));
     let samples = measured.map_or(&[][..], |measured| &measured.samples);
-    let is_timed = contestant.is_some_and(|contestant| contestant.times_stages(samples));
+    let is_timed = contestant.zip(measured).is_some_and(|(contestant, measured)| contestant.times_stages(measured));
     let is_timed = is_timed && (entries.is_some() || bytes.is_some());
     Bench {
         group: format!("Kernel {}", stage.name()),

@@ -5,13 +5,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use bp_charts::png;
+
 use crate::{
     args::SpeedArgs,
     backends,
     failure::Failure,
     files::{check_new, check_writable, create_folder, write_new},
     interrupt,
-    speed::{self, Outcome, Speed},
+    speed::{self, CHART_NAMES, Outcome, Speed, charts},
     tell, threads,
 };
 
@@ -39,7 +41,7 @@ pub(crate) fn write_speed(folder: &Path, speed: &Speed) -> Result<(), Failure> {
     Files::new(folder)?.write(speed, &speed::page(speed))
 }
 
-/// What is written, both new.
+/// What is written, all new.
 struct Files {
     folder: PathBuf,
     page: PathBuf,
@@ -47,13 +49,18 @@ struct Files {
 }
 
 impl Files {
-    /// The files of a folder, which holds neither yet.
+    /// The files of a folder, which holds none of them yet.
     fn new(folder: &Path) -> Result<Self, Failure> {
         let files =
             Self { folder: folder.to_owned(), page: folder.join("speed.md"), record: folder.join("speed.json") };
-        check_new(&files.page)?;
-        check_new(&files.record)?;
+        let charts = CHART_NAMES.into_iter().flat_map(|name| files.chart(name));
+        [files.page.clone(), files.record.clone()].into_iter().chain(charts).try_for_each(|path| check_new(&path))?;
         Ok(files)
+    }
+
+    /// A chart as text and as a picture.
+    fn chart(&self, name: &str) -> [PathBuf; 2] {
+        ["svg", "png"].map(|ending| self.folder.join(format!("{name}.{ending}")))
     }
 
     /// Makes the folder, and fails where nothing could be written to it; for telling so before the work is done.
@@ -64,7 +71,13 @@ impl Files {
 
     fn write(&self, speed: &Speed, page: &str) -> Result<(), Failure> {
         let json = serde_json::to_string_pretty(speed).map_err(|error| Failure::writing(&self.record, &error))?;
-        write_new(&self.record, &(json + "\n"))?;
+        write_new(&self.record, json + "\n")?;
+        for chart in charts(speed) {
+            let [text, picture] = self.chart(chart.name);
+            let svg = chart.plot.svg().map_err(|error| Failure::writing(&text, &error))?;
+            write_new(&picture, png(&svg).map_err(|error| Failure::writing(&picture, &error))?)?;
+            write_new(&text, svg)?;
+        }
         write_new(&self.page, page)?;
         tell(&format!("written: {} and {}", self.page.display(), self.record.display()));
         Ok(())

@@ -1,9 +1,11 @@
 //! The 14 diagrams of the thesis.
 
+use bp_charts::{Axis, DotChart, Key, Level, Series, Style, Value};
+
 use super::{
     Drawing,
-    chart::{Chart, Point, Series},
     format::{Spread, mebibytes, number},
+    legend,
     results::{Part, Results, Row},
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family},
 };
@@ -11,6 +13,15 @@ use crate::{
     failure::Failure,
     record::{Device, Measurement},
 };
+
+/// A value a scene.
+type PerScene = Series<Option<Value>>;
+
+/// One kind of number of one plan: a series a device.
+struct Group {
+    name: String,
+    series: Vec<PerScene>,
+}
 
 /// Number of a diagram, and of the table that it belongs to.
 type Numbers = (&'static str, &'static str);
@@ -58,20 +69,21 @@ fn speed_ups(
     plans: &[Named],
     parts: &[Part],
 ) -> Result<Drawing, Failure> {
-    let mut series = Vec::new();
+    let mut groups = Vec::new();
     for plan in plans {
         for &part in parts {
             let name = match part {
                 Part::MessagePassing => format!("{}: message passing", plan.title),
                 Part::Total => format!("{}: total", plan.title),
             };
-            series.extend(ours(results, &name, series.len(), |row| row.speed_up(plan.plan, part)));
+            let series = ours(results, &name, groups.len(), |row| row.speed_up(plan.plan, part));
+            groups.push(Group { name, series });
         }
     }
-    // Where each plan has one series, its printed one looks alike; else those are told apart among themselves.
-    let first_style = if series.len() == plans.len() { 0 } else { series.len() };
-    series.extend(printed(results, plans, first_style));
-    let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", series, Some(1.0));
+    // Where each plan has one group, its printed series looks alike; else those are told apart among themselves.
+    let first_look = if groups.len() == plans.len() { 0 } else { groups.len() };
+    let printed = printed(results, plans, first_look);
+    let chart = chart(results, format!("{what}: speed-up"), "time of BP / time of plan", (groups, printed), Some(1.0));
     let ours = if parts.len() == 1 { "ours are in all too" } else { "ours are apart for message passing and in all" };
     let caption = format!(
         "Above 1 is faster than BP. Printed times are of the thesis's GPU program in all; {ours}. Whiskers, where there \
@@ -80,79 +92,94 @@ fn speed_ups(
     drawing(numbers, chart, &caption)
 }
 
-/// The printed speed-ups of some plans; their styles are numbered from `style` on.
-fn printed(results: &Results<'_>, plans: &[Named], style: usize) -> Vec<Series> {
+/// The printed speed-ups of some plans; their looks are numbered from `first_look` on.
+fn printed(results: &Results<'_>, plans: &[Named], first_look: usize) -> Vec<PerScene> {
     // The same numbers are printed for every digit that CTCSBP's coefficient may have had.
     let mut plans: Vec<Named> = plans.to_vec();
     plans.dedup_by_key(|plan| plan.printed);
     let value = |plan: &Named, index| {
         let algorithm = plan.printed?;
         let value = results.thesis.time_ms("bp", index)? / results.thesis.time_ms(algorithm, index)?;
-        Some(Point { value, low: value, high: value })
+        Some(value.into())
     };
+    let look = if results.devices().len() > 1 { legend::any_device } else { Style::numbered };
     let series = |(i, plan): (usize, &Named)| Series {
         name: format!("{}: printed in the thesis", family(&[*plan])),
-        printed: true,
-        style: style + i,
+        style: look(first_look + i).hollow(),
         points: results.scenes().map(|(index, _)| value(plan, index)).collect(),
     };
     plans.iter().enumerate().map(series).collect()
 }
 
 fn memories(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
-    let series = measured(results, plans, |measured| mebibytes(measured.allocated_bytes));
-    let chart = chart(results, format!("{what}: required memory"), "MiB allocated", series, None);
+    let groups = measured(results, plans, |measured| mebibytes(measured.allocated_bytes));
+    let chart = chart(results, format!("{what}: required memory"), "MiB allocated", (groups, vec![]), None);
     drawing(numbers, chart, "Bytes allocated, counted. The thesis prints no memory figure.")
 }
 
 fn errors(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
-    let series = measured(results, plans, |measured| measured.all.rmse);
-    let chart = chart(results, format!("{what}: reliability"), "R over all known pixels, px", series, None);
+    let groups = measured(results, plans, |measured| measured.all.rmse);
+    let chart = chart(results, format!("{what}: reliability"), "R over all known pixels, px", (groups, vec![]), None);
     let caption = "Root mean squared error (equation 2.82); less is better. The thesis prints no reliability figure.";
     drawing(numbers, chart, caption)
 }
 
-/// A series a backend of one value of each plan's measurement.
-fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<Series> {
+/// One value of each plan's measurement.
+fn measured(results: &Results<'_>, plans: &[Named], value: impl Fn(&Measurement) -> f64) -> Vec<Group> {
     let of = |(i, plan): (usize, &Named)| {
-        ours(results, plan.title, i * results.devices().len(), |row| {
+        let series = ours(results, plan.title, i, |row| {
             let value = value(row.measured(plan.plan)?);
             Some(Spread { median: value, low: value, high: value, count: 1 })
-        })
+        });
+        Group { name: plan.title.to_owned(), series }
     };
-    plans.iter().enumerate().flat_map(of).collect()
+    plans.iter().enumerate().map(of).collect()
 }
 
-/// A series a backend that has a device, named after it where there are several or it only seems a GPU; their styles are
-/// numbered from `style` on.
-fn ours(results: &Results<'_>, name: &str, style: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<Series> {
+/// A series a backend that has a device, named after it where there are several or it only seems a GPU; their group has
+/// this number.
+fn ours(results: &Results<'_>, name: &str, group: usize, value: impl Fn(&Row<'_>) -> Option<Spread>) -> Vec<PerScene> {
     let devices = results.devices();
     let named = |device: &Device| results.backends().count() > 1 || device.software_rasteriser;
     let series = |(i, &(backend, device)): (usize, &(&str, &Device))| Series {
         name: if named(device) { format!("{name}, {}", results.label(backend)) } else { name.to_owned() },
-        printed: false,
-        style: style + i,
+        style: if devices.len() > 1 { legend::style(group, i) } else { Style::numbered(group) },
         points: (results.rows().filter(|row| row.backend == backend))
-            .map(|row| value(&row).map(|Spread { median, low, high, .. }| Point { value: median, low, high }))
+            .map(|row| value(&row).map(|Spread { median, low, high, .. }| Value { value: median, low, high }))
             .collect(),
     };
     devices.iter().enumerate().map(series).collect()
 }
 
-fn chart(results: &Results<'_>, title: String, y_label: &str, series: Vec<Series>, reference: Option<f64>) -> Chart {
+/// A chart of groups of ours and of printed series. On several devices, the legend names groups and devices, not each
+/// of their pairs.
+fn chart(
+    results: &Results<'_>,
+    title: String,
+    name: &str,
+    (groups, printed): (Vec<Group>, Vec<PerScene>),
+    reference: Option<f64>,
+) -> DotChart {
+    let mut keys = Vec::new();
+    if results.devices().len() > 1 {
+        keys = legend::keys(results, groups.iter().map(|group| group.name.clone()).enumerate());
+        keys.extend(printed.iter().map(|series| Key { name: series.name.clone(), style: series.style }));
+    }
+    let series: Vec<_> = groups.into_iter().flat_map(|group| group.series).chain(printed).collect();
     let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
-    Chart {
+    let level = |value| Level { name: format!("reference: {value}"), value, colour: None };
+    DotChart {
         description: format!("{title}, on {}. Series: {}.", results.data(), names.join("; ")),
-        y_label: format!("{y_label}; {}", results.setting()),
-        logarithmic: reference.is_some(),
-        reference,
+        axis: Axis { logarithmic: reference.is_some(), ..Axis::linear(format!("{name}; {}", results.setting())) },
+        levels: reference.into_iter().map(level).collect(),
+        keys,
         categories: results.scenes().map(|(_, scene)| scene.name.clone()).collect(),
         series,
         title,
     }
 }
 
-fn drawing((number, table): Numbers, chart: Chart, caption: &str) -> Result<Drawing, Failure> {
+fn drawing((number, table): Numbers, chart: DotChart, caption: &str) -> Result<Drawing, Failure> {
     let svg = chart.svg().map_err(|error| Failure::other(format!("diagram {number}: {error}")))?;
     Ok(Drawing {
         name: format!("diagram-{number}"),
@@ -164,18 +191,18 @@ fn drawing((number, table): Numbers, chart: Chart, caption: &str) -> Result<Draw
 }
 
 /// What a chart shows, in numbers: a row a scene.
-fn data_table(chart: &Chart) -> Table {
+fn data_table(chart: &DotChart) -> Table {
     let columns: Vec<&str> =
         std::iter::once("").chain(chart.series.iter().map(|series| series.name.as_str())).collect();
     let rows = chart.categories.iter().enumerate().map(|(i, category)| {
-        let value = |series: &Series| match series.points.get(i).copied().flatten() {
+        let value = |series: &PerScene| match series.points.get(i).copied().flatten() {
             None => "-".to_owned(),
-            Some(Point { value, low, high }) if low < high => {
+            Some(Value { value, low, high }) if low < high => {
                 format!("{} ({} to {})", number(value, 2), number(low, 2), number(high, 2))
             }
-            Some(Point { value, .. }) => number(value, 2),
+            Some(Value { value, .. }) => number(value, 2),
         };
         std::iter::once(category.clone()).chain(chart.series.iter().map(value)).collect()
     });
-    Table::new("", chart.y_label.clone(), &columns).rows(rows.collect::<Vec<_>>())
+    Table::new("", chart.axis.name.clone(), &columns).rows(rows.collect::<Vec<_>>())
 }

@@ -4,6 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use bp_core::{DisparityMap, Size};
+use maud::html;
 
 use super::{
     Drawing,
@@ -73,6 +74,8 @@ fn draw(
     let down = maps.len().div_ceil(ACROSS);
     let (width, row_height) = (ACROSS * (cell.width + GAP) + GAP, cell.height + GAP + NAME_HEIGHT);
     let height = TITLE_HEIGHT + down * row_height + GAP + BAR_HEIGHT;
+    let escaped = |text: &str| html! { (text) }.into_string();
+    let (title, setting) = (escaped(title), escaped(setting));
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          role=\"img\" font-family=\"sans-serif\" font-size=\"15\"><title>{title}</title>\
@@ -81,14 +84,14 @@ fn draw(
     );
     for (i, (name, map)) in maps.iter().enumerate() {
         let (x, y) = (GAP + i % ACROSS * (cell.width + GAP), TITLE_HEIGHT + GAP + i / ACROSS * row_height);
-        let _ = write!(svg, "<text x=\"{x}\" y=\"{}\">{name}</text>", y + NAME_HEIGHT - 8);
+        let _ = write!(svg, "<text x=\"{x}\" y=\"{}\">{}</text>", y + NAME_HEIGHT - 8, escaped(name));
         let y = y + NAME_HEIGHT;
         match map {
             Some(map) => svg += &embedded(map, x, y, last)?,
             None => _ = write!(svg, "<text x=\"{x}\" y=\"{}\">no map</text>", y + NAME_HEIGHT),
         }
     }
-    svg += &colour_bar(title, width - 2 * GAP, height - BAR_HEIGHT, last);
+    svg += &colour_bar(&title, width - 2 * GAP, height - BAR_HEIGHT, last);
     Ok(svg + "</svg>\n")
 }
 

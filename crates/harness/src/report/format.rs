@@ -1,5 +1,7 @@
 //! Numbers as text.
 
+pub(crate) use bp_charts::number;
+
 /// A sample of numbers: their median and range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spread {
@@ -39,17 +41,6 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// A number with so many decimals and commas between thousands.
-pub(crate) fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{:.decimals$}", value.abs());
-    let (whole, fraction) = text.split_once('.').map_or((text.as_str(), None), |(whole, rest)| (whole, Some(rest)));
-    let digits: Vec<char> = whole.chars().collect();
-    let groups: Vec<String> = digits.rchunks(3).rev().map(|group| group.iter().collect()).collect();
-    let sign = if value < 0.0 { "-" } else { "" };
-    let fraction = fraction.map_or(String::new(), |fraction| format!(".{fraction}"));
-    format!("{sign}{}{fraction}", groups.join(","))
-}
-
 /// A whole number with commas between thousands.
 pub(crate) fn whole(value: u64) -> String {
     let digits: Vec<char> = value.to_string().chars().collect();
@@ -71,9 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_commas_and_spreads_a_range_from_three_on() {
-        assert_eq!(number(-1_234_567.891, 2), "-1,234,567.89");
-        assert_eq!([number(999.9, 0), number(12.0, 1)], ["1,000", "12.0"]);
+    fn whole_numbers_have_commas_and_spreads_a_range_from_three_on() {
         assert_eq!(whole(1_000), "1,000");
         assert_eq!(Spread::of([3.0, 1.0, 2.0]).unwrap().to_string(), "2.0 (1.0 to 3.0)");
         assert_eq!(Spread::of([3000.0, 1000.0]).unwrap().to_string(), "2,000");

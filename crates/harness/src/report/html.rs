@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
     Drawing, Report,
-    markdown::{beneath, facts, heading, notes, title},
+    markdown::{TRADEOFFS, beneath, facts, heading, notes, title},
     tables::Table,
 };
 
@@ -48,6 +48,8 @@ pub(super) fn page(report: &Report<'_>) -> String {
                 @for figure in &report.figures { (drawing(figure)) }
                 h2 { "Diagrams" }
                 @for diagram in &report.diagrams { (drawing(diagram)) }
+                h2 { (TRADEOFFS) }
+                @for diagram in &report.tradeoffs { (drawing(diagram)) }
             }
         }
     }
@@ -62,7 +64,7 @@ fn contents(report: &Report<'_>) -> Markup {
                 @for table in &report.tables {
                     li { a href={ "#table-" (table.number) } { (heading(table)) } }
                 }
-                @for drawing in report.figures.iter().chain(&report.diagrams) {
+                @for drawing in report.drawings() {
                     li { a href={ "#" (drawing.name) } { (drawing.title) } }
                 }
             }

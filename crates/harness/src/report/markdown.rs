@@ -5,6 +5,9 @@ use std::fmt::Write as _;
 use super::{Drawing, Report, escape, results::UNAVAILABLE, tables::Table};
 use crate::record::{Device, Machine, Program};
 
+/// The heading of the diagrams that are ours.
+pub(super) const TRADEOFFS: &str = "Diagrams of ours: what plans cost and give";
+
 /// The whole page.
 pub(super) fn page(report: &Report<'_>) -> String {
     let mut text = format!("# {}\n\n", escape::markdown(&title(report)));
@@ -19,6 +22,8 @@ pub(super) fn page(report: &Report<'_>) -> String {
     report.figures.iter().for_each(|figure| text += &drawing(figure));
     text += "## Diagrams\n\n";
     report.diagrams.iter().for_each(|diagram| text += &drawing(diagram));
+    let _ = writeln!(text, "## {TRADEOFFS}\n");
+    report.tradeoffs.iter().for_each(|diagram| text += &drawing(diagram));
     text
 }
 
@@ -120,6 +125,7 @@ pub(crate) fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
 
 fn drawing(drawing: &Drawing) -> String {
     let Drawing { name, title, caption, table, .. } = drawing;
+    let [title, caption] = [title, caption].map(|text| escape::markdown(text));
     let table = table.as_ref().map_or(String::new(), |table| format!("{}\n\n{}\n", table.title, grid(table)));
     format!("### {title}\n\n{caption}\n\n![{title}]({name}.svg)\n\n{table}")
 }

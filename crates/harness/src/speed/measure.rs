@@ -93,7 +93,8 @@ pub(super) fn contest(
     };
     let (width, height) = (pair.size().width, pair.size().height);
     let entries = devices.iter().zip(entrants).map(entry).collect();
-    Ok(Contest { problem: problem.name().to_owned(), width, height, settings, labels_sha256, entries })
+    let (problem, family) = (problem.name().to_owned(), problem.family());
+    Ok(Contest { problem, family, width, height, settings, labels_sha256, entries })
 }
 
 fn sha256(labels: &[u16]) -> String {
@@ -134,7 +135,7 @@ impl Turns<'_> {
         let first_ms = milliseconds(self.solve(opened, &mut matcher)?.total);
         let rounds = if first_ms > FEW_ROUNDS_ABOVE_MS { self.rounds.min(FEW_ROUNDS) } else { self.rounds };
         self.work.skip(u64::from(self.rounds - rounds) * self.plan.message_updates());
-        let line = format!("{:<10}{:<10}ready in {prepare_ms:>8.1} ms", self.name, opened.name);
+        let line = format!("{:<12}{:<10}ready in {prepare_ms:>8.1} ms", self.name, opened.name);
         self.work.bar.line(&format!("{line}, first solve {first_ms:>10.1} ms"));
         let measurement = Measurement {
             prepare_ms,
@@ -187,7 +188,7 @@ impl Turns<'_> {
         }
         opened.note(&failure);
         self.work.skip(u64::from(left) * self.plan.message_updates());
-        self.work.bar.line(&format!("{:<10}{:<10}{failure}", self.name, opened.name));
+        self.work.bar.line(&format!("{:<12}{:<10}{failure}", self.name, opened.name));
         let beyond = failure.is_beyond_device();
         Ok(if beyond { Outcome::Unavailable(failure.to_string()) } else { Outcome::Error(failure.to_string()) })
     }

@@ -1,9 +1,13 @@
 //! What `bp speed` found. These types are the JSON of `speed.json`; what they share with runs of `bp reproduce` is
 //! documented in [`crate::record`].
 
+use bp_core::Stage;
 use serde::Serialize;
 
-use crate::record::{Clock, Clocked, Device, Machine, Program, Settings, Stages};
+use crate::{
+    record::{Clock, Clocked, Device, Machine, Program, Settings, Stages},
+    report::format::Spread,
+};
 
 /// Version of the schema; changes with every change of meaning.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
@@ -52,6 +56,9 @@ pub(crate) struct Contestant {
 pub(crate) struct Contest {
     /// Name of the problem.
     pub(crate) problem: String,
+    /// What grows from it to the next problem, all else being alike; none where there is no such problem, and in
+    /// records from before there were any.
+    pub(crate) family: Option<Family>,
     /// Pixels per row.
     pub(crate) width: usize,
     /// Pixels per column.
@@ -62,6 +69,18 @@ pub(crate) struct Contest {
     pub(crate) labels_sha256: Option<String>,
     /// In the order of the contestants.
     pub(crate) entries: Vec<Entry>,
+}
+
+/// Problems that are alike but for one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Family {
+    /// Pixels of an image.
+    Pixels,
+    /// Labels of a pixel.
+    Labels,
+    /// Loops on the one grid.
+    Loops,
 }
 
 /// A contestant in a contest.
@@ -140,11 +159,60 @@ impl StageBytes {
     }
 }
 
+impl Family {
+    pub(crate) const ALL: [Self; 3] = [Self::Pixels, Self::Labels, Self::Loops];
+
+    /// Its name: what grows.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Pixels => "pixels",
+            Self::Labels => "labels",
+            Self::Loops => "loops",
+        }
+    }
+
+    /// The number that grows.
+    pub(crate) fn number_of(self, contest: &Contest) -> u64 {
+        match self {
+            Self::Pixels => contest.width as u64 * contest.height as u64,
+            Self::Labels => contest.settings.labels as u64,
+            Self::Loops => contest.settings.steps_per_grid.into(),
+        }
+    }
+}
+
+impl Speed {
+    /// The problems of a family, or those of none.
+    pub(crate) fn contests_of(&self, family: Option<Family>) -> impl Iterator<Item = &Contest> {
+        self.contests.iter().filter(move |contest| contest.family == family)
+    }
+
+    /// The contestant of an entry.
+    pub(crate) fn contestant(&self, entry: &Entry) -> Option<&Contestant> {
+        self.contestants.iter().find(|contestant| contestant.name == entry.contestant)
+    }
+
+    /// The same as tables and charts name it.
+    pub(crate) fn label(&self, entry: &Entry) -> String {
+        self.contestant(entry).map_or_else(|| entry.contestant.clone(), Contestant::label)
+    }
+}
+
 impl Contestant {
     /// Whether its stages are timed: a processor's take as long as their calls, of a GPU only its own clock tells.
-    pub(crate) fn times_stages(&self, samples: &[Sample]) -> bool {
-        let waits = self.device.as_ref().is_some_and(|device| device.api.is_none());
-        waits || samples.iter().all(|sample| sample.device_stages().is_some())
+    pub(crate) fn times_stages(&self, measurement: &Measurement) -> bool {
+        self.device.as_ref().is_some_and(|device| device.api.is_none()) || measurement.has_clock()
+    }
+
+    /// The stages of a measurement of its that took any time.
+    pub(crate) fn stages(&self, measurement: &Measurement) -> impl Iterator<Item = StageTime> {
+        let moved = measurement.moved_bytes.as_ref().filter(|_| self.times_stages(measurement));
+        let time = move |stage: Stage| {
+            let ms = Spread::of(measurement.samples.iter().map(|sample| sample.stages_ms()[stage as usize]))?;
+            let bytes = moved.map(|bytes| bytes.in_order()[stage as usize]).filter(|&bytes| bytes > 0);
+            (ms.high > 0.0).then_some(StageTime { stage, ms, bytes })
+        };
+        Stage::ALL.into_iter().filter_map(time)
     }
 
     /// Its name; what is no GPU says so wherever its times may stand.
@@ -161,6 +229,31 @@ impl Outcome {
             Self::Measured(measurement) => Some(measurement),
             Self::Error(_) | Self::Unavailable(_) => None,
         }
+    }
+}
+
+/// A stage that took some time.
+pub(crate) struct StageTime {
+    pub(crate) stage: Stage,
+    pub(crate) ms: Spread,
+    /// What it has to read and write at least, where the device counts it and times the stage.
+    pub(crate) bytes: Option<u64>,
+}
+
+impl StageTime {
+    /// 10^9 bytes a second, with their range.
+    pub(crate) fn gb_per_s(&self) -> Option<Spread> {
+        let bytes = self.bytes? as f64;
+        let Spread { median, low, high, count } = self.ms;
+        let [median, low, high] = [median, high, low].map(|ms| bytes / (1e6 * ms));
+        Some(Spread { median, low, high, count })
+    }
+}
+
+impl Measurement {
+    /// Whether the stages are timed by the device's own clock.
+    pub(crate) fn has_clock(&self) -> bool {
+        self.samples.iter().all(|sample| sample.device_ms().is_some())
     }
 }
 

@@ -4,7 +4,11 @@ use std::fmt::Write as _;
 
 use bp_core::Stage;
 
-use super::record::{Contest, Contestant, Entry, Measurement, Outcome, Sample, Speed};
+use super::{
+    Chart,
+    charts::{growth, roofline},
+    record::{Contest, Contestant, Entry, Family, Measurement, Outcome, Sample, Speed, StageTime},
+};
 use crate::report::{
     device_fact,
     format::{Spread, mebibytes, number, or, whole},
@@ -23,15 +27,26 @@ pub(crate) fn page(speed: &Speed) -> String {
     let quick = if speed.quick { ", a quick run" } else { "" };
     let mut text = format!("# Devices beside one another, on {}{quick}\n\n", speed.machine.cpu);
     facts(speed).iter().for_each(|fact| _ = writeln!(text, "* {fact}"));
-    text += "\n## Problems\n\n";
-    speed.contests.iter().for_each(|contest| _ = writeln!(text, "* {}", described(contest)));
-    let _ = writeln!(text, "\n## Times\n\n{READING}\n\n{}", times(speed));
+    let _ = writeln!(text, "\n{READING}\n");
+    if speed.contests_of(None).next().is_some() {
+        text += "## Problems\n\n";
+        speed.contests_of(None).for_each(|contest| _ = writeln!(text, "* {}", described(contest)));
+        let _ = writeln!(text, "\n## Times\n\n{}", times(speed));
+        text += &(ratios(speed) + &stages(speed));
+    }
+    Family::ALL.into_iter().for_each(|family| text += &family_section(speed, family));
+    text += &roofline(speed).as_ref().map_or(String::new(), shown);
     let beneath = beneath(speed);
-    beneath.iter().for_each(|line| _ = writeln!(text, "* {line}"));
-    text += if beneath.is_empty() { "" } else { "\n" };
-    text += &ratios(speed);
-    text += &stages(speed);
+    if !beneath.is_empty() {
+        text += "## Less than asked for\n\n";
+        beneath.iter().for_each(|line| _ = writeln!(text, "* {line}"));
+    }
     text
+}
+
+/// A chart under its heading.
+fn shown(Chart { name, plot, caption }: &Chart) -> String {
+    format!("## {0}\n\n{caption}\n\n![{0}]({name}.svg)\n\n", plot.title)
 }
 
 /// What a reader must know before the numbers.
@@ -71,16 +86,39 @@ fn described(contest: &Contest) -> String {
     )
 }
 
-impl Speed {
-    /// All problems with all contestants that took part.
-    fn rows(&self) -> impl Iterator<Item = (&Contest, &Entry)> {
-        self.contests.iter().flat_map(|contest| contest.entries.iter().map(move |entry| (contest, entry)))
-    }
+/// Time against the number that grows in a family, as a chart and as a table.
+fn family_section(speed: &Speed, family: Family) -> String {
+    let contests: Vec<_> = speed.contests_of(Some(family)).collect();
+    let (Some(chart), Some(first)) = (growth(speed, family), contests.first()) else { return String::new() };
+    let labels = first.entries.iter().map(|entry| format!("{}, ms", speed.label(entry)));
+    let columns: Vec<_> = ["problem", family.name()].map(str::to_owned).into_iter().chain(labels).collect();
+    let cell = |entry: &Entry| match &entry.outcome {
+        Outcome::Measured(measured) => spread(Spread::of(measured.samples.iter().map(|sample| sample.total_ms))),
+        other => missing(other).to_owned(),
+    };
+    let rows = contests.iter().map(|contest| {
+        let which = [contest.problem.clone(), whole(family.number_of(contest))];
+        which.into_iter().chain(contest.entries.iter().map(cell)).collect()
+    });
+    let rows: Vec<_> = rows.collect();
+    format!("{}The first: {}\n\n{}\n", shown(&chart), described(first), lines(&columns, &rows))
+}
 
-    /// A contestant as tables name it.
-    fn label(&self, entry: &Entry) -> String {
-        let contestant = self.contestants.iter().find(|contestant| contestant.name == entry.contestant);
-        contestant.map_or_else(|| entry.contestant.clone(), Contestant::label)
+/// All problems of no family with all contestants that took part.
+fn rows(speed: &Speed) -> impl Iterator<Item = (&Contest, &Entry)> {
+    speed.contests_of(None).flat_map(entries)
+}
+
+fn entries(contest: &Contest) -> impl Iterator<Item = (&Contest, &Entry)> {
+    contest.entries.iter().map(move |entry| (contest, entry))
+}
+
+/// What stands in place of numbers.
+fn missing(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Measured(_) => "",
+        Outcome::Error(_) => "failed",
+        Outcome::Unavailable(_) => "unavailable",
     }
 }
 
@@ -97,12 +135,11 @@ fn times(speed: &Speed) -> String {
         "of that compiling, ms",
         "MiB allocated",
     ];
-    let rows = speed.rows().map(|(contest, entry)| {
+    let rows = rows(speed).map(|(contest, entry)| {
         let mut cells = vec![contest.problem.clone(), speed.label(entry)];
         match &entry.outcome {
             Outcome::Measured(measurement) => cells.extend(times_of(contest, measurement)),
-            Outcome::Error(_) => cells.push("failed".to_owned()),
-            Outcome::Unavailable(_) => cells.push("unavailable".to_owned()),
+            other => cells.push(missing(other).to_owned()),
         }
         cells
     });
@@ -128,7 +165,7 @@ fn times_of(contest: &Contest, measurement: &Measurement) -> [String; 7] {
     ]
 }
 
-/// Why numbers are missing in the table of times, or are fewer than others.
+/// Why numbers are missing, or are fewer than others.
 fn beneath(speed: &Speed) -> Vec<String> {
     let line = |(contest, entry): (&Contest, &Entry)| {
         let what = match &entry.outcome {
@@ -142,13 +179,13 @@ fn beneath(speed: &Speed) -> Vec<String> {
         };
         Some(format!("{} on {}: {what}.", contest.problem, speed.label(entry)))
     };
-    speed.rows().filter_map(line).collect()
+    speed.contests.iter().flat_map(entries).filter_map(line).collect()
 }
 
 /// How many times as long as the first contestant that is there the others take.
 fn ratios(speed: &Speed) -> String {
     let mut rows = Vec::new();
-    for contest in &speed.contests {
+    for contest in speed.contests_of(None) {
         let Some((first, others)) = contest.entries.split_first() else { continue };
         let Some(base) = first.outcome.measured() else { continue };
         for other in others {
@@ -187,7 +224,7 @@ fn stages(speed: &Speed) -> String {
                     more than that says that some stayed in caches.\n\n"
         .to_owned();
     let columns = ["backend", "stage", "clock", "ms", "GB/s", "% of copying"];
-    for contest in &speed.contests {
+    for contest in speed.contests_of(None) {
         let rows = contest.entries.iter().flat_map(|entry| stages_of(speed, entry));
         let _ = writeln!(text, "### {}\n\n{}", contest.problem, table(&columns, rows));
     }
@@ -197,23 +234,17 @@ fn stages(speed: &Speed) -> String {
 /// The stages of a contestant that took any time.
 fn stages_of(speed: &Speed, entry: &Entry) -> Vec<Vec<String>> {
     let Some(measured) = entry.outcome.measured() else { return Vec::new() };
-    let contestant = speed.contestants.iter().find(|contestant| contestant.name == entry.contestant);
+    let contestant = speed.contestant(entry);
     let copying = contestant.and_then(|contestant| contestant.copy_gb_per_s);
-    let has_clock = measured.samples.iter().all(|sample| sample.device_ms().is_some());
-    let is_timed = contestant.is_some_and(|contestant| contestant.times_stages(&measured.samples));
-    let bytes = measured.moved_bytes.as_ref().filter(|_| is_timed);
-    let row = |stage: Stage| {
-        let index = stage as usize;
-        let ms = Spread::of(measured.samples.iter().map(|sample| sample.stages_ms()[index]))?;
-        let bytes = bytes.map(|bytes| bytes.in_order()[index]).filter(|&bytes| bytes > 0);
-        let rate = bytes.map(|bytes| bytes as f64 / (1e6 * ms.median));
+    let clock = if measured.has_clock() { "device" } else { "wall" };
+    let row = |time: StageTime| {
+        let rate = time.gb_per_s().map(|rate| rate.median);
         let part = rate.zip(copying).map(|(rate, copying)| number(100.0 * rate / copying, 0));
-        let clock = if has_clock { "device" } else { "wall" };
-        let which = [speed.label(entry), stage.name().to_owned(), clock.to_owned()];
-        let cells = [spread(Some(ms)), or(rate.map(figures), ""), or(part, "")];
-        (ms.high > 0.0).then(|| [which, cells].concat())
+        let which = [speed.label(entry), time.stage.name().to_owned(), clock.to_owned()];
+        let cells = [spread(Some(time.ms)), or(rate.map(figures), ""), or(part, "")];
+        [which, cells].concat()
     };
-    Stage::ALL.into_iter().filter_map(row).collect()
+    contestant.into_iter().flat_map(|contestant| contestant.stages(measured)).map(row).collect()
 }
 
 fn table(columns: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {

@@ -159,7 +159,11 @@ fn speed_ups_of_two_records_are_counted_where_they_overlap() {
 fn records_of_other_problems_are_refused_side_by_side() {
     let folder = Folder::new();
     let rayon = run(&folder, RAYON);
-    folder.fails(&format!("compare {rayon} {}", committed(SYNTHETIC)), 3, &[SYNTHETIC, "data set", "synthetic", "rayon.json"]);
+    folder.fails(
+        &format!("compare {rayon} {}", committed(SYNTHETIC)),
+        3,
+        &[SYNTHETIC, "data set", "synthetic", "rayon.json"],
+    );
     let changes: [Change; 4] = [
         ("quick.json", |record| record["run"]["quick"] = json!(true), "--quick"),
         ("labels.json", |record| record["run"]["labels"] = json!(64), "L = 64, but 112"),

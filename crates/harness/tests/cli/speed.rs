@@ -31,10 +31,34 @@ fn a_run_writes_a_page_and_every_sample_once() {
     assert_eq!(fs::read_to_string(folder.path("new/folder/speed.md")).unwrap(), page);
 }
 
+/// Each family is a chart and a table; the scalar and the rayon backend count no bytes, so that nothing has a roof.
+#[test]
+fn families_of_problems_are_drawn() {
+    let folder = Folder::new();
+    let run = "speed --quick --problem loops,labels --backend scalar,rayon --threads 2 --rounds 3 --output out";
+    let output = folder.run(run);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let page = text(&output.stdout);
+    let words =
+        ["| problem | loops | scalar, ms | rayon, ms |", "| labels-256 | 256 | ", "![Time against loops](loops.svg)"];
+    assert!(words.iter().all(|word| page.contains(word)) && !page.contains("## Times"), "{page}");
+    for name in ["loops", "labels"] {
+        let svg = fs::read_to_string(folder.path(&format!("out/{name}.svg"))).unwrap();
+        let shown = ["scalar", "rayon", "milliseconds from images to labels, logarithmic axis"];
+        assert!(shown.iter().all(|text| svg.contains(&format!(">\n{text}\n<"))), "{svg}");
+        assert_eq!(image::image_dimensions(folder.path(&format!("out/{name}.png"))).unwrap().0, 1800);
+    }
+    assert!(!folder.path("out/pixels.svg").exists() && !folder.path("out/roofline.svg").exists());
+    for name in ["speed.json", "speed.md", "loops.svg"] {
+        fs::remove_file(folder.path(&format!("out/{name}"))).unwrap();
+    }
+    folder.fails(run, 1, &["loops.png", "overwritten"]);
+}
+
 #[test]
 fn what_cannot_be_run_is_told() {
     let folder = Folder::new();
-    folder.fails("speed --problem chess", 2, &["chess", "update", "published"]);
+    folder.fails("speed --problem chess", 2, &["chess", "update", "published", "pixels"]);
     folder.fails("speed --quick --backend rayon,rayon:0", 2, &["rayon twice"]);
     folder.fails("speed --quick --backend magic", 5, &["magic", "scalar"]);
 }

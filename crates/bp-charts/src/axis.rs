@@ -1,0 +1,121 @@
+//! Axes: what they show, from where to where, and which values they mark.
+
+use plotters::{coord::types::RangedCoordf64, prelude::Ranged};
+
+/// What stands along an axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What the values are, with their unit.
+    pub name: String,
+    /// Whether it is logarithmic; one that is not shows 0.
+    pub logarithmic: bool,
+    /// The values that are marked; none to have them chosen.
+    pub ticks: Vec<f64>,
+}
+
+impl Axis {
+    /// An axis that shows 0, whose marks are chosen.
+    pub fn linear(name: impl Into<String>) -> Self {
+        Self { name: name.into(), logarithmic: false, ticks: Vec::new() }
+    }
+
+    /// A logarithmic axis, whose marks are chosen.
+    pub fn logarithmic(name: impl Into<String>) -> Self {
+        Self { logarithmic: true, ..Self::linear(name) }
+    }
+
+    /// Its name as charts show it.
+    pub(crate) fn label(&self) -> String {
+        format!("{}{}", self.name, if self.logarithmic { ", logarithmic axis" } else { "" })
+    }
+
+    /// Whether the axis can show a value; the bounds keep its labels short.
+    pub(crate) fn shows(&self, value: f64) -> bool {
+        value.abs() <= 1e15 && (!self.logarithmic || value >= 1e-6)
+    }
+
+    /// The axis over those of some values that it can show; none where there are none.
+    pub(crate) fn scale(&self, values: impl IntoIterator<Item = f64>) -> Option<Scale> {
+        let values: Vec<f64> = values.into_iter().filter(|&value| self.shows(value)).collect();
+        let first = *values.first()?;
+        let (low, high) = values.iter().fold((first, first), |(low, high), &value| (low.min(value), high.max(value)));
+        Some(Scale::new(self, low, high))
+    }
+}
+
+/// Where an axis begins and ends, as heights, and the values that it marks.
+pub(crate) struct Scale {
+    logarithmic: bool,
+    low: f64,
+    high: f64,
+    pub(crate) ticks: Vec<f64>,
+}
+
+impl Scale {
+    fn new(axis: &Axis, low: f64, high: f64) -> Self {
+        let logarithmic = axis.logarithmic;
+        let (low, high) = if logarithmic { (low.log10(), high.log10()) } else { (low.min(0.0), high.max(0.0)) };
+        // One value alone has no span to take a share of.
+        let margin = if high - low < 1e-9 { 1.0 } else { 0.06 * (high - low) };
+        let (low, high) = (if logarithmic || low < 0.0 { low - margin } else { 0.0 }, high + margin);
+        let mut scale = Self { logarithmic, low, high, ticks: Vec::new() };
+        scale.ticks = match &axis.ticks[..] {
+            [] if logarithmic => decade_ticks(low, high),
+            [] => RangedCoordf64::from(low..high).key_points(7),
+            asked => asked.iter().copied().filter(|&tick| axis.shows(tick) && scale.reaches(tick)).collect(),
+        };
+        scale
+    }
+
+    fn height(&self, value: f64) -> f64 {
+        // No logarithm of a number below 0: it is not a number, and so would be the place.
+        if self.logarithmic { value.max(0.0).log10() } else { value }
+    }
+
+    fn reaches(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&self.height(value))
+    }
+
+    /// How far along the axis a value lies, from 0 to 1; what is beyond an end is put there.
+    pub(crate) fn fraction(&self, value: f64) -> f64 {
+        (self.height(value).clamp(self.low, self.high) - self.low) / (self.high - self.low)
+    }
+}
+
+/// Ticks at 1, 2 and 5 times the powers of ten between two heights; at more or fewer digits where they are not 4 to 12,
+/// and at equal steps where the range is too narrow for those.
+fn decade_ticks(low: f64, high: f64) -> Vec<f64> {
+    const DIGITS: [(&[f64], usize); 4] =
+        [(&[1.0, 2.0, 5.0], 1), (&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1), (&[1.0], 1), (&[1.0], 3)];
+    let span = 10f64.powf(low)..10f64.powf(high);
+    let choices = DIGITS.iter().map(|&(digits, every)| -> Vec<f64> {
+        let powers = (-6..=15).step_by(every).map(|power| 10f64.powi(power));
+        powers.flat_map(|power| digits.iter().map(move |digit| digit * power)).filter(|t| span.contains(t)).collect()
+    });
+    let even = || RangedCoordf64::from(span.clone()).key_points(7);
+    choices.into_iter().find(|ticks| (4..=12).contains(&ticks.len())).unwrap_or_else(even)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_few_round_and_on_the_axis() {
+        let ticks = |axis: &Axis, low, high| axis.scale([low, high]).unwrap().ticks;
+        assert_eq!(ticks(&Axis::logarithmic(""), 0.8, 30.0), [1.0, 2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(ticks(&Axis::logarithmic(""), 1.0, 1e6), [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6]);
+        assert_eq!(ticks(&Axis::linear(""), 3.0, 10.0)[..2], [0.0, 2.0]);
+        let asked = Axis { ticks: vec![0.0, 1.0, 16.0, 512.0, 4096.0], ..Axis::logarithmic("") };
+        assert_eq!(ticks(&asked, 1.0, 512.0), [1.0, 16.0, 512.0]);
+    }
+
+    #[test]
+    fn ends_lie_beyond_the_values_but_a_linear_axis_begins_at_0() {
+        let scale = Axis::linear("").scale([2.0, 10.0]).unwrap();
+        assert!(scale.fraction(0.0) == 0.0 && scale.fraction(10.0) < 1.0 && scale.fraction(1e9) == 1.0);
+        let scale = Axis::logarithmic("").scale([2.0, 0.0, 50.0]).unwrap();
+        assert!(scale.fraction(2.0) > 0.0 && (scale.fraction(10.0) - 0.5).abs() < 1e-12 && scale.fraction(-1.0) == 0.0);
+        assert!(Axis::logarithmic("").scale([0.0, f64::NAN]).is_none());
+    }
+}

@@ -1,0 +1,105 @@
+//! Markers side by side in categories.
+
+use plotters::{prelude::*, style::text_anchor::HPos};
+
+use crate::{
+    Axis, Error, Key, Level, Series, Value, entries,
+    sheet::{Canvas, Drawn, INK, MARGIN, Parts, ROW, Room, Sheet, TEXT_SIZE, WIDTH, text, widest},
+    style::{MARKER_UNIT, colour, draw_marker, draw_path, draw_whisker},
+};
+
+/// A dot chart: categories from left to right and, within each, one marker a series.
+#[derive(Clone, Debug)]
+pub struct DotChart {
+    /// The heading; the ids in the SVG derive from it, so no two charts of a page may share it.
+    pub title: String,
+    /// What the chart shows, for those who cannot see it.
+    pub description: String,
+    /// The vertical axis; its name stands above it.
+    pub axis: Axis,
+    /// Values to compare with.
+    pub levels: Vec<Level>,
+    /// What the legend holds besides the levels; where empty, the series.
+    pub keys: Vec<Key>,
+    /// The names along the horizontal axis.
+    pub categories: Vec<String>,
+    /// In the order of the markers: a point a category, `None` where there is no value. Lines are not
+    /// drawn.
+    pub series: Vec<Series<Option<Value>>>,
+}
+
+const RIGHT: f64 = WIDTH - MARGIN;
+const BAND: RGBColor = RGBColor(246, 246, 246);
+
+impl DotChart {
+    /// The chart as an SVG element.
+    ///
+    /// # Errors
+    ///
+    /// When the drawing library fails.
+    pub fn svg(&self) -> Result<String, Error> {
+        let sheet = self.sheet();
+        sheet.svg(|canvas| self.draw_categories(canvas, &sheet), |canvas| self.draw_values(canvas, &sheet))
+    }
+
+    fn sheet(&self) -> Sheet<'_> {
+        let values = self.series.iter().flat_map(|series| self.points(series));
+        let ends: Vec<f64> = values.flat_map(|(_, Value { value, low, high })| [value, low, high]).collect();
+        let levels = self.levels.iter().map(|level| level.value).filter(|_| !ends.is_empty());
+        let parts = Parts {
+            title: &self.title,
+            description: &self.description,
+            axis: &self.axis,
+            scale: self.axis.scale(ends.iter().copied().chain(levels)),
+            levels: &self.levels,
+            entries: entries(&self.keys, &self.series),
+        };
+        Sheet::new(parts, Room { right: RIGHT, plot_height: 260.0 }, |left| self.name_rows(left))
+    }
+
+    /// The points of a series that the axis can show, with the number of their category.
+    fn points(&self, series: &Series<Option<Value>>) -> impl Iterator<Item = (usize, Value)> {
+        let points = series.points.iter().take(self.categories.len()).enumerate();
+        points.filter_map(|(category, point)| Some((category, point.filter(|point| self.axis.shows(point.value))?)))
+    }
+
+    /// The width of a category.
+    fn slot(&self, left: f64) -> f64 {
+        (RIGHT - left) / self.categories.len().max(1) as f64
+    }
+
+    /// Rows that the names of the categories take turns in, where they are too wide for one.
+    fn name_rows(&self, left: f64) -> usize {
+        ((widest(&self.categories) + 8.0) / self.slot(left)).ceil() as usize
+    }
+
+    /// The bands that tell the categories apart, and their names below.
+    fn draw_categories(&self, canvas: &Canvas<'_>, sheet: &Sheet<'_>) -> Drawn {
+        let (slot, rows) = (self.slot(sheet.left), self.name_rows(sheet.left));
+        for (place, name) in self.categories.iter().enumerate() {
+            let (left, right) = (sheet.left + slot * place as f64, sheet.left + slot * (place + 1) as f64);
+            if place % 2 == 0 {
+                canvas.draw(&Rectangle::new([(left, sheet.top), (right, sheet.bottom)], BAND.filled()))?;
+            }
+            let y = sheet.bottom + ROW * ((place % rows.max(1)) as f64 + 0.7);
+            text(canvas, (f64::midpoint(left, right), y), name, TEXT_SIZE, HPos::Center)?;
+        }
+        draw_path(canvas, &[(sheet.left, sheet.bottom), (RIGHT, sheet.bottom)], INK)
+    }
+
+    fn draw_values(&self, canvas: &Canvas<'_>, sheet: &Sheet<'_>) -> Drawn {
+        // Few markers stay together in the middle of their category, many leave a gap to the next one.
+        let (slot, count) = (self.slot(sheet.left), self.series.len() as f64);
+        let step = slot * (0.84 / count).min(0.15);
+        for (place, series) in self.series.iter().enumerate() {
+            for (category, Value { value, low, high }) in self.points(series) {
+                let x = sheet.left + slot * (category as f64 + 0.5) + step * (place as f64 - (count - 1.0) / 2.0);
+                if high > low {
+                    draw_whisker(canvas, [(x, sheet.y(low)), (x, sheet.y(high))], colour(series.style.colour))?;
+                }
+                draw_marker(canvas, (x, sheet.y(value)), series.style, MARKER_UNIT.min(0.38 * step))?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! Charts as pictures of pixels.
+
+use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
+    sync::{Arc, LazyLock},
+};
+
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
+use resvg::{
+    render,
+    tiny_skia::{Pixmap, Transform},
+    usvg::{Options, Tree, fontdb::Database},
+};
+
+use crate::Error;
+
+/// Pixels of the picture for one of the chart.
+const SCALE: u32 = 2;
+
+/// The family that stands for sans-serif.
+const FAMILY: &str = "Noto Sans";
+
+/// The only fonts that are used, so that the picture does not depend on those of the machine.
+static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
+    let mut fonts = Database::new();
+    [notosans::REGULAR_TTF, notosans::BOLD_TTF].into_iter().for_each(|font| fonts.load_font_data(font.to_vec()));
+    fonts.set_sans_serif_family(FAMILY);
+    Arc::new(fonts)
+});
+
+/// A chart's SVG text as a PNG file of twice its width and height.
+///
+/// # Errors
+///
+/// When the text is none that a chart gives.
+pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
+    let failed = |error: &dyn std::fmt::Display| Error(format!("no picture can be made of the chart: {error}"));
+    let options = Options { fontdb: Arc::clone(&FONTS), font_family: FAMILY.to_owned(), ..Options::default() };
+    let tree = Tree::from_str(svg, &options).map_err(|error| failed(&error))?;
+    let [width, height] = [tree.size().width(), tree.size().height()].map(|side| (SCALE as f32 * side) as u32);
+    let mut pixmap = Pixmap::new(width, height).ok_or_else(|| failed(&"it has no size"))?;
+    render(&tree, Transform::from_scale(SCALE as f32, SCALE as f32), &mut pixmap.as_mut());
+    let mut file = Vec::new();
+    encode(&mut file, &pixmap).map_err(|error| failed(&error))?;
+    Ok(file)
+}
+
+/// Red, green and blue.
+type Colour = [u8; 3];
+
+/// Writes a PNG of 256 colours: a third of the bytes, as charts have few colours and the edges of shapes between them.
+fn encode(file: &mut Vec<u8>, pixmap: &Pixmap) -> Result<(), EncodingError> {
+    // The sheet is white and opaque all over.
+    let pixels: Vec<Colour> = pixmap.data().chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    let (palette, indices) = palette(&pixels);
+    let mut encoder = Encoder::new(file, pixmap.width(), pixmap.height());
+    encoder.set_color(ColorType::Indexed);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_palette(palette.concat());
+    encoder.set_compression(Compression::High);
+    encoder.set_filter(Filter::NoFilter);
+    let mut writer = encoder.write_header()?;
+    let run = |run: &[Colour]| std::iter::repeat_n(indices[&run[0]], run.len());
+    writer.write_image_data(&runs(&pixels).flat_map(run).collect::<Vec<u8>>())?;
+    writer.finish()
+}
+
+/// Neighbours of one colour, which most pixels are: few colours are looked up.
+fn runs(pixels: &[Colour]) -> impl Iterator<Item = &[Colour]> {
+    pixels.chunk_by(|a, b| a == b)
+}
+
+/// The 256 most frequent of some colours, and where in them each of the colours, or the one most like it, is.
+fn palette(pixels: &[Colour]) -> (Vec<Colour>, BTreeMap<Colour, u8>) {
+    let mut counts: BTreeMap<Colour, usize> = BTreeMap::new();
+    runs(pixels).for_each(|run| *counts.entry(run[0]).or_default() += run.len());
+    let mut palette: Vec<Colour> = counts.keys().copied().collect();
+    palette.sort_by_key(|colour| Reverse(counts[colour]));
+    palette.truncate(256);
+    let distance = |a: Colour, b: Colour| -> u32 { (0..3).map(|i| u32::from(a[i].abs_diff(b[i])).pow(2)).sum() };
+    let index = |&colour: &Colour| {
+        let nearest = (0u8..=255).zip(&palette).min_by_key(|&(_, &other)| distance(colour, other));
+        (colour, nearest.map_or(0, |(index, _)| index))
+    };
+    let indices = counts.keys().map(index).collect();
+    (palette, indices)
+}

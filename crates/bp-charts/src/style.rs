@@ -1,0 +1,170 @@
+//! How series look: the colours, the shapes of markers, the lines.
+
+use std::f64::consts::TAU;
+
+use plotters::{element::DashedPathElement, prelude::*};
+
+use crate::sheet::{At, Canvas, Drawn, FINE};
+
+/// How a series looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Style {
+    /// The number of its colour; after the last, the first follows.
+    pub colour: usize,
+    /// What stands at its points.
+    pub marker: Option<Marker>,
+    /// What goes from one of a plot's points to the next.
+    pub line: Option<Line>,
+}
+
+/// What stands at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Marker {
+    /// The number of its shape; after the last, the first follows.
+    pub shape: usize,
+    /// Whether it is hollow, as of values that somebody else gives.
+    pub hollow: bool,
+}
+
+/// What goes from point to point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// A straight line.
+    Solid,
+    /// The same, dashed.
+    Dashes,
+    /// The same, dotted.
+    Dots,
+    /// From the plot's top down to the first point, on to the right, down to the next, and from the last to the right
+    /// edge: what lies above it is no better, in both values, than one of the points.
+    Stairs,
+}
+
+impl Style {
+    /// A marker whose colour and shape no other number has for long: after each 8, the same colours take the shapes
+    /// that follow.
+    #[must_use]
+    pub fn numbered(number: usize) -> Self {
+        Self::marked(number, number + number / COLOURS.len())
+    }
+
+    /// A marker of this colour and shape.
+    #[must_use]
+    pub fn marked(colour: usize, shape: usize) -> Self {
+        Self { colour, marker: Some(Marker { shape, hollow: false }), line: None }
+    }
+
+    /// A line without markers.
+    #[must_use]
+    pub fn line(colour: usize, line: Line) -> Self {
+        Self { colour, marker: None, line: Some(line) }
+    }
+
+    /// The same with a hollow marker, if any.
+    #[must_use]
+    pub fn hollow(self) -> Self {
+        Self { marker: self.marker.map(|marker| Marker { hollow: true, ..marker }), ..self }
+    }
+
+    /// The same with a line.
+    #[must_use]
+    pub fn with_line(self, line: Line) -> Self {
+        Self { line: Some(line), ..self }
+    }
+}
+
+/// The colours of Okabe and Ito, which the colour-blind tell apart, with grey for yellow, too pale on white.
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(0, 0, 0),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(153, 153, 153),
+];
+
+/// The number of black, for what belongs to no series.
+pub const BLACK: usize = 4;
+
+/// The outline of a marker: its number of equal arms and the corners of the first of them, as degrees (clockwise from
+/// the right) and radii.
+type Shape = (u32, &'static [At]);
+
+/// Shapes of about one area: circle, square, triangle, diamond, plus, triangle downwards, cross, star, triangle to the
+/// right, pentagon, triangle to the left and needle star.
+const SHAPES: [Shape; 12] = [
+    (24, &[(0.0, 1.0)]),
+    (4, &[(45.0, 1.25)]),
+    (3, &[(-90.0, 1.5)]),
+    (4, &[(0.0, 1.4)]),
+    (4, &[(-18.0, 1.4), (18.0, 1.4), (45.0, 0.61)]),
+    (3, &[(90.0, 1.5)]),
+    (4, &[(27.0, 1.4), (63.0, 1.4), (90.0, 0.61)]),
+    (5, &[(-90.0, 1.6), (-54.0, 0.7)]),
+    (3, &[(0.0, 1.5)]),
+    (5, &[(90.0, 1.2)]),
+    (3, &[(180.0, 1.5)]),
+    (4, &[(0.0, 2.0), (45.0, 0.6)]),
+];
+
+/// The pixels of a marker's radius of 1 where there is room.
+pub(crate) const MARKER_UNIT: f64 = 4.8;
+
+/// The colour of a number.
+pub(crate) fn colour(number: usize) -> RGBColor {
+    COLOURS[number % COLOURS.len()]
+}
+
+/// A series' marker, whose radius of 1 is so many pixels; nothing where it has none.
+pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f64) -> Drawn {
+    let Some(Marker { shape, hollow }) = style.marker else { return Ok(()) };
+    let ((arms, corners), colour) = (SHAPES[shape % SHAPES.len()], colour(style.colour));
+    let corner = |arm: u32, (angle, radius): At| {
+        let (sin, cos) = (angle.to_radians() + TAU * f64::from(arm) / f64::from(arms)).sin_cos();
+        (x + unit * radius * cos, y + unit * radius * sin)
+    };
+    // One arm more than there are closes the line, with a join instead of two ends.
+    let outline: Vec<At> = (0..=arms).flat_map(|arm| corners.iter().map(move |&c| corner(arm, c))).collect();
+    canvas.draw(&Polygon::new(outline.as_slice(), if hollow { WHITE } else { colour }))?;
+    // Small markers have a thinner outline, which would fill them else.
+    let width = f64::from(THIN) * (unit / MARKER_UNIT).min(1.0);
+    canvas.draw(&PathElement::new(outline, colour.stroke_width(width as u32)))
+}
+
+/// A series' line along a path; nothing where it has none.
+pub(crate) fn draw_line(canvas: &Canvas<'_>, path: Vec<At>, style: Style) -> Drawn {
+    let stroke = colour(style.colour).stroke_width(20);
+    match style.line {
+        None => Ok(()),
+        Some(Line::Solid | Line::Stairs) => canvas.draw(&PathElement::new(path, stroke)),
+        Some(Line::Dashes) => canvas.draw(&DashedPathElement::new(path, DASH, GAP, stroke)),
+        Some(Line::Dots) => canvas.draw(&DashedPathElement::new(path, 20, GAP, stroke)),
+    }
+}
+
+/// A thin line, as of outlines, whiskers and axes.
+pub(crate) fn draw_path(canvas: &Canvas<'_>, points: &[At], colour: RGBColor) -> Drawn {
+    canvas.draw(&PathElement::new(points, colour.stroke_width(THIN)))
+}
+
+/// The whisker between the ends of an interval, which lie side by side or one above the other.
+pub(crate) fn draw_whisker(canvas: &Canvas<'_>, [from, to]: [At; 2], colour: RGBColor) -> Drawn {
+    let (across, down) = if from.0 == to.0 { (3.0, 0.0) } else { (0.0, 3.0) };
+    let cap = |(x, y): At| [(x - across, y - down), (x + across, y + down)];
+    let ([a, b], [c, d]) = (cap(from), cap(to));
+    draw_path(canvas, &[a, b, from, to, c, d], colour)
+}
+
+/// A thin dashed line from left to right.
+pub(crate) fn draw_dashes(canvas: &Canvas<'_>, left: f64, right: f64, y: f64, colour: RGBColor) -> Drawn {
+    canvas.draw(&DashedPathElement::new([(left, y), (right, y)], DASH, GAP, colour.stroke_width(THIN)))
+}
+
+/// Width of thin lines.
+const THIN: u32 = 15;
+
+/// Lengths of dashes and of what is between them.
+const DASH: u32 = 6 * FINE as u32;
+const GAP: u32 = 4 * FINE as u32;

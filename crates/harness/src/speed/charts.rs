@@ -1,0 +1,112 @@
+//! What `bp speed` found as charts, made from the record alone.
+
+use bp_charts::{Axis, BLACK, Key, Level, Line, Plot, Point, Series, Style, Value};
+use bp_core::Stage;
+
+use super::record::{Contestant, Entry, Family, Speed, StageTime};
+use crate::report::format::Spread;
+
+/// A chart and the words around it.
+pub(crate) struct Chart {
+    /// File name without ending.
+    pub(crate) name: &'static str,
+    pub(crate) plot: Plot,
+    /// What a reader must know.
+    pub(crate) caption: String,
+}
+
+/// File names, without ending, of all charts that there may be.
+pub(crate) const CHART_NAMES: [&str; 4] =
+    [Family::Pixels.name(), Family::Labels.name(), Family::Loops.name(), "roofline"];
+
+/// All charts that this run has numbers for.
+pub(crate) fn charts(speed: &Speed) -> Vec<Chart> {
+    Family::ALL.into_iter().filter_map(|family| growth(speed, family)).chain(roofline(speed)).collect()
+}
+
+/// Time against the number that grows in a family.
+pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
+    let contests: Vec<_> = speed.contests_of(Some(family)).collect();
+    let first = contests.first()?;
+    let series: Vec<_> = (first.entries.iter().enumerate())
+        .map(|(i, entry)| {
+            let points = contests.iter().filter_map(|contest| {
+                let own = contest.entries.iter().find(|other| other.contestant == entry.contestant)?;
+                let samples = &own.outcome.measured()?.samples;
+                let ms = Spread::of(samples.iter().map(|sample| sample.total_ms))?;
+                Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
+            });
+            let style = Style::numbered(i).with_line(Line::Solid);
+            Series { name: speed.label(entry), style, points: points.collect() }
+        })
+        .collect();
+    let ticks = contests.iter().map(|contest| family.number_of(contest) as f64).collect();
+    let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
+    let title = format!("Time against {}", family.name());
+    let plot = Plot {
+        description: format!("{title}. Series: {}.", names.join("; ")),
+        x: Axis { ticks, ..Axis::logarithmic(family.name()) },
+        y: Axis::logarithmic("milliseconds from images to labels"),
+        levels: Vec::new(),
+        keys: Vec::new(),
+        series,
+        title,
+    };
+    let caption = "Medians by the wall clock; whiskers from the least to the greatest of the rounds.".to_owned();
+    Some(Chart { name: family.name(), plot, caption })
+}
+
+/// What the stages of each device move a second, beside what it copies.
+pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
+    let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
+    let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
+    let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
+    let points = devices.iter().enumerate().flat_map(|(colour, (device, rates))| {
+        rates.iter().map(move |&(stage, point)| Series {
+            name: format!("{}: {}", device.label(), stage.name()),
+            style: Style::marked(colour, stage as usize),
+            points: vec![point],
+        })
+    });
+    let level = |(i, (device, _)): (usize, &(&Contestant, _))| {
+        Some(Level { name: format!("{}: copying", device.label()), value: device.copy_gb_per_s?, colour: Some(i) })
+    };
+    let others: Vec<_> = others.iter().map(|(contestant, _)| contestant.label()).collect();
+    let missing = if others.is_empty() { String::new() } else { format!(" Not in it: {}.", others.join(", ")) };
+    let plot = Plot {
+        title: "Stages beside the rate of copying".to_owned(),
+        description: "What each stage of each problem moves a second, beside the rate at which its device copies its \
+                      own memory."
+            .to_owned(),
+        x: Axis::logarithmic("MB that a stage has to read and write"),
+        y: Axis::logarithmic("GB/s"),
+        levels: devices.iter().enumerate().filter_map(level).collect(),
+        keys: Stage::ALL.map(key).into(),
+        series: points.collect(),
+    };
+    let caption = format!(
+        "A point a stage of a problem. Bytes are the least that it has to read and write, each value of a step counted \
+         once; caches may serve some of them, so that a point may lie above its line. Whiskers go from the least to \
+         the greatest of the rounds. Devices that count no bytes, or have no clock of their own, cannot be shown.{missing}"
+    );
+    (!devices.is_empty()).then_some(Chart { name: "roofline", plot, caption })
+}
+
+/// The bytes and rates of a device's stages in all problems; none of a device whose copy rate is not known.
+fn rates(speed: &Speed, device: &Contestant) -> Vec<(Stage, Point)> {
+    let own = |entry: &&Entry| entry.contestant == device.name && device.copy_gb_per_s.is_some();
+    let measured = speed.contests.iter().flat_map(|contest| contest.entries.iter().filter(own));
+    let point = |time: StageTime| {
+        let rate = with_range(time.gb_per_s()?);
+        Some((time.stage, Point::new(time.bytes? as f64 / 1e6, rate)))
+    };
+    measured
+        .filter_map(|entry| entry.outcome.measured())
+        .flat_map(|measured| device.stages(measured).filter_map(point))
+        .collect()
+}
+
+/// A median, and its range from three numbers on.
+fn with_range(Spread { median, low, high, count }: Spread) -> Value {
+    if count >= 3 { Value { value: median, low, high } } else { median.into() }
+}
