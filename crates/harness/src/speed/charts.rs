@@ -28,15 +28,15 @@ pub(crate) fn charts(speed: &Speed) -> Vec<Chart> {
 pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
     let first = contests.first()?;
-    let series: Vec<_> = (first.entries.iter().enumerate())
-        .map(|(i, entry)| {
+    let series: Vec<_> = (first.entries.iter())
+        .map(|entry| {
             let points = contests.iter().filter_map(|contest| {
                 let own = contest.entries.iter().find(|other| other.contestant == entry.contestant)?;
                 let samples = &own.outcome.measured()?.samples;
                 let ms = Spread::of(samples.iter().map(|sample| sample.total_ms))?;
                 Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
             });
-            let style = Style::numbered(i).with_line(Line::Solid);
+            let style = Style::numbered(speed.place(&entry.contestant)).with_line(Line::Solid);
             Series { name: speed.label(entry), style, points: points.collect() }
         })
         .collect();
@@ -61,15 +61,16 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
     let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
     let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
-    let points = devices.iter().enumerate().flat_map(|(colour, (device, rates))| {
-        rates.iter().map(move |&(stage, point)| Series {
+    let points = devices.iter().flat_map(|(device, rates)| {
+        rates.iter().map(|&(stage, point)| Series {
             name: format!("{}: {}", device.label(), stage.name()),
-            style: Style::marked(colour, stage as usize),
+            style: Style::marked(speed.place(&device.name), stage as usize),
             points: vec![point],
         })
     });
-    let level = |(i, (device, _)): (usize, &(&Contestant, _))| {
-        Some(Level { name: format!("{}: copying", device.label()), value: device.copy_gb_per_s?, colour: Some(i) })
+    let level = |(device, _): &(&Contestant, _)| {
+        let name = format!("{}: copying", device.label());
+        Some(Level { name, value: device.copy_gb_per_s?, colour: Some(speed.place(&device.name)) })
     };
     let others: Vec<_> = others.iter().map(|(contestant, _)| contestant.label()).collect();
     let missing = if others.is_empty() { String::new() } else { format!(" Not in it: {}.", others.join(", ")) };
@@ -78,9 +79,9 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
         description: "What each stage of each problem moves a second, beside the rate at which its device copies its \
                       own memory."
             .to_owned(),
-        x: Axis::logarithmic("MB that a stage has to read and write"),
-        y: Axis::logarithmic("GB/s"),
-        levels: devices.iter().enumerate().filter_map(level).collect(),
+        x: Axis::logarithmic("MB that a stage has to read and write at least"),
+        y: Axis::logarithmic("GB/s read and written"),
+        levels: devices.iter().filter_map(level).collect(),
         keys: Stage::ALL.map(key).into(),
         series: points.collect(),
     };

@@ -192,7 +192,12 @@ impl Speed {
         self.contestants.iter().find(|contestant| contestant.name == entry.contestant)
     }
 
-    /// The same as tables and charts name it.
+    /// The place of a contestant among all, which its colour tells in charts.
+    pub(crate) fn place(&self, name: &str) -> usize {
+        self.contestants.iter().position(|contestant| contestant.name == name).unwrap_or(0)
+    }
+
+    /// An entry's contestant as tables and charts name it.
     pub(crate) fn label(&self, entry: &Entry) -> String {
         self.contestant(entry).map_or_else(|| entry.contestant.clone(), Contestant::label)
     }
