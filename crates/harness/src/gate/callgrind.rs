@@ -1,7 +1,9 @@
-//! Instructions that kernels take, counted by valgrind's callgrind: where times vary by percents, these vary by nothing.
+//! Instructions that kernels take, counted by valgrind's callgrind. Where times vary by percents, these are the same in
+//! every run however busy the machine is; only where buffers lie in memory, which is the C library's to decide, moves
+//! them, by parts of a percent.
 //!
-//! They are no times. A kernel that waits for memory takes no more of them, and one of fewer, slower instructions looks
-//! better than it is. But whoever adds work to a kernel is found out, on any machine and however busy it is.
+//! They are no times. They tell of work added to a kernel, and of no other kernel's. A kernel that waits for memory,
+//! say because its working set left the cache, takes no more of them.
 //!
 //! Every solve has a process of its own, which valgrind runs on a processor that it makes up. That one has no AVX-512,
 //! so that a count is of another device than the times are, and says which.
