@@ -3,6 +3,7 @@
 
 mod baseline;
 mod callgrind;
+mod file;
 mod guarded;
 mod instructions;
 mod judge;

@@ -27,6 +27,15 @@ pub(crate) fn machine(name: Option<&str>) -> Machine {
     Machine { name, cpu, cores, memory_bytes, system: system_name }
 }
 
+/// The processor told apart from others that go by the same name, as rented ones do.
+pub(crate) fn processor(machine: &Machine) -> String {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(id) = raw_cpuid::CpuId::new().get_feature_info() {
+        return format!("{}, family {}, model {}", machine.cpu, id.family_id(), id.model_id());
+    }
+    machine.cpu.clone()
+}
+
 /// Refuses what would not fit into the memory that is allowed, or that this machine has available now, before anything
 /// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
 /// have, memory of its own.

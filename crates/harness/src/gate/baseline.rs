@@ -2,20 +2,13 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    failure::Failure,
-    files::{create_folder, write_text},
-    record::Machine,
-};
-
-/// Version of the files; changes with every change of meaning.
-const SCHEMA_VERSION: u32 = 1;
+use super::file;
+use crate::{failure::Failure, machine::processor, record::Machine};
 
 /// Name of the file for all machines.
 const ANYWHERE: &str = "anywhere";
@@ -24,7 +17,6 @@ const ANYWHERE: &str = "anywhere";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Baseline {
-    schema_version: u32,
     /// Commit of the program that was measured for it last.
     commit: String,
     /// The processor and the number of its cores; empty and 0 in the file for all machines.
@@ -64,10 +56,10 @@ impl Baselines {
                 "there is no such folder of baselines; run this in the project's folder, or name it by --baselines";
             return Err(Failure::reading(folder, &what));
         }
-        let here = read(&file(folder, &machine.name))?;
+        let here: Option<Baseline> = file::read(&named(folder, &machine.name))?;
         Ok(Self {
-            here: here.filter(|here| (here.cpu.as_str(), here.cores) == (machine.cpu.as_str(), machine.cores)),
-            anywhere: read(&file(folder, ANYWHERE))?,
+            here: here.filter(|here| (&here.cpu, here.cores) == (&processor(machine), machine.cores)),
+            anywhere: file::read(&named(folder, ANYWHERE))?,
             folder: folder.to_owned(),
             machine_name: machine.name.clone(),
         })
@@ -75,21 +67,18 @@ impl Baselines {
 
     /// The file for this kind of machine.
     pub(super) fn path_here(&self) -> PathBuf {
-        file(&self.folder, &self.machine_name)
+        named(&self.folder, &self.machine_name)
     }
 
     /// The file for all machines.
     pub(super) fn path_anywhere(&self) -> PathBuf {
-        file(&self.folder, ANYWHERE)
+        named(&self.folder, ANYWHERE)
     }
 
     /// Writes both files.
     pub(super) fn write(&self) -> Result<(), Failure> {
-        create_folder(&self.folder)?;
         for (path, baseline) in [(self.path_here(), &self.here), (self.path_anywhere(), &self.anywhere)] {
-            let Some(baseline) = baseline else { continue };
-            let json = serde_json::to_string_pretty(baseline).map_err(|error| Failure::writing(&path, &error))?;
-            write_text(&path, &(json + "\n"))?;
+            baseline.as_ref().map_or(Ok(()), |baseline| file::write(&path, baseline))?;
         }
         Ok(())
     }
@@ -99,9 +88,8 @@ impl Baseline {
     /// One of these devices of a machine, or of all machines, that expects nothing yet.
     pub(super) fn new(machine: Option<&Machine>, devices: BTreeMap<String, String>) -> Self {
         Self {
-            schema_version: SCHEMA_VERSION,
             commit: String::new(),
-            cpu: machine.map_or_else(String::new, |machine| machine.cpu.clone()),
+            cpu: machine.map_or_else(String::new, processor),
             cores: machine.map_or(0, |machine| machine.cores),
             devices,
             runs: BTreeMap::new(),
@@ -115,20 +103,6 @@ impl Baseline {
     }
 }
 
-fn file(folder: &Path, name: &str) -> PathBuf {
+fn named(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.json"))
-}
-
-/// Reads a file, where it is there.
-fn read(path: &Path) -> Result<Option<Baseline>, Failure> {
-    let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(|error| Failure::reading(path, &error))?,
-    };
-    let baseline: Baseline = serde_json::from_str(&text).map_err(|error| Failure::reading(path, &error))?;
-    if baseline.schema_version != SCHEMA_VERSION {
-        let what = format!("version {} of baselines, this program has {SCHEMA_VERSION}", baseline.schema_version);
-        return Err(Failure::reading(path, &format!("{what}; make it anew by --update")));
-    }
-    Ok(Some(baseline))
 }

@@ -1,23 +1,15 @@
 //! `bp gate --instructions`: counts beside those that were recorded.
 
-use std::{
-    fmt::Write as _,
-    fs,
-    path::{Path, PathBuf},
+use std::{fmt::Write as _, path::PathBuf};
+
+use serde::Serialize;
+
+use super::{
+    callgrind::{self, Counts},
+    file,
+    table::table,
 };
-
-use serde::{Deserialize, Serialize};
-
-use super::{callgrind, callgrind::Counts, table::table};
-use crate::{
-    args::GateArgs,
-    failure::Failure,
-    files::{create_folder, write_text},
-    report::format::whole,
-};
-
-/// Version of the file; changes with every change of meaning.
-const SCHEMA_VERSION: u32 = 1;
+use crate::{args::GateArgs, failure::Failure, report::format::whole};
 
 /// Name of the file.
 const FILE: &str = "instructions.json";
@@ -25,14 +17,6 @@ const FILE: &str = "instructions.json";
 /// A count may differ by this fraction. The same program takes the same instructions; what is built anew from the same
 /// sources may differ by a few.
 const TOLERANCE: f64 = 0.01;
-
-/// The counts of one compiler and valgrind.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Recorded {
-    schema_version: u32,
-    counts: Counts,
-}
 
 /// What was counted, judged.
 #[derive(Serialize)]
@@ -50,7 +34,7 @@ pub(crate) struct CountJudgement {
 pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
-    let recorded = read(&args.baselines.join(FILE))?;
+    let recorded: Option<Counts> = file::read(&args.baselines.join(FILE))?;
     let counts = callgrind::count(valgrind)?;
     let unlike = match &recorded {
         None => Some(format!("there is no {}", args.baselines.join(FILE).display())),
@@ -59,20 +43,6 @@ pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
     };
     let recorded = recorded.filter(|_| unlike.is_none());
     Ok(CountJudgement { baselines: args.baselines.clone(), counts, recorded, unlike })
-}
-
-/// Reads the file, where it is there.
-fn read(path: &Path) -> Result<Option<Counts>, Failure> {
-    let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(|error| Failure::reading(path, &error))?,
-    };
-    let recorded: Recorded = serde_json::from_str(&text).map_err(|error| Failure::reading(path, &error))?;
-    if recorded.schema_version != SCHEMA_VERSION {
-        let what = format!("version {} of counts, this program has {SCHEMA_VERSION}", recorded.schema_version);
-        return Err(Failure::reading(path, &format!("{what}; make it anew by --instructions --update")));
-    }
-    Ok(Some(recorded.counts))
 }
 
 impl CountJudgement {
@@ -115,10 +85,7 @@ impl CountJudgement {
     /// Writes the counts as the new baseline; the file's name.
     pub(crate) fn update(&self) -> Result<String, Failure> {
         let path = self.baselines.join(FILE);
-        create_folder(&self.baselines)?;
-        let recorded = Recorded { schema_version: SCHEMA_VERSION, counts: self.counts.clone() };
-        let json = serde_json::to_string_pretty(&recorded).map_err(|error| Failure::writing(&path, &error))?;
-        write_text(&path, &(json + "\n"))?;
+        file::write(&path, &self.counts)?;
         Ok(path.display().to_string())
     }
 }

@@ -55,8 +55,8 @@ fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
     assert!(!text.contains("no baseline |") && text.contains("0 changed, 0 without one"), "{text}");
 
     let [speed_up, energy] = ["rayon on 1 thread: sweep over bp, total", "sweep: energy"];
-    edit(&baselines.path_here(), |json| json["runs"]["quick"]["speed_ups"][speed_up] = 1e9.into());
-    edit(&baselines.path_anywhere(), |json| json["runs"]["quick"]["facts"][energy] = "7".into());
+    edit(&baselines.path_here(), |json| json["baseline"]["runs"]["quick"]["speed_ups"][speed_up] = 1e9.into());
+    edit(&baselines.path_anywhere(), |json| json["baseline"]["runs"]["quick"]["facts"][energy] = "7".into());
     let mut other = judge(&gate, &measured);
     assert!(other.is_any_worse() && page(&other).contains("WORSE"), "{}", page(&other));
     other.repeat(&measured);
@@ -76,7 +76,7 @@ fn other_devices_and_other_settings_have_no_baseline() {
         gate.renew(&mut baselines, std::slice::from_ref(&measured)).unwrap();
         (measured, baselines.path_here())
     };
-    edit(&path, |json| json["devices"]["rayon on 1 thread"] = "another".into());
+    edit(&path, |json| json["baseline"]["devices"]["rayon on 1 thread"] = "another".into());
     let told = page(&judge(&gate(&args), &measured));
     assert!(told.lines().filter(|line| line.contains("no baseline |")).all(|line| line.contains("rayon on 1 thread")));
     assert!(told.contains("no baseline |"), "{told}");
@@ -93,7 +93,7 @@ fn a_baseline_of_another_processor_or_version_is_not_taken_for_this_one() {
     baselines.here = Some(Baseline::new(Some(&machine), BTreeMap::new()));
     baselines.write().unwrap();
     assert!(Baselines::read(&path, &machine).unwrap().here.is_some());
-    edit(&baselines.path_here(), |json| json["cores"] = 1000.into());
+    edit(&baselines.path_here(), |json| json["baseline"]["cores"] = 1000.into());
     assert!(Baselines::read(&path, &machine).unwrap().here.is_none());
     edit(&baselines.path_here(), |json| json["schema_version"] = 99.into());
     let told = Baselines::read(&path, &machine).unwrap_err().to_string();

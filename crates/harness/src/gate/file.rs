@@ -1,0 +1,42 @@
+//! Files of baselines: JSON with a version, written whole.
+
+use std::{fs, io::ErrorKind, path::Path};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::{
+    failure::Failure,
+    files::{create_folder, write_text},
+};
+
+/// Version of the files; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Versioned<T> {
+    schema_version: u32,
+    baseline: T,
+}
+
+/// Reads a file; `None` where there is none.
+pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failure> {
+    let text = match fs::read_to_string(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(|error| Failure::reading(path, &error))?,
+    };
+    let file: Versioned<T> = serde_json::from_str(&text).map_err(|error| Failure::reading(path, &error))?;
+    if file.schema_version != SCHEMA_VERSION {
+        let what = format!("version {} of baselines, this program has {SCHEMA_VERSION}", file.schema_version);
+        return Err(Failure::reading(path, &format!("{what}; make it anew by --update")));
+    }
+    Ok(Some(file.baseline))
+}
+
+/// Writes a file, and its folder where that is missing.
+pub(super) fn write(path: &Path, baseline: &impl Serialize) -> Result<(), Failure> {
+    create_folder(path.parent().unwrap_or(Path::new(".")))?;
+    let file = Versioned { schema_version: SCHEMA_VERSION, baseline };
+    let json = serde_json::to_string_pretty(&file).map_err(|error| Failure::writing(path, &error))?;
+    write_text(path, &(json + "\n"))
+}
