@@ -1,7 +1,7 @@
 //! Charts: markers side by side in categories, and points and lines between two numeric axes.
 //!
 //! They are drawn as SVG text, which scales with its page, names itself to those who cannot see it, and stands on a
-//! white sheet of its own, so that it can be read on a dark page. [`png`] makes a picture of such a text that is the
+//! white sheet of its own, so that it can be read on a dark page. [`png()`] makes a picture of such a text that is the
 //! same on every machine.
 
 mod axis;

@@ -7,7 +7,7 @@ use bp_core::{DisparityMap, Size};
 use maud::html;
 
 use super::{
-    Drawing,
+    Drawing, printable,
     results::Results,
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, ours::CENSUS},
 };
@@ -74,7 +74,7 @@ fn draw(
     let down = maps.len().div_ceil(ACROSS);
     let (width, row_height) = (ACROSS * (cell.width + GAP) + GAP, cell.height + GAP + NAME_HEIGHT);
     let height = TITLE_HEIGHT + down * row_height + GAP + BAR_HEIGHT;
-    let escaped = |text: &str| html! { (text) }.into_string();
+    let escaped = |text: &str| html! { (printable(text)) }.into_string();
     let (title, setting) = (escaped(title), escaped(setting));
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     failure::Failure,
     record::{Measurement, Settings},
-    summary::{groups, interval, mean, mean_of_medians, samples},
+    summary::{Group, groups, interval, mean, mean_of_medians, samples},
 };
 
 /// A plan on a backend, with numbers of every scene.
@@ -48,7 +48,7 @@ struct Field<'a> {
 pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
     let field = Field::new(results);
     let quantities = [error(), memory()].into_iter().chain(energies(&field.entrants));
-    quantities.enumerate().map(|(i, quantity)| field.drawing(i + 1, &quantity)).collect()
+    quantities.enumerate().map(|(i, quantity)| Diagram::new(&field, &quantity).drawing(i + 1)).collect()
 }
 
 fn error() -> Quantity {
@@ -96,7 +96,7 @@ fn energies(entrants: &[Entrant<'_>]) -> Vec<Quantity> {
 impl<'a> Field<'a> {
     fn new(results: &'a Results<'a>) -> Self {
         let (plans, devices) = (all_plans(results), results.devices());
-        let entrant = |group: &crate::summary::Group<'a>| {
+        let entrant = |group: &Group<'a>| {
             let measured = group.whole()?;
             let ms = samples(&measured, |sample| sample.total_ms);
             let value = mean_of_medians(&ms)?;
@@ -113,71 +113,6 @@ impl<'a> Field<'a> {
         Self { results, plans, entrants }
     }
 
-    fn drawing(&self, number: usize, quantity: &Quantity) -> Result<Drawing, Failure> {
-        let entrants: Vec<_> = self.entrants.iter().filter(|entrant| (quantity.compares)(entrant.settings)).collect();
-        let value = |entrant: &Entrant<'_>| mean(&entrant.measured, quantity.value);
-        let points: Vec<_> = entrants.iter().map(|entrant| Point::new(entrant.ms, value(entrant))).collect();
-        let front = front(&points);
-        let members: Vec<_> = front.iter().map(|&i| self.name(entrants[i])).collect();
-        let members = format!("Pareto front, nothing else being both faster and lower: {}.", members.join("; "));
-        let chart = self.chart(quantity, &members, &entrants, &points, &front);
-        let svg = chart.svg().map_err(|error| Failure::other(format!("diagram A.{number}: {error}")))?;
-        let caption =
-            [Some(READING.to_owned()), Some(quantity.note.to_owned()), Some(members), self.short_names(&entrants)];
-        let caption: Vec<_> = caption.into_iter().chain([self.results.unavailable()]).flatten().collect();
-        Ok(Drawing {
-            name: format!("diagram-A.{number}"),
-            title: format!("Diagram A.{number} (ours): {}", quantity.title),
-            caption: caption.join(" "),
-            svg,
-            table: Some(self.table(quantity, &entrants, &points)),
-        })
-    }
-
-    fn chart(
-        &self,
-        quantity: &Quantity,
-        members: &str,
-        entrants: &[&Entrant<'_>],
-        points: &[Point],
-        front: &[usize],
-    ) -> Plot {
-        let is_shown = |plan: &usize| entrants.iter().any(|entrant| entrant.plan == *plan);
-        let plans = (0..self.plans.len()).filter(is_shown).map(|plan| (plan, short(&self.plans[plan])));
-        let stairs = Series {
-            name: "Pareto front".to_owned(),
-            style: Style::line(GREY, Line::Stairs),
-            points: front.iter().map(|&i| points[i]).collect(),
-        };
-        let front = Key { name: stairs.name.clone(), style: stairs.style };
-        let point = |(entrant, &point): (&&Entrant<'_>, &Point)| Series {
-            name: self.name(entrant),
-            style: legend::style(entrant.plan, entrant.backend),
-            points: vec![point],
-        };
-        let data = self.results.data();
-        Plot {
-            title: quantity.title.clone(),
-            description: format!("{}, means over {data}, of every plan on every backend. {members}", quantity.title),
-            x: Axis::logarithmic("milliseconds from images to labels"),
-            y: Axis { name: format!("{}; {}", quantity.axis.name, self.results.setting()), ..quantity.axis.clone() },
-            levels: Vec::new(),
-            keys: legend::keys(self.results, plans).into_iter().chain([front]).collect(),
-            series: [stairs].into_iter().chain(entrants.iter().zip(points).map(point)).collect(),
-        }
-    }
-
-    /// A row an entrant.
-    fn table(&self, quantity: &Quantity, entrants: &[&Entrant<'_>], points: &[Point]) -> Table {
-        let rows = entrants.iter().zip(points).map(|(entrant, Point { x, y })| {
-            let range = format!("{} ({} to {})", number(x.value, 1), number(x.low, 1), number(x.high, 1));
-            let ms = if x.low < x.high { range } else { number(x.value, 1) };
-            vec![short(&self.plans[entrant.plan]), self.label(entrant), ms, number(y.value, 2)]
-        });
-        let columns = ["plan", "backend", "total, ms", &quantity.axis.name];
-        Table::new("", self.results.setting(), &columns).rows(rows.collect::<Vec<_>>())
-    }
-
     fn label(&self, entrant: &Entrant<'_>) -> String {
         self.results.label(self.results.devices()[entrant.backend].0)
     }
@@ -185,12 +120,95 @@ impl<'a> Field<'a> {
     fn name(&self, entrant: &Entrant<'_>) -> String {
         format!("{} on {}", short(&self.plans[entrant.plan]), self.label(entrant))
     }
+}
 
-    /// What the short names of our plans mean, as far as they are shown.
-    fn short_names(&self, entrants: &[&Entrant<'_>]) -> Option<String> {
-        let is_shown = |plan: usize| entrants.iter().any(|entrant| entrant.plan == plan);
-        let own = self.plans.iter().enumerate().filter(|&(i, plan)| plan.printed.is_none() && is_shown(i));
+/// A quantity of all entrants that it compares.
+struct Diagram<'a> {
+    field: &'a Field<'a>,
+    quantity: &'a Quantity,
+    entrants: Vec<&'a Entrant<'a>>,
+    /// One an entrant.
+    points: Vec<Point>,
+    /// Numbers of the points that nothing beats.
+    front: Vec<usize>,
+}
+
+impl<'a> Diagram<'a> {
+    fn new(field: &'a Field<'a>, quantity: &'a Quantity) -> Self {
+        let entrants: Vec<_> = field.entrants.iter().filter(|entrant| (quantity.compares)(entrant.settings)).collect();
+        let point = |entrant: &&Entrant<'_>| Point::new(entrant.ms, mean(&entrant.measured, quantity.value));
+        let points: Vec<_> = entrants.iter().map(point).collect();
+        Self { field, quantity, entrants, front: front(&points), points }
+    }
+
+    fn drawing(&self, number: usize) -> Result<Drawing, Failure> {
+        let svg = self.chart().svg().map_err(|error| Failure::other(format!("diagram A.{number}: {error}")))?;
+        let caption = [Some(READING.to_owned()), Some(self.quantity.note.to_owned()), Some(self.members())];
+        let names = [self.short_names(), self.field.results.unavailable()];
+        Ok(Drawing {
+            name: format!("diagram-A.{number}"),
+            title: format!("Diagram A.{number} (ours): {}", self.quantity.title),
+            caption: caption.into_iter().chain(names).flatten().collect::<Vec<_>>().join(" "),
+            svg,
+            table: Some(self.table()),
+        })
+    }
+
+    /// Who is on the front, in a sentence.
+    fn members(&self) -> String {
+        let members: Vec<_> = self.front.iter().map(|&i| self.field.name(self.entrants[i])).collect();
+        format!("Pareto front, nothing else being both faster and lower: {}.", members.join("; "))
+    }
+
+    fn chart(&self) -> Plot {
+        let Self { field, quantity, .. } = self;
+        let (results, title) = (field.results, &quantity.title);
+        let stairs = Series {
+            name: "Pareto front".to_owned(),
+            style: Style::line(GREY, Line::Stairs),
+            points: self.front.iter().map(|&i| self.points[i]).collect(),
+        };
+        let front = Key { name: stairs.name.clone(), style: stairs.style };
+        let plans = self.plans().map(|(i, plan)| (i, short(plan)));
+        let point = |(entrant, &point): (&&Entrant<'_>, &Point)| Series {
+            name: field.name(entrant),
+            style: legend::style(entrant.plan, entrant.backend),
+            points: vec![point],
+        };
+        let points = self.entrants.iter().zip(&self.points).map(point);
+        let (data, members) = (results.data(), self.members());
+        Plot {
+            title: title.clone(),
+            description: format!("{title}, means over {data}, of every plan on every backend. {members}"),
+            x: Axis::logarithmic("milliseconds from images to labels"),
+            y: Axis { name: format!("{}; {}", quantity.axis.name, results.setting()), ..quantity.axis.clone() },
+            levels: Vec::new(),
+            keys: legend::keys(results, plans).into_iter().chain([front]).collect(),
+            series: [stairs].into_iter().chain(points).collect(),
+        }
+    }
+
+    /// A row an entrant.
+    fn table(&self) -> Table {
+        let rows = self.entrants.iter().zip(&self.points).map(|(entrant, Point { x, y })| {
+            let range = format!("{} ({} to {})", number(x.value, 1), number(x.low, 1), number(x.high, 1));
+            let ms = if x.low < x.high { range } else { number(x.value, 1) };
+            vec![short(&self.field.plans[entrant.plan]), self.field.label(entrant), ms, number(y.value, 2)]
+        });
+        let columns = ["plan", "backend", "total, ms", &self.quantity.axis.name];
+        Table::new("", self.field.results.setting(), &columns).rows(rows.collect::<Vec<_>>())
+    }
+
+    /// The plans that are shown, with their places among all.
+    fn plans(&self) -> impl Iterator<Item = (usize, &Named)> {
+        let is_shown = |plan: usize| self.entrants.iter().any(|entrant| entrant.plan == plan);
+        self.field.plans.iter().enumerate().filter(move |&(i, _)| is_shown(i))
+    }
+
+    /// What the short names of our plans mean.
+    fn short_names(&self) -> Option<String> {
         let meaning = |plan: &Named| format!("\"{}\" is {}", short(plan), plan.title.trim_start_matches("ours: "));
+        let own = self.plans().filter(|(_, plan)| plan.printed.is_none());
         let names: Vec<_> = own.map(|(_, plan)| meaning(plan)).collect();
         (!names.is_empty()).then(|| format!("{}.", names.join("; ")))
     }
@@ -208,7 +226,7 @@ fn short(plan: &Named) -> String {
     if plan.printed.is_some() { plan.title.to_owned() } else { format!("ours: {}", plan.plan) }
 }
 
-/// The points that no other one is below without being right of them, from left to right.
+/// Numbers of the points that no other is below without being right of them, from left to right.
 fn front(points: &[Point]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     let place = |i: usize| (points[i].x.value, points[i].y.value);

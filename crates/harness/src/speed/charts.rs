@@ -3,7 +3,7 @@
 use bp_charts::{Axis, BLACK, Key, Level, Line, Plot, Point, Series, Style, Value};
 use bp_core::Stage;
 
-use super::record::{Contestant, Entry, Family, Speed, StageTime};
+use super::record::{Contest, Contestant, Entry, Family, Speed, StageTime};
 use crate::report::format::Spread;
 
 /// A chart and the words around it.
@@ -27,22 +27,10 @@ pub(crate) fn charts(speed: &Speed) -> Vec<Chart> {
 /// Time against the number that grows in a family.
 pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
-    let first = contests.first()?;
-    let series: Vec<_> = (first.entries.iter())
-        .map(|entry| {
-            let points = contests.iter().filter_map(|contest| {
-                let own = contest.entries.iter().find(|other| other.contestant == entry.contestant)?;
-                let samples = &own.outcome.measured()?.samples;
-                let ms = Spread::of(samples.iter().map(|sample| sample.total_ms))?;
-                Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
-            });
-            let style = Style::numbered(speed.place(&entry.contestant)).with_line(Line::Solid);
-            Series { name: speed.label(entry), style, points: points.collect() }
-        })
-        .collect();
-    let ticks = contests.iter().map(|contest| family.number_of(contest) as f64).collect();
+    let series: Vec<_> = contests.first()?.entries.iter().map(|entry| grown(speed, family, entry)).collect();
     let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
     let title = format!("Time against {}", family.name());
+    let ticks = contests.iter().map(|contest| family.number_of(contest) as f64).collect();
     let plot = Plot {
         description: format!("{title}. Series: {}.", names.join("; ")),
         x: Axis { ticks, ..Axis::logarithmic(family.name()) },
@@ -56,41 +44,57 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     Some(Chart { name: family.name(), plot, caption })
 }
 
+/// The times of the contestant of `first` in a family.
+fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
+    let point = |contest: &Contest| {
+        let own = contest.entries.iter().find(|entry| entry.contestant == first.contestant)?;
+        let ms = Spread::of(own.outcome.measured()?.samples.iter().map(|sample| sample.total_ms))?;
+        Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
+    };
+    Series {
+        name: speed.label(first),
+        style: Style::numbered(speed.place(&first.contestant)).with_line(Line::Solid),
+        points: speed.contests_of(Some(family)).filter_map(point).collect(),
+    }
+}
+
 /// What the stages of each device move a second, beside what it copies.
 pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
     let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
-    let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
-    let points = devices.iter().flat_map(|(device, rates)| {
-        rates.iter().map(|&(stage, point)| Series {
-            name: format!("{}: {}", device.label(), stage.name()),
-            style: Style::marked(speed.place(&device.name), stage as usize),
-            points: vec![point],
-        })
-    });
     let level = |(device, _): &(&Contestant, _)| {
         let name = format!("{}: copying", device.label());
         Some(Level { name, value: device.copy_gb_per_s?, colour: Some(speed.place(&device.name)) })
     };
-    let others: Vec<_> = others.iter().map(|(contestant, _)| contestant.label()).collect();
-    let missing = if others.is_empty() { String::new() } else { format!(" Not in it: {}.", others.join(", ")) };
+    let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
+    let title = "Stages beside the rate of copying";
     let plot = Plot {
-        title: "Stages beside the rate of copying".to_owned(),
-        description: "What each stage of each problem moves a second, beside the rate at which its device copies its \
-                      own memory."
-            .to_owned(),
+        title: title.to_owned(),
+        description: format!("{title}: what each device's stages move a second in each problem, and what it copies."),
         x: Axis::logarithmic("MB that a stage has to read and write at least"),
         y: Axis::logarithmic("GB/s read and written"),
         levels: devices.iter().filter_map(level).collect(),
         keys: Stage::ALL.map(key).into(),
-        series: points.collect(),
+        series: devices.iter().flat_map(|(device, rates)| stages(speed, device, rates)).collect(),
     };
+    let others: Vec<_> = others.iter().map(|(contestant, _)| contestant.label()).collect();
+    let missing = if others.is_empty() { String::new() } else { format!(" Not in it: {}.", others.join(", ")) };
     let caption = format!(
         "A point a stage of a problem. Bytes are the least that it has to read and write, each value of a step counted \
          once; caches may serve some of them, so that a point may lie above its line. Whiskers go from the least to \
          the greatest of the rounds. Devices that count no bytes, or have no clock of their own, cannot be shown.{missing}"
     );
     (!devices.is_empty()).then_some(Chart { name: "roofline", plot, caption })
+}
+
+/// A series a point: colours tell devices, shapes stages.
+fn stages(speed: &Speed, device: &Contestant, rates: &[(Stage, Point)]) -> Vec<Series<Point>> {
+    let series = |&(stage, point): &(Stage, Point)| Series {
+        name: format!("{}: {}", device.label(), stage.name()),
+        style: Style::marked(speed.place(&device.name), stage as usize),
+        points: vec![point],
+    };
+    rates.iter().map(series).collect()
 }
 
 /// The bytes and rates of a device's stages in all problems; none of a device whose copy rate is not known.
