@@ -15,7 +15,7 @@ const THREADED: &str = "rayon";
 pub(super) struct Runner {
     pub(super) name: String,
     pub(super) opened: Opened,
-    /// Where it runs; none for a device that does not ask.
+    /// Where it runs, if not in the pool of its caller.
     pool: Option<ThreadPool>,
 }
 
@@ -28,9 +28,9 @@ pub(super) struct Runners {
 }
 
 impl Runner {
-    fn new(name: &str, backend: &str, threads: Option<usize>) -> Result<Self, Failure> {
+    fn new(name: &str, backend: &str, own_threads: Option<usize>) -> Result<Self, Failure> {
         let failed = |error| Failure::other(format!("cannot start the threads: {error}"));
-        let pool = threads.map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().map_err(failed));
+        let pool = own_threads.map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().map_err(failed));
         let pool = pool.transpose()?;
         let opened = within(pool.as_ref(), || backends::open(backend, None))?;
         Ok(Self { name: name.to_owned(), opened, pool })
@@ -66,7 +66,8 @@ impl Runners {
         all.push(Runner::new(&one_thread, THREADED, Some(1))?);
         let all_threads = (threads > 1).then(|| format!("{THREADED} on {threads} threads"));
         if let Some(name) = &all_threads {
-            all.push(Runner::new(name, THREADED, Some(threads))?);
+            // In the pool that this runs in: it has them all.
+            all.push(Runner::new(name, THREADED, None)?);
         }
         for name in
             backends::ALL.iter().map(|backend| backend.name()).filter(|name| ![reference, THREADED].contains(name))
