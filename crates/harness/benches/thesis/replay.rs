@@ -44,7 +44,7 @@ fn one(group: &mut BenchmarkGroup<'_, WallTime>, bench: &Bench) {
     match (bench.entries, bench.bytes) {
         (Some(elements), Some(bytes)) => _ = group.throughput(Throughput::ElementsAndBytes { elements, bytes }),
         (Some(elements), None) => _ = group.throughput(Throughput::Elements(elements)),
-        (None, Some(bytes)) => _ = group.throughput(Throughput::BytesDecimal(bytes)),
+        (None, Some(bytes)) => _ = group.throughput(Throughput::Bytes(bytes)),
         (None, None) => (),
     }
     // The first call is the warm-up: it has the last sample, so that those that count come in their order.

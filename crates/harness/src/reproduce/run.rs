@@ -1,4 +1,4 @@
-//! Takes the samples: plan after plan in turns, saving each.
+//! Takes the samples: round after round, scenes and plans in turns, saving each.
 
 use std::{ops::ControlFlow, time::Instant};
 
@@ -41,19 +41,21 @@ pub(crate) fn run(
     scenes.iter().try_for_each(|scene| add_scene(storage, scene, devices))?;
     scenes.retain(|scene| is_asked(&scene.record.name));
     let mut failed = Vec::new();
-    for scene in scenes {
-        bar.set_total(work(storage.record(), is_asked));
-        bar.resume_at(done(storage.record()));
-        for round in 0..storage.record().run.samples {
+    bar.resume_at(done(storage.record()));
+    // A round takes in all scenes: so the samples of each spread over the whole run, and what else the machine does for a
+    // while meets a few of all rather than all of a few.
+    for round in 0..storage.record().run.samples {
+        for scene in &scenes {
+            bar.set_total(work(storage.record(), is_asked));
             for planned in plans::all() {
                 for device in devices.iter_mut().filter_map(|asked| asked.device.as_mut().ok()) {
-                    failed.extend(sample_cell(&scene, &planned, device, round, storage, &bar)?);
+                    failed.extend(sample_cell(scene, &planned, device, round, storage, &bar)?);
                 }
             }
         }
     }
-    let quick = storage.record().run.quick;
-    if let Some(folder) = source.folder().filter(|_| !quick && storage.record().labellings.is_empty()) {
+    let wants_energies = !storage.record().run.quick && storage.record().labellings.is_empty() && !scenes.is_empty();
+    if let Some(folder) = source.folder().filter(|_| wants_energies) {
         bar.message("outside energies".to_owned());
         let done = done(storage.record());
         storage.record_mut().labellings = energies::compare(folder, &mut |_| bar.update(done))?;
