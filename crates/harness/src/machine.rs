@@ -36,6 +36,11 @@ pub(crate) fn processor(machine: &Machine) -> String {
     machine.cpu.clone()
 }
 
+/// The kind of a machine: alike are those of one processor and as many cores.
+pub(crate) fn kind(machine: &Machine) -> String {
+    slug(&format!("{} {} cores", processor(machine), machine.cores))
+}
+
 /// Refuses what would not fit into the memory that is allowed, or that this machine has available now, before anything
 /// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
 /// have, memory of its own.
@@ -83,6 +88,12 @@ pub(crate) fn program() -> Result<Program, Failure> {
         rustc: env!("BP_RUSTC").to_owned(),
         flags: env!("BP_FLAGS").to_owned(),
     })
+}
+
+/// The commit that the running program was built from, and whether with changes.
+pub(crate) fn commit() -> String {
+    let changes = if env!("BP_CLEAN_TREE") == "true" { "" } else { " with changes" };
+    format!("{}{changes}", env!("BP_COMMIT"))
 }
 
 /// Lower-case letters, digits and single hyphens.

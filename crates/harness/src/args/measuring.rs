@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
 use super::{DataArgs, percent, threads};
-use crate::{backends, gate::Solve, speed::Problem};
+use crate::{
+    backends,
+    gate::{Renewal, Solve},
+    speed::Problem,
+};
 
 /// `bp reproduce`.
 #[derive(Debug, Args)]
@@ -75,7 +79,7 @@ pub(crate) struct GateArgs {
     /// A smaller image and fewer loops: half a minute on two cores. Has baselines of its own.
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Rounds, each of which runs every plan on every backend once, in turns.
+    /// Rounds, each of which runs everything that is guarded once, in turns.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(10..=1000))]
     pub(crate) rounds: u32,
     /// How many percent of a speed-up may be lost.
@@ -90,9 +94,10 @@ pub(crate) struct GateArgs {
     /// Count the instructions of the processor backends' kernels under valgrind, in place of taking times.
     #[arg(long, conflicts_with_all = ["quick", "rounds", "tolerance", "tolerance_shared"])]
     pub(crate) instructions: bool,
-    /// Measure three times and write new baselines instead of failing.
-    #[arg(long)]
-    pub(crate) update: bool,
+    /// Write what is measured as the new baseline for this kind of machine, the median of three measurements; everywhere:
+    /// for all machines too, after a change that is meant to change results.
+    #[arg(long, value_name = "WHERE", num_args = 0..=1, require_equals = true, default_missing_value = "here")]
+    pub(crate) update: Option<Renewal>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -9,11 +9,8 @@ use crate::{
     record::{Cell, Clock, Record, Sample},
     report::table_of_times,
     reproduce,
-    speed::Speed,
+    speed::{Problem, Speed},
 };
-
-/// The problems of `bp speed` whose kernels are timed: the update alone, and our two plans.
-const PROBLEMS: [&str; 3] = ["update", "hierarchy", "sweep"];
 
 /// What has to be measured for a bench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -97,8 +94,8 @@ fn samples(cell: Option<&Cell>, part: Part) -> Vec<Duration> {
 fn of_kernels(backends: &[String], speed: Option<&Speed>) -> Vec<Bench> {
     let mut benches = Vec::new();
     for stage in Stage::ALL {
-        for (problem, backend) in PROBLEMS.iter().flat_map(|problem| backends.iter().map(move |name| (problem, name))) {
-            benches.push(kernel(stage, problem, backend, speed));
+        for problem in Problem::KERNELS.map(Problem::name) {
+            benches.extend(backends.iter().map(|backend| kernel(stage, problem, backend, speed)));
         }
     }
     benches

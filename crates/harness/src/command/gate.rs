@@ -16,11 +16,11 @@ pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
     if args.instructions {
         let judgement = threads::run_on(None, || gate::instructions(args))?;
         print(args, &judgement, &judgement.page())?;
-        return if args.update { written(&judgement.update()?) } else { conclude(&judgement.failures()) };
+        return if args.update.is_some() { written(&judgement.update()?) } else { conclude(&judgement.failures()) };
     }
     let judgement = threads::run_on(None, || gate::gate(args))?;
     print(args, &judgement, &gate::page(&judgement))?;
-    if args.update { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
+    if args.update.is_some() { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
 }
 
 fn print(args: &GateArgs, judgement: &impl Serialize, page: &str) -> Result<(), Failure> {
@@ -33,7 +33,8 @@ fn written(files: &str) -> Result<(), Failure> {
 }
 
 fn conclude(failures: &[String]) -> Result<(), Failure> {
-    let Some(first) = failures.first() else { return Ok(()) };
-    let advice = "if that is meant, the same command with --update writes new baselines";
-    Err(Failure::gate(format!("the gate failed in {} places, such as {first}; {advice}", failures.len())))
+    let Some((first, others)) = failures.split_first() else { return Ok(()) };
+    let more = if others.is_empty() { String::new() } else { format!("; and {} more", others.len()) };
+    let advice = "if that is meant, write new baselines by --update (see --help)";
+    Err(Failure::gate(format!("the gate failed: {first}{more}; {advice}")))
 }

@@ -7,23 +7,16 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::file;
-use crate::{failure::Failure, machine::processor, record::Machine};
+use super::{file, renew::Renewal};
+use crate::{failure::Failure, machine, record::Machine};
 
-/// Name of the file for all machines.
-const ANYWHERE: &str = "anywhere";
-
-/// A file.
+/// A file. Which machine it is for, its name tells programs and its fields tell readers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Baseline {
-    /// Commit of the program that was measured for it last.
-    commit: String,
     /// The processor and the number of its cores; empty and 0 in the file for all machines.
     cpu: String,
     cores: usize,
-    /// The device of each runner, with its driver.
-    pub(super) devices: BTreeMap<String, String>,
     /// Of runs with and without --quick, where there were any.
     pub(super) runs: BTreeMap<String, Expected>,
 }
@@ -32,6 +25,10 @@ pub(super) struct Baseline {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Expected {
+    /// Commit of the program that was measured for it.
+    pub(super) commit: String,
+    /// The device of each runner, with its driver.
+    pub(super) devices: BTreeMap<String, String>,
     /// Median of each speed-up.
     pub(super) speed_ups: BTreeMap<String, f64>,
     /// What does not vary.
@@ -41,68 +38,56 @@ pub(super) struct Expected {
 /// Both files.
 #[derive(Clone, Debug)]
 pub(super) struct Baselines {
-    folder: PathBuf,
-    machine_name: String,
+    path_here: PathBuf,
+    path_anywhere: PathBuf,
     /// For this kind of machine, where there is one.
     pub(super) here: Option<Baseline>,
     pub(super) anywhere: Option<Baseline>,
 }
 
 impl Baselines {
-    /// Reads the files of a folder that are for this machine.
-    pub(super) fn read(folder: &Path, machine: &Machine) -> Result<Self, Failure> {
-        if !folder.is_dir() {
+    /// Reads the files of a folder that are for this machine; the folder must be there unless they are to be renewed.
+    pub(super) fn read(folder: &Path, machine: &Machine, renews: bool) -> Result<Self, Failure> {
+        if !renews && !folder.is_dir() {
             let what =
                 "there is no such folder of baselines; run this in the project's folder, or name it by --baselines";
             return Err(Failure::reading(folder, &what));
         }
-        let here: Option<Baseline> = file::read(&named(folder, &machine.name))?;
-        Ok(Self {
-            here: here.filter(|here| (&here.cpu, here.cores) == (&processor(machine), machine.cores)),
-            anywhere: file::read(&named(folder, ANYWHERE))?,
-            folder: folder.to_owned(),
-            machine_name: machine.name.clone(),
-        })
+        let path_here = folder.join(format!("{}.json", machine::kind(machine)));
+        let path_anywhere = folder.join("anywhere.json");
+        Ok(Self { here: file::read(&path_here)?, anywhere: file::read(&path_anywhere)?, path_here, path_anywhere })
     }
 
     /// The file for this kind of machine.
-    pub(super) fn path_here(&self) -> PathBuf {
-        named(&self.folder, &self.machine_name)
+    pub(super) fn path_here(&self) -> &Path {
+        &self.path_here
     }
 
     /// The file for all machines.
-    pub(super) fn path_anywhere(&self) -> PathBuf {
-        named(&self.folder, ANYWHERE)
+    #[cfg(test)]
+    pub(super) fn path_anywhere(&self) -> &Path {
+        &self.path_anywhere
     }
 
-    /// Writes both files.
-    pub(super) fn write(&self) -> Result<(), Failure> {
-        for (path, baseline) in [(self.path_here(), &self.here), (self.path_anywhere(), &self.anywhere)] {
-            baseline.as_ref().map_or(Ok(()), |baseline| file::write(&path, baseline))?;
+    /// Writes what was renewed; the names of the files.
+    pub(super) fn write(&self, renewal: Renewal) -> Result<Vec<String>, Failure> {
+        let here = [(&self.path_here, &self.here)];
+        let all = [(&self.path_here, &self.here), (&self.path_anywhere, &self.anywhere)];
+        let renewed = if renewal == Renewal::Here { &here[..] } else { &all[..] };
+        for (path, baseline) in renewed {
+            file::write(path, baseline)?;
         }
-        Ok(())
+        Ok(renewed.iter().map(|(path, _)| path.display().to_string()).collect())
     }
 }
 
 impl Baseline {
-    /// One of these devices of a machine, or of all machines, that expects nothing yet.
-    pub(super) fn new(machine: Option<&Machine>, devices: BTreeMap<String, String>) -> Self {
+    /// One of a machine, or of all machines, that expects nothing yet.
+    pub(super) fn new(machine: Option<&Machine>) -> Self {
         Self {
-            commit: String::new(),
-            cpu: machine.map_or_else(String::new, processor),
+            cpu: machine.map_or_else(String::new, machine::processor),
             cores: machine.map_or(0, |machine| machine.cores),
-            devices,
             runs: BTreeMap::new(),
         }
     }
-
-    /// Expects this of runs of a setting from now on.
-    pub(super) fn renew(&mut self, setting: &str, expected: Expected) {
-        env!("BP_COMMIT").clone_into(&mut self.commit);
-        self.runs.insert(setting.to_owned(), expected);
-    }
-}
-
-fn named(folder: &Path, name: &str) -> PathBuf {
-    folder.join(format!("{name}.json"))
 }

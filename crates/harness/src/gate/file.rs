@@ -19,17 +19,26 @@ struct Versioned<T> {
     baseline: T,
 }
 
+/// The one field that every version has.
+#[derive(Deserialize)]
+struct Version {
+    schema_version: u32,
+}
+
 /// Reads a file; `None` where there is none.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failure> {
     let text = match fs::read_to_string(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         text => text.map_err(|error| Failure::reading(path, &error))?,
     };
-    let file: Versioned<T> = serde_json::from_str(&text).map_err(|error| Failure::reading(path, &error))?;
-    if file.schema_version != SCHEMA_VERSION {
-        let what = format!("version {} of baselines, this program has {SCHEMA_VERSION}", file.schema_version);
-        return Err(Failure::reading(path, &format!("{what}; make it anew by --update")));
+    let failed = |error: serde_json::Error| Failure::reading(path, &error);
+    // The version comes first: another one may well have other fields.
+    let Version { schema_version } = serde_json::from_str(&text).map_err(failed)?;
+    if schema_version != SCHEMA_VERSION {
+        let what = format!("version {schema_version} of baselines, this program has {SCHEMA_VERSION}");
+        return Err(Failure::reading(path, &format!("{what}; delete it, and make it anew by --update")));
     }
+    let file: Versioned<T> = serde_json::from_str(&text).map_err(failed)?;
     Ok(Some(file.baseline))
 }
 

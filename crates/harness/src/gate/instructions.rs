@@ -47,27 +47,34 @@ pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
 
 impl CountJudgement {
     /// Each count with its name, what it was, and by what fraction it is more.
-    fn rows(&self) -> impl Iterator<Item = (&str, u64, Option<(u64, f64)>)> {
-        self.counts.counts.iter().map(|count| {
-            let before = self.recorded.as_ref().and_then(|recorded| recorded.get(&count.name));
-            let more = before.map(|before| (before, count.instructions as f64 / before as f64 - 1.0));
-            (count.name.as_str(), count.instructions, more)
+    fn rows(&self) -> impl Iterator<Item = (&String, u64, Option<(u64, f64)>)> {
+        self.counts.counts.iter().map(|(name, &count)| {
+            let before = self.recorded.as_ref().and_then(|recorded| recorded.counts.get(name));
+            (name, count, before.map(|&before| (before, count as f64 / before as f64 - 1.0)))
         })
     }
 
-    /// Counts that grew beyond the tolerance, in words.
+    /// Counts that grew beyond the tolerance or are no more, and backends that went to another device, in words.
     pub(crate) fn failures(&self) -> Vec<String> {
         let grown = self.rows().filter_map(|(name, now, before)| {
             let (before, more) = before.filter(|&(_, more)| more > TOLERANCE)?;
             let percent = 100.0 * more;
             Some(format!("{name}: {} instructions, was {} (+{percent:.1} %)", whole(now), whole(before)))
         });
-        grown.collect()
+        let Counts { devices, counts, .. } = &self.counts;
+        let recorded = || self.recorded.iter();
+        let moved = recorded().flat_map(|recorded| &recorded.devices).filter_map(|(backend, before)| {
+            let now = devices.get(backend).filter(|&now| now != before)?;
+            Some(format!("{backend} runs on {now}, did on {before}"))
+        });
+        let gone = recorded().flat_map(|recorded| recorded.counts.keys()).filter(|&name| !counts.contains_key(name));
+        grown.chain(moved).chain(gone.map(|name| format!("{name}: not counted any more"))).collect()
     }
 
     /// The page.
     pub(crate) fn page(&self) -> String {
-        let mut text = format!("# Instructions\n\n* Counted by {}.\n", self.counts.tools());
+        let mut text = format!("# Instructions\n\n* Counted on {}.\n", self.counts.tools());
+        self.counts.devices.iter().for_each(|(backend, device)| _ = writeln!(text, "* {backend}: {device}."));
         if let Some(unlike) = &self.unlike {
             let advice = "`bp gate --instructions --update` writes one";
             let _ = writeln!(text, "* Nothing to compare with: {unlike}; {advice}.");

@@ -35,6 +35,8 @@ pub(crate) struct Judgement {
     pub(super) unavailable: Vec<String>,
     pub(super) speed_ups: Vec<SpeedUp>,
     pub(super) facts: Vec<JudgedFact>,
+    /// What is expected of devices that are here, and was not measured.
+    pub(super) missing: Vec<String>,
     /// Baselines that were written.
     pub(crate) written: Vec<String>,
 }
@@ -89,6 +91,7 @@ impl Judgement {
             unavailable: gate.runners.unavailable.clone(),
             speed_ups: measured.ratios.iter().map(|(guarded, ratio)| known.speed_up(guarded, *ratio)).collect(),
             facts: measured.facts.iter().map(|(name, fact)| known.fact(name, fact)).collect(),
+            missing: known.missing(measured),
             written: Vec::new(),
         })
     }
@@ -119,7 +122,8 @@ impl Judgement {
             self.facts.iter().filter(|fact| fact.has_changed()).map(|fact| {
                 format!("{}: {}, was {}", fact.name, fact.value, fact.baseline.as_deref().unwrap_or_default())
             });
-        worse.chain(changed).collect()
+        let missing = self.missing.iter().map(|name| format!("{name}: in the baseline, but not measured any more"));
+        worse.chain(changed).chain(missing).collect()
     }
 }
 
@@ -137,10 +141,32 @@ impl<'a> Known<'a> {
 
     /// What this machine's baseline expects, where these runners were the same devices then.
     fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
-        let here = self.baselines.here.as_ref();
+        let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.devices());
+        runners.iter().all(|&runner| here.devices.get(runner) == devices.get(runner)).then_some(here)
+    }
+
+    /// What is expected of the devices that are here, and was not measured.
+    fn missing(&self, measured: &Measured) -> Vec<String> {
         let devices = self.gate.devices();
-        let same = |runner: &&String| here.is_some_and(|here| here.devices.get(*runner) == devices.get(*runner));
-        self.expected(here).filter(|_| runners.iter().all(same))
+        let of_device = |expected: &Expected, name: &str| {
+            let is_of = |runner: &String| {
+                name.starts_with(&format!("{runner}: ")) || name.starts_with(&format!("{runner} over "))
+            };
+            let same = |(runner, device)| !is_of(runner) || devices.get(runner) == Some(device);
+            expected.devices.iter().all(same)
+        };
+        let is_measured = |name: &str| {
+            measured.facts.contains_key(name) || measured.ratios.iter().any(|(guarded, _)| guarded.name() == name)
+        };
+        let all = [&self.baselines.here, &self.baselines.anywhere].map(|baseline| self.expected(baseline.as_ref()));
+        let mut missing: Vec<_> = (all.into_iter().flatten())
+            .flat_map(|expected| {
+                let names = expected.speed_ups.keys().chain(expected.facts.keys());
+                names.filter(|name| of_device(expected, name) && !is_measured(name)).cloned()
+            })
+            .collect();
+        missing.dedup();
+        missing
     }
 
     fn speed_up(&self, guarded: &Guarded, first: Ratio) -> SpeedUp {

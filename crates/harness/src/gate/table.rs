@@ -35,6 +35,7 @@ pub(crate) fn page(judgement: &Judgement) -> String {
         let rows = changed.into_iter().map(fact).collect();
         let _ = write!(text, "\n{}", table(&["number", "now", "baseline"], rows));
     }
+    judgement.missing.iter().for_each(|name| _ = writeln!(text, "* Not measured any more: {name}."));
     text
 }
 

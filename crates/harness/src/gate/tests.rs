@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::*;
+use super::{baseline::Baseline, *};
 
 /// The processor's backends on a tiny scene.
 fn gate(args: &GateArgs) -> Gate<'_> {
@@ -20,14 +20,14 @@ fn args(baselines: &Path) -> GateArgs {
         tolerance_shared: 20.0,
         baselines: baselines.to_owned(),
         instructions: false,
-        update: false,
+        update: None,
         json: false,
         counted: None,
     }
 }
 
 fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
-    let baselines = Baselines::read(&gate.args.baselines, &machine::machine(None)).unwrap();
+    let baselines = Baselines::read(&gate.args.baselines, &machine::machine(None), false).unwrap();
     Judgement::new(gate, &baselines, measured).unwrap()
 }
 
@@ -47,16 +47,16 @@ fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
     let first = judge(&gate, &measured);
     assert!(first.failures().is_empty() && page(&first).contains("There is no baseline"), "{}", page(&first));
 
-    let mut baselines = Baselines::read(folder.path(), &machine::machine(None)).unwrap();
-    gate.renew(&mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
+    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
     let same = judge(&gate, &measured);
     let text = page(&same);
     assert!(same.failures().is_empty() && !text.contains("There is no baseline"), "{text}");
     assert!(!text.contains("no baseline |") && text.contains("0 changed, 0 without one"), "{text}");
 
     let [speed_up, energy] = ["rayon on 1 thread: sweep over bp, total", "sweep: energy"];
-    edit(&baselines.path_here(), |json| json["baseline"]["runs"]["quick"]["speed_ups"][speed_up] = 1e9.into());
-    edit(&baselines.path_anywhere(), |json| json["baseline"]["runs"]["quick"]["facts"][energy] = "7".into());
+    edit(baselines.path_here(), |json| json["baseline"]["runs"]["quick"]["speed_ups"][speed_up] = 1e9.into());
+    edit(baselines.path_anywhere(), |json| json["baseline"]["runs"]["quick"]["facts"][energy] = "7".into());
     let mut other = judge(&gate, &measured);
     assert!(other.is_any_worse() && page(&other).contains("WORSE"), "{}", page(&other));
     other.repeat(&measured);
@@ -72,11 +72,11 @@ fn other_devices_and_other_settings_have_no_baseline() {
     let (measured, path) = {
         let gate = gate(&args);
         let measured = gate.measure().unwrap();
-        let mut baselines = Baselines::read(folder.path(), &machine::machine(None)).unwrap();
-        gate.renew(&mut baselines, std::slice::from_ref(&measured)).unwrap();
-        (measured, baselines.path_here())
+        let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
+        gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+        (measured, baselines.path_here().to_owned())
     };
-    edit(&path, |json| json["baseline"]["devices"]["rayon on 1 thread"] = "another".into());
+    edit(&path, |json| json["baseline"]["runs"]["quick"]["devices"]["rayon on 1 thread"] = "another".into());
     let told = page(&judge(&gate(&args), &measured));
     assert!(told.lines().filter(|line| line.contains("no baseline |")).all(|line| line.contains("rayon on 1 thread")));
     assert!(told.contains("no baseline |"), "{told}");
@@ -86,18 +86,35 @@ fn other_devices_and_other_settings_have_no_baseline() {
 }
 
 #[test]
-fn a_baseline_of_another_processor_or_version_is_not_taken_for_this_one() {
+fn what_is_expected_and_not_measured_fails() {
     let folder = tempfile::tempdir().unwrap();
-    let (machine, path) = (machine::machine(None), folder.path().to_owned());
-    let mut baselines = Baselines::read(&path, &machine).unwrap();
-    baselines.here = Some(Baseline::new(Some(&machine), BTreeMap::new()));
-    baselines.write().unwrap();
-    assert!(Baselines::read(&path, &machine).unwrap().here.is_some());
-    edit(&baselines.path_here(), |json| json["baseline"]["cores"] = 1000.into());
-    assert!(Baselines::read(&path, &machine).unwrap().here.is_none());
-    edit(&baselines.path_here(), |json| json["schema_version"] = 99.into());
-    let told = Baselines::read(&path, &machine).unwrap_err().to_string();
+    let args = args(folder.path());
+    let gate = gate(&args);
+    let mut measured = gate.measure().unwrap();
+    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
+    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    measured.ratios.pop();
+    measured.facts.remove("census: energy").expect("plans whose times are not guarded are solved too");
+    edit(baselines.path_here(), |json| {
+        json["baseline"]["runs"]["quick"]["devices"]["gone"] = "a device that is not here".into();
+        json["baseline"]["runs"]["quick"]["speed_ups"]["gone over scalar: bp, total"] = 2.0.into();
+    });
+    let failures = judge(&gate, &measured).failures();
+    assert!(failures.len() == 2 && failures.iter().all(|failure| failure.contains("not measured")), "{failures:?}");
+    assert!(failures[0].starts_with("rayon on") && failures[1].starts_with("census: energy"), "{failures:?}");
+}
+
+#[test]
+fn files_of_another_version_are_refused_and_folders_made_only_for_new_baselines() {
+    let folder = tempfile::tempdir().unwrap();
+    let (machine, path) = (machine::machine(None), folder.path().join("new"));
+    let told = Baselines::read(&path, &machine, false).unwrap_err().to_string();
+    assert!(told.contains("new") && told.contains("--baselines"), "{told}");
+    let mut baselines = Baselines::read(&path, &machine, true).unwrap();
+    baselines.here = Some(Baseline::new(Some(&machine)));
+    baselines.write(Renewal::Here).unwrap();
+    assert!(Baselines::read(&path, &machine, false).unwrap().here.is_some());
+    edit(baselines.path_here(), |json| *json = serde_json::json!({ "schema_version": 99, "other": 1 }));
+    let told = Baselines::read(&path, &machine, false).unwrap_err().to_string();
     assert!(told.contains("version 99") && told.contains("--update"), "{told}");
-    let told = Baselines::read(&path.join("none"), &machine).unwrap_err().to_string();
-    assert!(told.contains("none") && told.contains("--baselines"), "{told}");
 }

@@ -29,12 +29,19 @@ enum Passing {
 }
 
 impl Problem {
+    const UPDATE: Self = Self::new("update", [620, 555], 64, Profile::Thesis, Passing::Loops(10));
+    const HIERARCHY: Self = Self::new("hierarchy", [620, 555], 128, Profile::Census, Passing::HalfSteps(5, 10));
+    const SWEEP: Self = Self::new("sweep", [620, 555], 128, Profile::Census, Passing::Sweep);
+
+    /// Those by which kernels are compared.
+    pub(crate) const KERNELS: [Self; 3] = [Self::UPDATE, Self::HIERARCHY, Self::SWEEP];
+
     /// All of them: the update alone, our two plans, the thesis's BP, the size at which others publish times, and the
     /// families, small enough that a slow device is soon done with them.
     pub(crate) const ALL: [Self; 23] = [
-        Self::new("update", [620, 555], 64, Profile::Thesis, Passing::Loops(10)),
-        Self::new("hierarchy", [620, 555], 128, Profile::Census, Passing::HalfSteps(5, 10)),
-        Self::new("sweep", [620, 555], 128, Profile::Census, Passing::Sweep),
+        Self::UPDATE,
+        Self::HIERARCHY,
+        Self::SWEEP,
         Self::new("thesis", [620, 555], 112, Profile::Thesis, Passing::Loops(112)),
         Self::new("published", [900, 750], 128, Profile::Census, Passing::HalfSteps(5, 7)),
         Self::one_of(Family::Pixels, "pixels-x1", [80, 60], 16, 5),
@@ -70,7 +77,7 @@ impl Problem {
     }
 
     /// Its name in records.
-    pub(crate) fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         self.name
     }
 
