@@ -60,8 +60,15 @@ impl Settings {
         let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend));
         let names =
             self.named.clone().unwrap_or_else(|| by_default().map(|backend| backend.name().to_owned()).collect());
-        let chosen = |name: &String| Ok(backends::choose(name, None).map_err(|failure| failure.of(BACKEND))?.name);
-        names.iter().map(chosen).collect()
+        let mut chosen: Vec<String> = Vec::new();
+        for name in &names {
+            let name = backends::choose(name, None).map_err(|failure| failure.of(BACKEND))?.name;
+            if chosen.contains(&name) {
+                return Err(Failure::usage(format!("{BACKEND} names {name} twice")));
+            }
+            chosen.push(name);
+        }
+        Ok(chosen)
     }
 }
 
@@ -120,9 +127,9 @@ mod tests {
         };
         let size = told(&[(SIZE, "fast")]);
         assert!(size.contains("BP_BENCH=fast") && size.contains("quick or full"), "{size}");
-        for names in ["magic", "rayon,", "rayon,magic"] {
+        for (names, word) in [("magic", "scalar"), ("rayon,", "scalar"), ("rayon,rayon:0", "rayon twice")] {
             let backend = told(&[(BACKEND, names)]);
-            assert!(backend.contains(BACKEND) && backend.contains("scalar"), "{backend}");
+            assert!(backend.contains(BACKEND) && backend.contains(word), "{backend}");
         }
     }
 }
