@@ -22,7 +22,7 @@ pub fn bytes<T>(values: &Vec<T>) -> u64 {
     (values.capacity() * size_of::<T>()) as u64
 }
 
-/// Bytes copied at a time: more than any cache holds.
+/// Bytes copied at a time: more than the caches of all but a few processors hold.
 const COPIED: usize = 256 << 20;
 
 /// Copies of which the median is taken, after one that is not timed.

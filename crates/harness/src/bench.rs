@@ -103,14 +103,21 @@ impl Job {
     fn measure(&self, asked: &HashSet<Of>, results: &Path) -> Result<Measured, Failure> {
         let Self { settings, source, backends, .. } = self;
         let mut devices = backends::open_all(backends).map_err(|failure| failure.of(settings::BACKEND))?;
-        tell(&format!("scenes: {}", source.set.described));
-        source.check()?;
-        let run = reproduce::settings(source, &devices, settings.quick, settings.rounds());
-        let mut storage = reproduce::begin(results, machine::program()?, machine::machine(None), run)?;
         let is_asked = |name: &str| asked.iter().any(|of| matches!(of, Of::Scene(scene) if *scene == name));
-        let late = reproduce::run(source, &mut devices, &mut storage, &is_asked)?;
         let scenes = source.names().into_iter().any(is_asked);
         if scenes {
+            tell(&format!("scenes: {}", source.set.described));
+            source.check()?;
+        }
+        let run = reproduce::settings(source, &devices, settings.quick, settings.rounds());
+        let mut storage = reproduce::begin(results, machine::program()?, machine::machine(None), run)?;
+        let mut late = Vec::new();
+        if scenes {
+            let ran = reproduce::run(source, &mut devices, &mut storage, &is_asked);
+            late = ran.inspect_err(|_| {
+                let folder = storage.folder().display();
+                tell(&format!("what was measured is in {folder}; `bp report {folder}` makes its tables and charts"));
+            })?;
             report::write(storage.folder(), storage.record())?;
         }
         let problem = |of: &Of| if let Of::Problem(name) = of { Some((*name).to_owned()) } else { None };

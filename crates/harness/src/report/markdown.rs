@@ -104,8 +104,9 @@ pub(super) fn beneath(report: &Report<'_>, table: &Table) -> Option<String> {
 }
 
 fn section(report: &Report<'_>, table: &Table) -> String {
-    let beneath = beneath(report, table).map_or(String::new(), |beneath| format!("{beneath}\n\n"));
-    format!("### {}\n\n{}\n\n{}\n{beneath}", heading(table), notes(report, table), grid(table))
+    let [heading, notes] = [heading(table), notes(report, table)].map(|text| escape::markdown(&text));
+    let beneath = beneath(report, table).map_or(String::new(), |text| format!("{}\n\n", escape::markdown(&text)));
+    format!("### {heading}\n\n{notes}\n\n{}\n{beneath}", grid(table))
 }
 
 /// The lines of a table.
@@ -126,6 +127,8 @@ pub(crate) fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
 fn drawing(drawing: &Drawing) -> String {
     let Drawing { name, title, caption, table, .. } = drawing;
     let [title, caption] = [title, caption].map(|text| escape::markdown(text));
-    let table = table.as_ref().map_or(String::new(), |table| format!("{}\n\n{}\n", table.title, grid(table)));
+    let table = table
+        .as_ref()
+        .map_or(String::new(), |table| format!("{}\n\n{}\n", escape::markdown(&table.title), grid(table)));
     format!("### {title}\n\n{caption}\n\n![{title}]({name}.svg)\n\n{table}")
 }

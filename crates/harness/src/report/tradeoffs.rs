@@ -84,7 +84,10 @@ fn energies(entrants: &[Entrant<'_>]) -> Vec<Quantity> {
         }
     }
     let quantity = |own: Model| Quantity {
-        title: format!("Energy against time: profile {}, slope {}, K = {}", own.0, own.3, own.4),
+        title: format!(
+            "Energy against time: profile {}, L = {} from {} px, slope {}, K = {}",
+            own.0, own.1, own.2, own.3, own.4
+        ),
         axis: Axis::logarithmic("energy / 1000"),
         value: |measured| measured.energy.total as f64 / 1000.0,
         note: "Only plans of this profile: its energies and those of another are not of one scale.",
@@ -157,6 +160,9 @@ impl<'a> Diagram<'a> {
     /// Who is on the front, in a sentence.
     fn members(&self) -> String {
         let members: Vec<_> = self.front.iter().map(|&i| self.field.name(self.entrants[i])).collect();
+        if members.is_empty() {
+            return "No plan has numbers of every scene.".to_owned();
+        }
         format!("Pareto front, nothing else being both faster and lower: {}.", members.join("; "))
     }
 
