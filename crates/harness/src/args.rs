@@ -107,13 +107,6 @@ fn threads() -> impl TypedValueParser<Value = u16> {
     clap::value_parser!(u16).range(1..=1024)
 }
 
-fn percent(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (0.0..100.0).contains(&value) => Ok(value),
-        _ => Err("must be a number from 0 to below 100".to_owned()),
-    }
-}
-
 fn positive(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{DataArgs, percent, threads};
+use super::{DataArgs, threads};
 use crate::{
     backends,
     gate::{Renewal, Solve},
@@ -82,17 +82,11 @@ pub(crate) struct GateArgs {
     /// Rounds, each of which runs everything that is guarded once, in turns.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(10..=1000))]
     pub(crate) rounds: u32,
-    /// How many percent of a speed-up may be lost.
-    #[arg(long, value_name = "PERCENT", default_value_t = 12.0, value_parser = percent)]
-    pub(crate) tolerance: f64,
-    /// The same of those in which several threads take part, which the machine's other work disturbs more.
-    #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = percent)]
-    pub(crate) tolerance_shared: f64,
     /// Folder of the baselines: one file for each kind of machine, and one for all.
     #[arg(long, value_name = "DIR", default_value = "bench-data/gate")]
     pub(crate) baselines: PathBuf,
     /// Count the instructions of the processor backends' kernels under valgrind, in place of taking times.
-    #[arg(long, conflicts_with_all = ["quick", "rounds", "tolerance", "tolerance_shared"])]
+    #[arg(long, conflicts_with_all = ["quick", "rounds"])]
     pub(crate) instructions: bool,
     /// Write what is measured as the new baseline for this kind of machine, the median of three measurements; everywhere:
     /// for all machines too, after a change that is meant to change results.

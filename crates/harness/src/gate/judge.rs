@@ -171,14 +171,12 @@ impl<'a> Known<'a> {
 
     fn speed_up(&self, guarded: &Guarded, first: Ratio) -> SpeedUp {
         let name = guarded.name();
-        let args = self.gate.args;
-        let percent = if guarded.is_shared { args.tolerance_shared } else { args.tolerance };
         let of = |expected: Option<&Expected>, tolerance: f64| Some((*expected?.speed_ups.get(&name)?, tolerance));
-        let here = of(self.expected_here(&[&guarded.of.runner, &guarded.over.runner]), percent / 100.0);
+        let here = of(self.expected_here(&[&guarded.of.runner, &guarded.over.runner]), guarded.tolerance);
         let anywhere = of(self.expected(self.baselines.anywhere.as_ref()), TOLERANCE_ANYWHERE);
         let (baseline, tolerance) = here.or(anywhere).unzip();
         let verdict = baseline.zip(tolerance).map_or(Verdict::NoBaseline, |(b, tolerance)| first.judge(b, tolerance));
-        SpeedUp { name, first, second: None, baseline, tolerance: tolerance.unwrap_or(percent / 100.0), verdict }
+        SpeedUp { name, first, second: None, baseline, tolerance: tolerance.unwrap_or(guarded.tolerance), verdict }
     }
 
     fn fact(&self, name: &str, fact: &Fact) -> JudgedFact {

@@ -19,12 +19,8 @@ use crate::{
     speed::milliseconds,
 };
 
-/// An entrant solves its problem again and again until a turn has taken so many milliseconds: the times of a short solve
-/// alone would mostly tell about what came before it.
-const TURN_MS: f64 = 20.0;
-
 /// The most solves of a turn.
-const MOST_SOLVES: u32 = 20;
+const MOST_SOLVES: u32 = 400;
 
 /// What is solved.
 pub(super) struct Problem {
@@ -126,7 +122,7 @@ fn enter<'a>(
     let mut ready =
         Ready { entrant, runner, matcher: prepare(runner, &planned, problem)?, solves: 1, turns: Vec::new() };
     let first = ready.solve(problem)?;
-    ready.solves = ((TURN_MS / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
+    ready.solves = ((runner.turn_ms / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
     add_answer(&runner.name, entrant.plan, &ready.matcher, problem, facts)?;
     let owner = Some(runner.name.clone()).filter(|runner| *runner != runners.lineup.reference);
     let allocated = Fact { value: ready.matcher.allocated_bytes().to_string(), runner: owner };

@@ -11,10 +11,20 @@ use crate::{
 /// The backend whose one thread is held against the reference's, and all of its threads against one.
 const THREADED: &str = "rayon";
 
+/// A problem is solved again and again until a turn has taken so many milliseconds: the times of a short solve alone
+/// would mostly tell about what came before it.
+const TURN_MS: f64 = 20.0;
+
+/// The same of all threads of the fast processor backend. Systems take their time to spread threads that have just been
+/// woken over the processors: until then two are no faster than one.
+const TURN_OF_THREADS_MS: f64 = 300.0;
+
 /// A device in its pool of threads.
 pub(super) struct Runner {
     pub(super) name: String,
     pub(super) opened: Opened,
+    /// How long its turns take at least, unless that were too many solves.
+    pub(super) turn_ms: f64,
     /// Where it runs, if not in the pool of its caller.
     pool: Option<ThreadPool>,
 }
@@ -33,7 +43,7 @@ impl Runner {
         let pool = own_threads.map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().map_err(failed));
         let pool = pool.transpose()?;
         let opened = within(pool.as_ref(), || backends::open(backend, None))?;
-        Ok(Self { name: name.to_owned(), opened, pool })
+        Ok(Self { name: name.to_owned(), opened, turn_ms: TURN_MS, pool })
     }
 
     /// Runs some work where the device's threads are.
@@ -67,7 +77,7 @@ impl Runners {
         let all_threads = (threads > 1).then(|| format!("{THREADED} on {threads} threads"));
         if let Some(name) = &all_threads {
             // In the pool that this runs in: it has them all.
-            all.push(Runner::new(name, THREADED, None)?);
+            all.push(Runner { turn_ms: TURN_OF_THREADS_MS, ..Runner::new(name, THREADED, None)? });
         }
         for name in
             backends::ALL.iter().map(|backend| backend.name()).filter(|name| ![reference, THREADED].contains(name))

@@ -16,8 +16,6 @@ fn args(baselines: &Path) -> GateArgs {
     GateArgs {
         quick: true,
         rounds: 3,
-        tolerance: 12.0,
-        tolerance_shared: 20.0,
         baselines: baselines.to_owned(),
         instructions: false,
         update: None,
