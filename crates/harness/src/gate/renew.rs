@@ -13,9 +13,9 @@ use crate::{failure::Failure, machine, report::format::Spread};
 /// Which baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renewal {
-    /// That for this kind of machine.
+    /// The file for this kind of machine.
     Here,
-    /// That for all machines too.
+    /// That and the file for all machines.
     Everywhere,
 }
 
