@@ -133,6 +133,18 @@ impl Image {
         Self { size: Size { width, height: rows.len() }, above, below, pixels }
     }
 
+    /// A copy of some columns as an image of its own, with the apron's. Nothing is known of the columns beside them.
+    ///
+    /// # Panics
+    /// Where `columns` are none, or lie outside.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        let Self { size: Size { width, height }, above, below, ref pixels } = *self;
+        assert!(!columns.is_empty() && columns.end <= width, "columns {columns:?} of an image of {}", self.size);
+        let pixels = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
+        Self { size: Size { width: columns.len(), height }, above, below, pixels }
+    }
+
     /// The colour at column `x`, row `y`.
     ///
     /// # Panics
@@ -215,6 +227,15 @@ impl StereoPair {
     #[must_use]
     pub fn strip(&self, rows: Range<usize>) -> Self {
         Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
+    }
+
+    /// Some columns of both images, the same of each, see [`Image::columns`].
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        Self { left: self.left.columns(columns.clone()), right: self.right.columns(columns) }
     }
 }
 
