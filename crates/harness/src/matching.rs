@@ -1,5 +1,6 @@
 //! What `bp match` does with a pair: options make a plan, a session runs it, outputs are written, a report is told.
 
+mod memory;
 mod outputs;
 pub(crate) mod plan;
 mod report;
