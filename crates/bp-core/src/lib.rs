@@ -38,6 +38,7 @@ mod error;
 pub mod exactness;
 pub mod image;
 mod map;
+pub mod maps;
 pub mod memory;
 mod metrics;
 mod model;
