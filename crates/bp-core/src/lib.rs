@@ -45,6 +45,7 @@ mod model;
 mod plan;
 mod settings;
 pub mod synthetic;
+mod tiles;
 pub mod worked_example;
 
 pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Side, Solver};
@@ -58,3 +59,4 @@ pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
 pub use plan::{Buffer, MAX_GRIDS, Plan};
 pub use settings::{Algorithm, BAND_ROWS, Cut, MessageStart, Schedule, Settings};
+pub use tiles::{HALO, Needed, Span, Tile, Tiled, Tiling};
