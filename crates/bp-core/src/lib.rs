@@ -43,6 +43,7 @@ mod metrics;
 mod model;
 mod plan;
 mod settings;
+pub mod survey;
 pub mod synthetic;
 pub mod worked_example;
 
