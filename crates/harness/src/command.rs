@@ -1,4 +1,4 @@
-//! One file a command, and `plan`, which `bp match` runs.
+//! One file a command.
 
 mod compare;
 mod conform;
@@ -8,7 +8,6 @@ pub(crate) mod evaluate;
 mod export;
 mod gate;
 pub(crate) mod match_pair;
-mod plan;
 pub(crate) mod scenes;
 mod speed;
 

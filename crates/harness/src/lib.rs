@@ -1,9 +1,9 @@
 //! The `bp` program: commands, files, scenes, records, reports.
 //!
-//! `command` holds one file a command, `reproduce` runs the thesis's experiments and records them, `report` makes
-//! tables, charts and pages from records, `compare` and `export` set several beside one another and hand one to other
-//! programs, `gate` holds speed-ups against committed baselines. `bench` is what `cargo bench` runs. `backends` is the
-//! only file that lists backends.
+//! `command` holds one file a command, `matching` what happens to a pair, `reproduce` runs the thesis's experiments and
+//! records them, `report` makes tables, charts and pages from records, `compare` and `export` set several beside one
+//! another and hand one to other programs, `gate` holds speed-ups against committed baselines. `bench` is what `cargo
+//! bench` runs. `backends` is the only file that lists backends.
 
 mod args;
 mod backends;
@@ -16,6 +16,7 @@ mod files;
 mod gate;
 mod interrupt;
 mod machine;
+mod matching;
 pub mod record;
 pub mod report;
 pub mod reproduce;

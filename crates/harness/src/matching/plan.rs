@@ -24,7 +24,7 @@ const SMALLER: [Smaller; 3] = [
 ];
 
 /// The plan that the options describe for images of `size`.
-pub(super) fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
+pub(crate) fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
     let labels = args.labels.map_or_else(|| default_labels(size), usize::from);
     let model = Model::new(args.profile, labels)?.with_min_disparity(args.min_disparity)?;
     let slope = args.slope.unwrap_or(model.slope());
@@ -33,7 +33,7 @@ pub(super) fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
 }
 
 /// Refuses options that contradict each other or would do nothing.
-pub(super) fn check_options(args: &PlanArgs) -> Result<(), Failure> {
+pub(crate) fn check_options(args: &PlanArgs) -> Result<(), Failure> {
     check_algorithm_options(args)?;
     if args.z.is_some() && counts_on_each_grid(args) {
         return Err(Failure::usage(
@@ -101,7 +101,7 @@ fn settings(args: &PlanArgs, size: Size, labels: usize) -> Settings {
 }
 
 /// The settings as records tell them.
-pub(super) fn recorded_settings(args: &PlanArgs, plan: &Plan, opened: &Opened) -> record::Settings {
+pub(crate) fn recorded_settings(args: &PlanArgs, plan: &Plan, opened: &Opened) -> record::Settings {
     let own = counts_on_each_grid(args);
     let k = (!own).then(|| loops(args, plan.model().labels()));
     let z = (!own && args.algorithm().divides_loops()).then(|| args.z.unwrap_or(2));
@@ -110,7 +110,7 @@ pub(super) fn recorded_settings(args: &PlanArgs, plan: &Plan, opened: &Opened) -
 
 /// The plan, if it fits into the memory that there is and that `--max-memory` allows. In place of the default plan, the
 /// first smaller one that is allowed runs, and standard error tells so.
-pub(super) fn fitting(args: &MatchArgs, plan: Plan, opened: &Opened) -> Result<Plan, Failure> {
+pub(crate) fn fitting(args: &MatchArgs, plan: Plan, opened: &Opened) -> Result<Plan, Failure> {
     let mut plans = vec![plan];
     if !is_shaped(&args.plan) {
         let smaller =

@@ -1,0 +1,10 @@
+//! What `bp match` does with a pair: options make a plan, a session runs it, outputs are written, a report is told.
+
+mod outputs;
+pub(crate) mod plan;
+mod report;
+mod session;
+
+pub(crate) use outputs::Outputs;
+pub(crate) use report::{Report, text};
+pub(crate) use session::{Answer, Session};

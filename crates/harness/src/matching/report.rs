@@ -1,0 +1,113 @@
+//! What is told of a match, as text or as JSON.
+
+use std::fmt::Write as _;
+
+use bp_core::{Errors, Stage, StereoPair, Times};
+use serde::Serialize;
+
+use super::{Answer, Outputs};
+use crate::{
+    backends::Opened,
+    command::evaluate::{self, ErrorReport},
+    record,
+};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub(crate) struct Report {
+    width: usize,
+    height: usize,
+    backend: String,
+    device: record::Device,
+    settings: record::Settings,
+    allocated_bytes: u64,
+    /// Of every match, in order.
+    samples_ms: Vec<f64>,
+    /// The median of these, and the stages of that match.
+    total_ms: f64,
+    clocks: Vec<record::Clocked>,
+    energy: record::Energy,
+    errors: Option<ErrorReport>,
+    messages_sha256: Option<String>,
+    output: String,
+}
+
+impl Report {
+    /// What is told of an answer.
+    pub(crate) fn new(
+        pair: &StereoPair,
+        opened: &Opened,
+        answer: Answer,
+        errors: Option<Errors>,
+        outputs: &Outputs,
+    ) -> Self {
+        let median = median(&answer.samples);
+        Self {
+            width: pair.size().width,
+            height: pair.size().height,
+            backend: opened.name.clone(),
+            device: (&opened.info).into(),
+            settings: answer.settings,
+            allocated_bytes: answer.allocated_bytes,
+            samples_ms: answer.samples.iter().map(total_ms).collect(),
+            total_ms: total_ms(&median),
+            clocks: record::clocks(&median),
+            energy: answer.energy.into(),
+            errors: errors.map(Into::into),
+            messages_sha256: answer.messages_sha256,
+            output: outputs.map.display().to_string(),
+        }
+    }
+}
+
+/// The sample of median total; of an even number, the lower one of the two in the middle.
+fn median(samples: &[Times]) -> Times {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by_key(|times| times.total);
+    sorted[(samples.len() - 1) / 2]
+}
+
+fn total_ms(times: &Times) -> f64 {
+    1000.0 * times.total.as_secs_f64()
+}
+
+/// The range of several samples.
+fn spread(samples_ms: &[f64]) -> String {
+    let low = samples_ms.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = samples_ms.iter().copied().fold(0.0, f64::max);
+    let count = samples_ms.len();
+    if count > 1 { format!(", median of {count} from {low:.1} to {high:.1} ms") } else { String::new() }
+}
+
+/// The report as text.
+pub(crate) fn text(report: &Report) -> String {
+    let mut text = String::new();
+    let Report { width, height, settings, .. } = report;
+    let record::Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
+    let last = min_disparity + *labels as i32 - 1;
+    let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
+    let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
+    let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
+    let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
+    let _ = writeln!(text, "{:<10}{plan}, on {}: {}{software}", "plan", report.backend, report.device.name);
+    let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
+    for record::Clocked { clock, stages } in &report.clocks {
+        let _ = writeln!(text, "{:<12}{clock:?} clock", "");
+        for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {
+            let _ = writeln!(text, "{:<14}{:<16}{ms:>10.1} ms", "", stage.name());
+        }
+    }
+    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let (planned, allocated) = (mebibytes(settings.planned_bytes), mebibytes(report.allocated_bytes));
+    let _ = writeln!(text, "{:<10}{allocated:.1} MiB allocated, {planned:.1} MiB predicted", "memory");
+    let record::Energy { total, data, smoothness } = report.energy;
+    let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
+    if let Some(hash) = &report.messages_sha256 {
+        let _ = writeln!(text, "{:<10}sha256 {hash}", "messages");
+    }
+    if let Some(errors) = &report.errors {
+        text += &evaluate::error_table(errors);
+    }
+    let _ = writeln!(text, "{:<10}{}", "written", report.output);
+    text
+}
