@@ -9,6 +9,7 @@
 //! It is plain integer arithmetic on one thread, so that every machine gives the same answer whatever backend matches.
 
 mod coarse;
+mod codes;
 mod range;
 mod rows;
 mod shrink;

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::LONGEST_SIDE;
-use crate::{Error, StereoPair, census, memory};
+use super::{LONGEST_SIDE, codes};
+use crate::{DisparityMap, Error, StereoPair, maps, memory};
 
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.
 const RADIUS: usize = 2;
@@ -24,26 +24,26 @@ const LEAST_PATCH: usize = 16;
 pub(super) struct Matches {
     /// What a left pixel of row y shows was looked for in row `y + rows_down` of the right image.
     pub(super) rows_down: isize,
-    width: usize,
-    /// Disparities in small pixels `[height][width]`.
-    disparities: Vec<Option<i16>>,
+    /// Disparities in small pixels.
+    map: DisparityMap,
 }
 
 impl Matches {
     /// How many pixels have a match.
     pub(super) fn count(&self) -> usize {
-        self.disparities.iter().flatten().count()
+        self.found().count()
     }
 
     /// Their share, 0 to 1.
     pub(super) fn share(&self) -> f64 {
-        self.count() as f64 / self.disparities.len() as f64
+        self.count() as f64 / self.map.size().pixels() as f64
     }
 
     /// Column, row and disparity of every pixel that has a match.
-    pub(super) fn found(&self) -> impl Iterator<Item = (usize, usize, i16)> {
-        let place = |(i, disparity): (usize, &Option<i16>)| Some((i % self.width, i / self.width, (*disparity)?));
-        self.disparities.iter().enumerate().filter_map(place)
+    pub(super) fn found(&self) -> impl Iterator<Item = (usize, usize, i32)> {
+        let width = self.map.size().width;
+        let known = self.map.values().iter().enumerate().filter(|(_, disparity)| disparity.is_finite());
+        known.map(move |(i, &disparity)| (i % width, i / width, disparity as i32))
     }
 }
 
@@ -51,12 +51,13 @@ impl Matches {
 pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Error> {
     let mut search = Search::new(small, rows_down)?;
     let size = small.size();
-    let mut matches = memory::filled("coarse matches", size.pixels(), None)?;
-    for (y, row) in matches.chunks_exact_mut(size.width).enumerate() {
+    let mut disparities = memory::filled("coarse matches", size.pixels(), DisparityMap::UNKNOWN)?;
+    for (y, row) in disparities.chunks_exact_mut(size.width).enumerate() {
         search.match_row(y, row);
     }
-    remove_specks(&mut matches, size.width);
-    Ok(Matches { rows_down, width: size.width, disparities: matches })
+    let map = DisparityMap::new(size, disparities)?;
+    let map = maps::remove_speckles(map, (size.pixels() / SPECK).max(LEAST_PATCH))?;
+    Ok(Matches { rows_down, map })
 }
 
 /// The costs of a pair, and room for one row of answers. Index `reach + d` stands for disparity d.
@@ -99,10 +100,11 @@ impl Search {
     fn fill_strips(&mut self, small: &StereoPair, rows_down: isize) {
         let (width, disparities) = (self.width, 2 * self.reach + 1);
         let mut costs = vec![OUTSIDE; width + 2 * RADIUS];
-        for y in 0..self.height {
-            let codes = |image, y| (0..width).map(|x| census::code(image, x, y)).collect::<Vec<u8>>();
+        let codes = |image| codes::of_rectangle(image, 0..width, 0..self.height);
+        let (left, right) = (codes(small.left()), codes(small.right()));
+        for (y, left) in left.chunks_exact(width).enumerate() {
             let below = y.saturating_add_signed(rows_down).min(self.height - 1);
-            let (left, right) = (codes(small.left(), y), codes(small.right(), below));
+            let right = &right[below * width..(below + 1) * width];
             for index in 0..disparities {
                 let [from, to] = self.columns(index);
                 costs.fill(OUTSIDE);
@@ -117,7 +119,7 @@ impl Search {
     }
 
     /// Fills a row of matches with those that both sides agree on and that are distinct.
-    fn match_row(&mut self, y: usize, matches: &mut [Option<i16>]) {
+    fn match_row(&mut self, y: usize, matches: &mut [f32]) {
         self.sum_windows(y);
         self.left.clear();
         self.right.clear();
@@ -132,7 +134,9 @@ impl Search {
             let back = self.right.index[(x as i16 - disparity) as usize];
             let (best, second) = (u16::from(self.left.cost[x]), u16::from(self.second[x]));
             let distinct = second != u16::from(IMPOSSIBLE) && 10 * second > 11 * best;
-            *found = (distinct && back.abs_diff(self.left.index[x]) <= 1).then_some(disparity);
+            if distinct && back.abs_diff(self.left.index[x]) <= 1 {
+                *found = f32::from(disparity);
+            }
         }
     }
 
@@ -189,42 +193,5 @@ impl Best {
 fn add_shifted(sums: &mut [u8], values: &[u8]) {
     for shift in 0..=2 * RADIUS {
         sums.iter_mut().zip(&values[shift..]).for_each(|(sum, value)| *sum += value);
-    }
-}
-
-/// Takes out matches whose neighbours of like disparity, and theirs, are too few to be a surface.
-fn remove_specks(matches: &mut [Option<i16>], width: usize) {
-    let least = (matches.len() / SPECK).max(LEAST_PATCH);
-    let mut seen = vec![false; matches.len()];
-    let mut patch = Vec::new();
-    for start in 0..matches.len() {
-        if seen[start] || matches[start].is_none() {
-            continue;
-        }
-        collect_patch(matches, width, start, &mut seen, &mut patch);
-        if patch.len() < least {
-            patch.iter().for_each(|&i| matches[i] = None);
-        }
-    }
-}
-
-/// Collects the pixels connected with `start` by steps of at most one disparity.
-fn collect_patch(matches: &[Option<i16>], width: usize, start: usize, seen: &mut [bool], patch: &mut Vec<usize>) {
-    patch.clear();
-    patch.push(start);
-    seen[start] = true;
-    let mut next = 0;
-    while let Some(&i) = patch.get(next) {
-        next += 1;
-        let (x, here) = (i % width, matches[i]);
-        let beside = [(x > 0).then(|| i - 1), (x + 1 < width).then_some(i + 1)];
-        let above = [i.checked_sub(width), Some(i + width).filter(|&i| i < matches.len())];
-        for other in beside.into_iter().chain(above).flatten() {
-            let alike = here.zip(matches[other]).is_some_and(|(a, b)| a.abs_diff(b) <= 1);
-            if alike && !seen[other] {
-                seen[other] = true;
-                patch.push(other);
-            }
-        }
     }
 }

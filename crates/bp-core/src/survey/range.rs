@@ -43,12 +43,12 @@ impl DisparityRange {
 
 impl SeenDisparities {
     pub(super) fn of(matches: &Matches, factor: usize) -> Option<Self> {
-        let mut found: Vec<i16> = matches.found().map(|(_, _, disparity)| disparity).collect();
+        let mut found: Vec<i32> = matches.found().map(|(_, _, disparity)| disparity).collect();
         found.sort_unstable();
         let beyond = found.len() / BEYOND;
         let (least, largest) = (*found.get(beyond)?, *found.get(found.len().checked_sub(beyond + 1)?)?);
         let step = factor as i32;
-        Some(Self { least: step * i32::from(least), largest: step * i32::from(largest), step })
+        Some(Self { least: step * least, largest: step * largest, step })
     }
 
     /// Labels for all of them and a margin. Those left over by rounding go to the near end, and so do those beyond

@@ -1,9 +1,9 @@
 //! Whether rows correspond: a few hundred matches looked at in full size, a window of census codes each.
 
-use std::array;
+use std::ops::Range;
 
-use super::coarse::Matches;
-use crate::{Size, StereoPair, census};
+use super::{coarse::Matches, codes};
+use crate::{Image, Size, StereoPair};
 
 /// Matches looked at, up to twice as many.
 const POINTS: usize = 256;
@@ -80,7 +80,7 @@ fn places(looks: &[Matches], factor: usize) -> impl Iterator<Item = (usize, usiz
     let count: usize = looks.iter().map(Matches::count).sum();
     let each = move |look: &Matches| {
         let centre = |i: usize| i * factor + factor / 2;
-        let place = |(x, y, disparity): (usize, usize, i16)| {
+        let place = |(x, y, disparity): (usize, usize, i32)| {
             (centre(x), centre(y), centre(x) as i64 - factor as i64 * i64::from(disparity))
         };
         look.found().map(place).collect::<Vec<_>>()
@@ -94,28 +94,26 @@ fn places(looks: &[Matches], factor: usize) -> impl Iterator<Item = (usize, usiz
 fn costs(pair: &StereoPair, (x, y): (usize, usize), column: i64, reach: usize, factor: usize) -> Option<Vec<u32>> {
     let size = pair.size();
     let (half_width, half_height) = (WINDOW_WIDTH / 2, WINDOW_HEIGHT / 2);
-    let (first_column, first_row) = (x.checked_sub(half_width)?, y.checked_sub(half_height + reach)?);
-    let first_match = usize::try_from(column - (half_width + factor) as i64).ok()?;
-    let (columns, rows) = (WINDOW_WIDTH + 2 * factor, WINDOW_HEIGHT + 2 * reach);
-    let inside = first_column + WINDOW_WIDTH <= size.width && first_match + columns <= size.width;
-    if !inside || first_row + rows > size.height {
+    let (left, top) = (x.checked_sub(half_width)?, y.checked_sub(half_height + reach)?);
+    let (left_columns, rows) = (left..left + WINDOW_WIDTH, top..top + 2 * reach + WINDOW_HEIGHT);
+    let left = usize::try_from(column - (half_width + factor) as i64).ok()?;
+    let right_columns = left..left + 2 * factor + WINDOW_WIDTH;
+    if left_columns.end.max(right_columns.end) > size.width || rows.end > size.height {
         return None;
     }
-    let word = |codes: &[u8]| codes.iter().fold(0, |word: u64, &code| word << 8 | u64::from(code));
-    let window: [u64; WINDOW_HEIGHT] = array::from_fn(|row| {
-        let codes: [u8; WINDOW_WIDTH] =
-            array::from_fn(|column| census::code(pair.left(), first_column + column, first_row + reach + row));
-        word(&codes)
-    });
-    let strips: Vec<Vec<u64>> = (first_row..first_row + rows)
-        .map(|row| {
-            let codes = (first_match..first_match + columns).map(|column| census::code(pair.right(), column, row));
-            codes.collect::<Vec<u8>>().windows(WINDOW_WIDTH).map(word).collect()
-        })
-        .collect();
-    let differing = |strips: &[Vec<u64>], column: usize| -> u32 {
-        strips.iter().zip(&window).map(|(strip, row)| (strip[column] ^ row).count_ones()).sum()
+    let window = words(pair.left(), left_columns, y - half_height..y + half_height + 1);
+    let strips = words(pair.right(), right_columns, rows);
+    let differing = |strips: &[Vec<u64>], place: usize| -> u32 {
+        strips.iter().zip(&window).map(|(strip, row)| (strip[place] ^ row[0]).count_ones()).sum()
     };
-    let least = |strips: &[Vec<u64>]| (0..=2 * factor).map(|column| differing(strips, column)).min().unwrap_or(0);
+    let least = |strips: &[Vec<u64>]| (0..=2 * factor).map(|place| differing(strips, place)).min().unwrap_or(0);
     Some(strips.windows(WINDOW_HEIGHT).map(least).collect())
+}
+
+/// The codes of each row of a rectangle, [`WINDOW_WIDTH`] from every place on where so many are left.
+fn words(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<Vec<u64>> {
+    let width = columns.len();
+    let word = |codes: &[u8]| codes.iter().fold(0, |word: u64, &code| word << 8 | u64::from(code));
+    let codes = codes::of_rectangle(image, columns, rows);
+    codes.chunks_exact(width).map(|row| row.windows(WINDOW_WIDTH).map(word).collect()).collect()
 }
