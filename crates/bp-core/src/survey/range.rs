@@ -39,6 +39,17 @@ impl DisparityRange {
     pub fn max_disparity(&self) -> i32 {
         self.min_disparity + self.labels as i32 - 1
     }
+
+    /// The range from another first disparity to the same last one, or past that to the next number of labels.
+    #[must_use]
+    pub fn starting_at(&self, min_disparity: i32) -> Self {
+        Self::spanning(min_disparity, self.max_disparity())
+    }
+
+    fn spanning(min_disparity: i32, max_disparity: i32) -> Self {
+        let needed = (i64::from(max_disparity) - i64::from(min_disparity) + 1).clamp(1, MAX_LABELS as i64) as usize;
+        Self { min_disparity, labels: needed.next_multiple_of(LABEL_STEP).min(MAX_LABELS) }
+    }
 }
 
 impl SeenDisparities {
@@ -55,9 +66,7 @@ impl SeenDisparities {
     /// [`MAX_LABELS`], which are left out.
     #[must_use]
     pub fn range(&self) -> DisparityRange {
-        let min_disparity = self.least - MARGIN * self.step;
-        let needed = (self.largest + MARGIN * self.step - min_disparity + 1) as usize;
-        DisparityRange { min_disparity, labels: needed.next_multiple_of(LABEL_STEP).min(MAX_LABELS) }
+        DisparityRange::spanning(self.least - MARGIN * self.step, self.largest + MARGIN * self.step)
     }
 
     /// Whether some lie below the first label of a model, and whether some lie above its last.

@@ -97,6 +97,10 @@ fn labels_that_leave_out_what_was_seen_are_told_at_their_end() {
     };
     let range = seen.range();
     assert_eq!(beyond(range.min_disparity, range.labels), [false, false]);
+    let from_zero = range.starting_at(0);
+    assert_eq!((from_zero.min_disparity, from_zero.max_disparity() / 16), (0, range.max_disparity() / 16));
+    assert_eq!(range.starting_at(i32::MIN).labels, crate::MAX_LABELS);
+    assert_eq!(range.starting_at(i32::MAX).labels, 16);
     assert_eq!(beyond(0, 64), [false, false]);
     assert_eq!(beyond(0, 40), [false, true]);
     assert_eq!(beyond(20, 60), [true, false]);
