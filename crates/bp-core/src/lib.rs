@@ -45,6 +45,7 @@ mod metrics;
 mod model;
 mod plan;
 mod settings;
+pub mod survey;
 pub mod synthetic;
 mod tiles;
 pub mod worked_example;

@@ -43,6 +43,11 @@ impl Outputs {
         check_range(&self.map, model.disparity(0), model.disparity(model.labels() as u16 - 1))
     }
 
+    /// Whether the format can hold a disparity.
+    pub(crate) fn hold(&self, disparity: i32) -> bool {
+        check_range(&self.map, disparity, disparity).is_ok()
+    }
+
     /// Writes all files.
     pub(crate) fn write(&self, answer: &Answer) -> Result<(), Failure> {
         write_map(&self.map, &answer.map)?;

@@ -29,6 +29,8 @@ pub(crate) struct Report {
     energy: record::Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
+    /// What may be wrong with the images or the labels, as standard error tells it.
+    warnings: Vec<String>,
     output: String,
 }
 
@@ -39,6 +41,7 @@ impl Report {
         opened: &Opened,
         answer: Answer,
         errors: Option<Errors>,
+        warnings: Vec<String>,
         outputs: &Outputs,
     ) -> Self {
         let median = median(&answer.samples);
@@ -55,6 +58,7 @@ impl Report {
             energy: answer.energy.into(),
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
+            warnings,
             output: outputs.map.display().to_string(),
         }
     }
