@@ -5,6 +5,6 @@ pub(crate) mod plan;
 mod report;
 mod session;
 
-pub(crate) use outputs::Outputs;
+pub(crate) use outputs::{Content, Making, Outputs};
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

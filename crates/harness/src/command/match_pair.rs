@@ -13,7 +13,7 @@ use crate::{
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
-    matching::{self, Outputs, Report, Session, plan},
+    matching::{self, Content, Making, Outputs, Report, Session, plan},
     tell, threads,
 };
 
@@ -26,17 +26,18 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let outputs = Outputs::of(args);
-    let inputs: Vec<&Path> = [&args.left, &args.right].into_iter().chain(truths).map(PathBuf::as_path).collect();
-    outputs.check(&inputs)?;
+    let outputs = Outputs::of(Some(&args.output), &args.outputs);
+    let making = Making::of(&args.outputs.making)?;
+    let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
+    outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
     let pair = read_pair(&args.left, &args.right, limit)?;
     let plan = plan::plan(&args.plan, pair.size())?;
-    outputs.check_range(plan.model())?;
+    outputs.check_model(&making, plan.model(), pair.size())?;
     warn_of_labels(&plan);
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
-    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), &outputs))?;
+    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), (&outputs, &making)))?;
     if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
 }
 
@@ -46,13 +47,20 @@ fn run(
     pair: &StereoPair,
     plan: Plan,
     truth: Option<&GroundTruth>,
-    outputs: &Outputs,
+    (outputs, making): (&Outputs, &Making),
 ) -> Result<Report, Failure> {
     let mut session = Session::open(args)?;
     let answer = session.solve(pair, plan)?;
     let errors: Option<Errors> = truth.map(|truth| truth.errors(&answer.map)).transpose()?;
-    outputs.write(&answer)?;
-    Ok(Report::new(pair, session.opened(), answer, errors, outputs))
+    let inputs: Vec<&Path> = sources(args).collect();
+    let (image, plan) = (Some(pair.left()), Some(&answer.settings));
+    outputs.write(making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+    Ok(Report::new(pair, session.opened(), answer, errors, outputs.paths(making)))
+}
+
+/// The files that the outputs are made of.
+fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
+    [&args.left, &args.right].into_iter().chain(&args.outputs.making.calib).map(PathBuf::as_path)
 }
 
 /// Warns of labels that match nothing inside the right image.
