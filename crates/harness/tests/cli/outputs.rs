@@ -230,8 +230,7 @@ fn jpegs_are_images_and_no_maps_and_cut_ones_neither() {
         let image = image::open(folder.path(&format!("{name}.png"))).unwrap();
         image.save(folder.path(&format!("{name}.jpg"))).unwrap();
     }
-    let report = folder
-        .json(&format!("match left.jpg right.jpg -o a.pfm --labels 12 --ground-truth truth.png --scale 2 --json"));
+    let report = folder.json("match left.jpg right.jpg -o a.pfm --labels 12 --ground-truth truth.png --scale 2 --json");
     assert!(report["errors"]["all"]["bad"][1].as_f64().unwrap() < 50.0, "{}", report["errors"]);
     folder.fails("evaluate left.jpg truth.png", 3, &["left.jpg", "JPEG"]);
     let whole = fs::read(folder.path("left.jpg")).unwrap();
