@@ -6,25 +6,17 @@ use crate::{Image, Model, Seed, StereoPair};
 const HALF_LENGTH: usize = 10;
 
 /// The census code of the pixel at (x, y): its eight neighbours in row order, from the highest bit to the lowest, 1
-/// where the neighbour's grey value is greater. Border pixels are repeated outward.
+/// where the neighbour's grey value is greater. Border pixels are repeated outward, see [`Image::grey_near`].
 ///
 /// # Panics
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    let size = image.size();
     let centre = image.grey(x, y);
-    let columns = [x.saturating_sub(1), x, (x + 1).min(size.width - 1)];
-    let rows = [y.saturating_sub(1), y, (y + 1).min(size.height - 1)];
-    let mut code = 0;
-    for (j, &row) in rows.iter().enumerate() {
-        for (i, &column) in columns.iter().enumerate() {
-            if (i, j) != (1, 1) {
-                code = code << 1 | u8::from(image.grey(column, row) > centre);
-            }
-        }
-    }
-    code
+    let (x, y) = (x as isize, y as isize);
+    let window = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    let neighbours = window.filter(|&offset| offset != (0, 0));
+    neighbours.fold(0, |code, (dx, dy)| code << 1 | u8::from(image.grey_near(x + dx, y + dy) > centre))
 }
 
 /// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the

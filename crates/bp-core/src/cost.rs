@@ -159,6 +159,23 @@ mod tests {
         assert_eq!(cost(Profile::Mrf, &[200], &[50], None).at(0, 0, 0), 450);
     }
 
+    /// What strips of an image are matched by.
+    #[test]
+    fn costs_of_a_strip_are_those_of_the_whole_image() {
+        let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);
+        let view = |first| Image::from_rgb(5, 9, (first..first + 45).map(noise).collect()).unwrap();
+        let pair = StereoPair::new(view(0), view(100)).unwrap();
+        for (profile, rows) in Profile::ALL.into_iter().flat_map(|p| [0..2, 1..4, 4..5, 8..9].map(|rows| (p, rows))) {
+            let model = Model::new(profile, 3).unwrap();
+            let whole = DataCost::of_pair(&pair, model).unwrap();
+            let strip = DataCost::of_pair(&pair.strip(rows.clone()), model).unwrap();
+            for (x, y, label) in rows.clone().flat_map(|y| (0..15).map(move |i| (i / 3, y, i as u16 % 3))) {
+                let found = strip.at(x, y - rows.start, label);
+                assert_eq!(found, whole.at(x, y, label), "{} {rows:?} ({x}, {y})", profile.name());
+            }
+        }
+    }
+
     #[test]
     fn a_seed_fixes_its_four_nodes_only() {
         let seed = Seed { x: 2, y: 0, label: 2 };

@@ -1,6 +1,10 @@
 //! What a profile compares: a few bytes a pixel of each image.
 
-use bp_core::{Error, Image, Model, Profile, Size, StereoPair, image::grey, memory};
+use bp_core::{
+    Error, Image, Model, Profile, Size, StereoPair,
+    image::{APRON, grey},
+    memory,
+};
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
@@ -16,7 +20,8 @@ pub(crate) struct Features {
     right: Vec<u8>,
     /// 255 where the right image has a column, else 0: `[parity][lane]`, padded alike.
     inside: [Vec<u8>; 2],
-    /// Grey values of both images with their border pixels repeated outward, `[height][width + 2]`; for `census` only.
+    /// Grey values of both images and of what lies around, see [`Image::grey_near`], `[height][width]` with [`APRON`] more
+    /// rows and columns on every side; for `census` only.
     grey: [Vec<u8>; 2],
 }
 
@@ -50,7 +55,7 @@ impl Features {
         let right = (right.as_mut_slice(), *lanes + 2 * BLOCK, BLOCK);
         let views = [(pair.left(), left_grey, (left.as_mut_slice(), *lanes, 0)), (pair.right(), right_grey, right)];
         for (image, grey, (out, lanes, offset)) in views {
-            let rows = grey.par_chunks_mut(size.width + 2).with_min_len(MIN_ROWS).enumerate();
+            let rows = grey.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
             rows.for_each(|(y, row)| dispatch!(level, simd => grey_row(simd, image, y, row)));
             let rows = out.par_chunks_mut(2 * lanes * channels(*profile)).with_min_len(MIN_ROWS).enumerate();
             let view = View { profile: *profile, image, grey };
@@ -96,20 +101,26 @@ fn channels(profile: Profile) -> usize {
 }
 
 fn grey_bytes(size: Size, profile: Profile) -> usize {
-    if profile == Profile::Census { size.height * (size.width + 2) } else { 0 }
+    if profile == Profile::Census { (size.height + 2 * APRON) * (size.width + 2 * APRON) } else { 0 }
 }
 
+/// Fills the given row of [`Features::grey`].
 #[inline(always)]
-fn grey_row<S: Simd>(simd: S, image: &Image, y: usize, row: &mut [u8]) {
+fn grey_row<S: Simd>(simd: S, image: &Image, index: usize, row: &mut [u8]) {
     let width = image.size().width;
-    let pixels = &image.pixels()[y * width..][..width];
+    let pixels = image.row_near(index as isize - APRON as isize);
+    let (before, rest) = row.split_at_mut(APRON);
+    let (own, after) = rest.split_at_mut(width);
     simd.vectorize(
         #[inline(always)]
-        || row[1..=width].iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+        || own.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
     );
-    row[0] = row[1];
-    row[width + 1] = row[width];
+    before.fill(own[0]);
+    after.fill(own[width - 1]);
 }
+
+/// Columns and rows of the neighbours that a census code compares, in order, counted from [`APRON`] before the pixel.
+const CENSUS_NEIGHBOURS: [(usize, usize); 8] = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
 
 /// An image to be taken in.
 struct View<'a> {
@@ -145,20 +156,22 @@ impl View<'_> {
         }
     }
 
+    /// Grey values of the row that lies `APRON - dy` rows above row `y`.
+    #[inline(always)]
+    fn grey_row(&self, y: usize, dy: usize) -> &[u8] {
+        let columns = self.image.size().width + 2 * APRON;
+        &self.grey[(y + dy) * columns..][..columns]
+    }
+
     /// The census codes of a row, as [`bp_core::census::code`] gives them, dealt to even and odd columns.
     #[inline(always)]
     fn census(&self, y: usize, even: &mut [u8], odd: &mut [u8]) {
-        let Size { width, height } = self.image.size();
-        let row = |y: usize| &self.grey[y * (width + 2)..][..width + 2];
-        let [above, centre, below] = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
         let mut codes = [0; 2 * BLOCK];
         for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
             let (x, columns) = (2 * BLOCK * index, even.len() + odd.len());
-            let middle = &centre[x + 1..][..columns];
-            for (row, dx) in
-                [(above, 0), (above, 1), (above, 2), (centre, 0), (centre, 2), (below, 0), (below, 1), (below, 2)]
-            {
-                let neighbours = &row[x + dx..][..columns];
+            let middle = &self.grey_row(y, APRON)[x + APRON..][..columns];
+            for (dx, dy) in CENSUS_NEIGHBOURS {
+                let neighbours = &self.grey_row(y, dy)[x + dx..][..columns];
                 for ((code, neighbour), middle) in codes[..columns].iter_mut().zip(neighbours).zip(middle) {
                     // Older bits leave at the top: what an earlier block left behind is gone after eight.
                     *code = *code << 1 | u8::from(neighbour > middle);

@@ -1,6 +1,6 @@
 //! The commands of every part.
 
-use bp_core::{MessageStart, Schedule, Side};
+use bp_core::{MessageStart, Schedule, Side, image::APRON};
 
 use super::{Composer, Nodes, PartRecorder, Rows, Work};
 use crate::{
@@ -25,7 +25,8 @@ impl Composer<'_> {
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
             let rows = Rows { first: 0, step: 1, count: size.height };
             let work = Work { parameters, rows, row_invocations: size.width };
-            let pipeline = Pipeline { kernel: Kernel::Features, constants: vec![profile] };
+            let constants = vec![profile, ("APRON", APRON as u32)];
+            let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
         }
         part.push_short(Command::Barrier);
