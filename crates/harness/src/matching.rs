@@ -7,6 +7,6 @@ mod report;
 mod session;
 pub(crate) mod warnings;
 
-pub(crate) use outputs::Outputs;
+pub(crate) use outputs::{Content, Making, Outputs};
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

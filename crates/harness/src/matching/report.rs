@@ -1,11 +1,11 @@
 //! What is told of a match, as text or as JSON.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::PathBuf};
 
 use bp_core::{Errors, Stage, StereoPair, Times};
 use serde::Serialize;
 
-use super::{Answer, Outputs};
+use super::Answer;
 use crate::{
     backends::Opened,
     command::evaluate::{self, ErrorReport},
@@ -31,7 +31,8 @@ pub(crate) struct Report {
     messages_sha256: Option<String>,
     /// What may be wrong with the images or the labels, as standard error tells it.
     warnings: Vec<String>,
-    output: String,
+    /// The files, the disparity map first.
+    written: Vec<String>,
 }
 
 impl Report {
@@ -42,7 +43,7 @@ impl Report {
         answer: Answer,
         errors: Option<Errors>,
         warnings: Vec<String>,
-        outputs: &Outputs,
+        written: Vec<PathBuf>,
     ) -> Self {
         let median = median(&answer.samples);
         Self {
@@ -59,7 +60,7 @@ impl Report {
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
             warnings,
-            output: outputs.map.display().to_string(),
+            written: written.iter().map(|path| path.display().to_string()).collect(),
         }
     }
 }
@@ -112,6 +113,6 @@ pub(crate) fn text(report: &Report) -> String {
     if let Some(errors) = &report.errors {
         text += &evaluate::error_table(errors);
     }
-    let _ = writeln!(text, "{:<10}{}", "written", report.output);
+    let _ = writeln!(text, "{:<10}{}", "written", report.written.join(", "));
     text
 }
