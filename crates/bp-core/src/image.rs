@@ -89,6 +89,14 @@ impl Image {
         Self::from_rgb(width, height, pixels.iter().map(|&v| [v; 3]).collect())
     }
 
+    /// The same turned left to right.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mut pixels = self.pixels.clone();
+        pixels.chunks_exact_mut(self.size.width).for_each(<[_]>::reverse);
+        Self { pixels, ..*self }
+    }
+
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {
@@ -200,6 +208,14 @@ impl StereoPair {
             return Err(Error::SizesDiffer { left: left.size(), right: right.size() });
         }
         Ok(Self { left, right })
+    }
+
+    /// The pair in a mirror: the right image, turned left to right, is its left one and the other way round. What is its
+    /// disparity map in the mirror is the right image's: right pixel (x, y) with disparity d shows what left pixel
+    /// (x + d, y) shows.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self { left: self.right.mirrored(), right: self.left.mirrored() }
     }
 
     /// The size of both images.

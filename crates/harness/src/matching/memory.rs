@@ -1,6 +1,6 @@
 //! What a match takes of memory, known before it begins, and how its plan is tiled to keep within.
 
-use bp_core::{DeviceKind, Error, Plan, Schedule, Tiling};
+use bp_core::{DeviceKind, Error, Plan, Schedule, Size, Tiling};
 
 use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, tell};
 
@@ -13,11 +13,12 @@ const PAIR: u64 = 6;
 /// Bytes a pixel of known truth.
 const TRUTH: u64 = 5;
 
-/// Bytes a pixel while an answer is finished: the map, and what is made of it to be written.
-const FINISHING: u64 = 4 + 4;
+/// Bytes a pixel of the map, and of what is made of it at a time to be written: most for a picture with a bar beside it.
+const MAP: u64 = 4;
+const WRITING: u64 = 8;
 
-/// Bytes a pixel of labels.
-const LABELS: u64 = 2;
+/// Bytes a pixel of depths.
+const DEPTH: u64 = 4;
 
 /// How a plan is tiled, and what it takes.
 pub(crate) struct Fitted {
@@ -30,25 +31,22 @@ pub(crate) struct Fitted {
 /// How `plan` is tiled to keep within `--max-memory` and the memory that there is. Standard error tells where the image is
 /// not matched as a whole. The plan itself stays what it is: tiles cost less accuracy than a smaller plan does.
 pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<Fitted, Failure> {
-    let size = plan.image_size();
-    let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
-    let held = PROGRAM + a_pixel(PAIR + if args.ground_truth.is_some() { TRUTH } else { 0 });
-    let limit = Limit::of(args, opened, held);
+    let beside = Beside::of(args, plan.image_size());
+    let limit = Limit::of(args, opened, beside.held);
     let needed = |tile: &Plan| {
         opened.device.check(tile)?;
         // A whole image stays prepared while its answer is finished.
-        let finishing = if tile.image_size() == size { a_pixel(FINISHING) } else { 0 };
-        Ok(opened.device.planned_bytes(tile).saturating_add(finishing))
+        let kept = if tile.image_size() == plan.image_size() { beside.finishing } else { 0 };
+        Ok(opened.device.planned_bytes(tile).saturating_add(kept))
     };
-    let peak = |tiles: u64| held.saturating_add(tiles.max(a_pixel(LABELS + FINISHING)));
-    let room = limit.bytes.saturating_sub(held);
+    let room = limit.bytes.saturating_sub(beside.held);
     let tiling = match Tiling::within(plan, room, &needed) {
         Err(Error::OutOfMemory { needed, available, .. }) if available == Some(room) => {
-            return Err(limit.refuse(plan, peak(needed)));
+            return Err(limit.refuse(plan, beside.peak(needed)));
         }
         tiling => tiling?,
     };
-    let peak_bytes = peak(tiling.bytes(&needed)?);
+    let peak_bytes = beside.peak(tiling.bytes(&needed)?);
     if peak_bytes > limit.bytes {
         return Err(limit.refuse(plan, peak_bytes));
     }
@@ -56,11 +54,33 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         if args.messages_hash {
             return Err(Failure::out_of_memory("--messages-hash needs the whole image in memory at once"));
         }
-        let whole =
-            needed(plan).map_or_else(|error| error.to_string(), |bytes| format!("{} bytes are needed", peak(bytes)));
+        let bytes = |bytes| format!("{} bytes are needed", beside.peak(bytes));
+        let whole = needed(plan).map_or_else(|error| error.to_string(), bytes);
         tell(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
     }
     Ok(Fitted { tiling, peak_bytes })
+}
+
+/// Bytes that are needed beside those of tiles.
+struct Beside {
+    /// All the time.
+    held: u64,
+    /// Once the labels are there. Those and their energy need less than writing the map, and are gone by then.
+    finishing: u64,
+}
+
+impl Beside {
+    fn of(args: &MatchArgs, size: Size) -> Self {
+        let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
+        let truth = if args.ground_truth.is_some() { TRUTH } else { 0 };
+        let depth = if args.outputs.depth.is_some() { DEPTH } else { 0 };
+        Self { held: PROGRAM + a_pixel(PAIR + truth), finishing: a_pixel(MAP + WRITING + depth) }
+    }
+
+    /// Most bytes that are held, where tiles need so many.
+    fn peak(&self, tiles: u64) -> u64 {
+        self.held.saturating_add(tiles.max(self.finishing))
+    }
 }
 
 /// What a tiling is, in words.
