@@ -6,6 +6,7 @@ mod folder;
 mod recorded;
 mod running;
 mod speed;
+mod survey;
 
 use std::{fs, path::Path, process::Command};
 
