@@ -2,7 +2,7 @@
 
 use super::folder::{Folder, text};
 
-/// Two views of a noisy plane 9 px apart, and a third one whose rows are 4 px lower; large enough to be looked at.
+/// Two views of a noisy plane 9 px apart, one whose rows are 2 px lower, and another scene; large enough to be looked at.
 fn views() -> Folder {
     let folder = Folder::new();
     let noise = |x: u32, y: u32| {
