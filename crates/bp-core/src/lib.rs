@@ -32,10 +32,12 @@ pub mod census;
 #[cfg(feature = "conformance")]
 pub mod conformance;
 mod cost;
+mod depth;
 mod driver;
 mod energy;
 mod error;
 pub mod exactness;
+mod features;
 pub mod image;
 mod map;
 pub mod maps;
@@ -51,6 +53,7 @@ pub mod worked_example;
 
 pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Side, Solver};
 pub use cost::{DataCost, Seed};
+pub use depth::{Calibration, Point, depth_map, points};
 pub use driver::{Matcher, Observer, Progress, Stage, Times};
 pub use energy::{Energy, cheapest_labels};
 pub use error::Error;
