@@ -36,9 +36,9 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let survey = Survey::of(&pair)?;
     let range = labels::range(&args.plan, pair.size(), &survey, &outputs);
     let plan = plan::plan(&args.plan, pair.size(), range.unwrap_or_else(|| labels::default(&args.plan, pair.size())))?;
-    outputs.check_model(&making, plan.model(), pair.size())?;
     let warnings = warnings::of(&survey, &plan, [&args.left, &args.right], range.is_none());
     warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+    outputs.check_model(&making, plan.model(), pair.size())?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
     let outputs = (&outputs, &making);
