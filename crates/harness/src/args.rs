@@ -12,7 +12,7 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
+pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
@@ -29,6 +29,7 @@ pub(crate) struct Cli {
 const AFTER_HELP: &str = "\
 Examples:
   bp match left.png right.png --output map.pfm --picture map.png
+  bp match left.png right.png --output map.pfm --labels auto
   bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
   bp convert map.pfm --image left.png --points cloud.ply --calib calib.txt
   bp evaluate map.png truth.png --scale 2

@@ -72,14 +72,14 @@ pub(crate) struct PlanArgs {
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
-    /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
-    /// up to a multiple of 16]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
-    pub(crate) labels: Option<u16>,
-    /// Disparity of the first label in pixels; may be negative.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true,
+    /// Number of labels; the largest disparity is the least plus labels - 1. auto takes labels and least disparity from
+    /// a coarse look at the images. [default: a quarter of the width, rounded up to a multiple of 16]
+    #[arg(long, value_name = "N|auto", value_parser = labels)]
+    pub(crate) labels: Option<Labels>,
+    /// Disparity of the first label in pixels; may be negative. [default: 0; with --labels auto what the images need]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
-    pub(crate) min_disparity: i32,
+    pub(crate) min_disparity: Option<i32>,
     /// Loops (k) that the algorithm derives its own from; with --grids or sweep, loops on each grid. [default: labels;
     /// 1 for sweep]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -112,6 +112,21 @@ pub(crate) struct PlanArgs {
     /// Truncation K of the smoothness cost. [default: the profile's]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
     pub(crate) truncation: Option<u8>,
+}
+
+/// Labels as they are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Labels {
+    /// As many as the images need.
+    Auto,
+    /// So many.
+    Count(u16),
+}
+
+fn labels(text: &str) -> Result<Labels, String> {
+    let count = || text.parse().ok().filter(|count| (1..=MAX_LABELS).contains(&usize::from(*count)));
+    let labels = if text == "auto" { Some(Labels::Auto) } else { count().map(Labels::Count) };
+    labels.ok_or_else(|| format!("must be auto or a number from 1 to {MAX_LABELS}"))
 }
 
 impl PlanArgs {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair};
+use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair, survey::Survey};
 
 use super::{evaluate, print_json};
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
-    matching::{self, Content, Making, Outputs, Report, Session, plan},
+    matching::{self, Content, Making, Outputs, Report, Session, labels, plan, warnings},
     tell, threads,
 };
 
@@ -32,12 +32,16 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
     let pair = read_pair(&args.left, &args.right, limit)?;
-    let plan = plan::plan(&args.plan, pair.size())?;
+    let survey = Survey::of(&pair)?;
+    let range = labels::range(&args.plan, pair.size(), &survey, &outputs);
+    let plan = plan::plan(&args.plan, pair.size(), range.unwrap_or_else(|| labels::default(&args.plan, pair.size())))?;
     outputs.check_model(&making, plan.model(), pair.size())?;
-    warn_of_labels(&plan);
+    let warnings = warnings::of(&survey, &plan, [&args.left, &args.right], range.is_none());
+    warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
-    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), (&outputs, &making)))?;
+    let outputs = (&outputs, &making);
+    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), warnings, outputs))?;
     if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
 }
 
@@ -47,6 +51,7 @@ fn run(
     pair: &StereoPair,
     plan: Plan,
     truth: Option<&GroundTruth>,
+    warnings: Vec<String>,
     (outputs, making): (&Outputs, &Making),
 ) -> Result<Report, Failure> {
     let mut session = Session::open(args)?;
@@ -55,25 +60,12 @@ fn run(
     let inputs: Vec<&Path> = sources(args).collect();
     let (image, plan) = (Some(pair.left()), Some(&answer.settings));
     outputs.write(making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
-    Ok(Report::new(pair, session.opened(), answer, errors, outputs.paths(making)))
+    Ok(Report::new(pair, session.opened(), answer, errors, warnings, outputs.paths(making)))
 }
 
 /// The files that the outputs are made of.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right].into_iter().chain(&args.outputs.making.calib).map(PathBuf::as_path)
-}
-
-/// Warns of labels that match nothing inside the right image.
-fn warn_of_labels(plan: &Plan) {
-    let (model, width) = (plan.model(), plan.image_size().width);
-    if model.labels() > width {
-        let labels = model.labels();
-        tell(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
-    }
-    let matches_any = |label| (model.disparity(label).unsigned_abs() as usize) < width;
-    if !(0..model.labels() as u16).any(matches_any) {
-        tell("warning: with this --min-disparity no label matches anything inside the right image");
-    }
 }
 
 fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {

@@ -107,6 +107,11 @@ impl Outputs {
         making.calibration(size).map(drop)
     }
 
+    /// Whether the formats can hold a disparity.
+    pub(crate) fn hold(&self, disparity: i32) -> bool {
+        self.check_range(disparity as f32, disparity as f32).is_ok()
+    }
+
     /// Writes all files.
     pub(crate) fn write(&self, making: &Making, content: &Content<'_>) -> Result<(), Failure> {
         let disparities = Raster::disparities(content.map);

@@ -29,6 +29,8 @@ pub(crate) struct Report {
     energy: record::Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
+    /// What may be wrong with the images or the labels, as standard error tells it.
+    warnings: Vec<String>,
     /// The files, the disparity map first.
     written: Vec<String>,
 }
@@ -40,6 +42,7 @@ impl Report {
         opened: &Opened,
         answer: Answer,
         errors: Option<Errors>,
+        warnings: Vec<String>,
         written: Vec<PathBuf>,
     ) -> Self {
         let median = median(&answer.samples);
@@ -56,6 +59,7 @@ impl Report {
             energy: answer.energy.into(),
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
+            warnings,
             written: written.iter().map(|path| path.display().to_string()).collect(),
         }
     }
