@@ -103,8 +103,13 @@ impl Outputs {
 
     /// The same for a map of disparities from the first to the second of `range`.
     pub(crate) fn check_map(&self, making: &Making, range: (f32, f32), size: Size) -> Result<(), Failure> {
-        self.map.as_deref().map_or(Ok(()), |map| check_range(map, range.0, range.1))?;
+        self.check_range(range.0, range.1)?;
         making.calibration(size).map(drop)
+    }
+
+    /// Fails where a format cannot hold disparities from `low` to `high`.
+    fn check_range(&self, low: f32, high: f32) -> Result<(), Failure> {
+        self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))
     }
 
     /// Whether the formats can hold a disparity.
