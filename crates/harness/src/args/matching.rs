@@ -6,7 +6,7 @@ use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Sche
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{OutputArgs, named, positive, switch, threads};
+use super::{FinishArgs, OutputArgs, named, positive, switch, threads};
 use crate::{backends, files::PixelLimit};
 
 /// `bp match`.
@@ -30,8 +30,8 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
-    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given:
-    /// bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
+    /// Keep within so much memory, images and answer included: larger pairs are matched strip by strip or tile by tile.
+    /// Bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024). [default: what is free]
     #[arg(long, value_name = "SIZE")]
     pub(crate) max_memory: Option<ByteSize>,
     /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
@@ -41,6 +41,9 @@ pub(crate) struct MatchArgs {
     /// Ground truth of the left image: errors are measured where it is given.
     #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
     pub(crate) ground_truth: Option<PathBuf>,
+    /// What is done to the map after matching.
+    #[command(flatten)]
+    pub(crate) finish: FinishArgs,
     /// What else is written, and how.
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,

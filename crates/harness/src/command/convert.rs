@@ -29,7 +29,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let map = read_map(&args.map, args.map_scale, limit)?;
     outputs.check_map(&making, map.range().unwrap_or((0.0, 0.0)), map.size())?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;
-    outputs.write(&making, &Content { map: &map, image: image.as_ref(), plan: None, inputs: &inputs })
+    outputs.write(&making, &Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs })
 }
 
 /// Reads the left image of a map.
