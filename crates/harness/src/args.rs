@@ -1,5 +1,6 @@
 //! The command line.
 
+mod many;
 mod matching;
 mod measuring;
 mod records;
@@ -11,6 +12,7 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
+pub(crate) use many::ManyArgs;
 pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};

@@ -27,7 +27,7 @@ pub(crate) use speed::{check_speed, speed, write_speed};
 use crate::failure::Failure;
 
 /// Prints what `--json` asks for.
-fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+pub(crate) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, report).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)

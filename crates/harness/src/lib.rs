@@ -17,6 +17,7 @@ mod gate;
 mod interrupt;
 mod machine;
 mod matching;
+mod notes;
 pub mod record;
 pub mod report;
 pub mod reproduce;
@@ -25,11 +26,12 @@ mod speed;
 mod summary;
 mod threads;
 
-use std::{io::Write, process::ExitCode};
+use std::process::ExitCode;
 
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
+use notes::{note, tell};
 
 /// Runs the program; the exit codes are documented in `bp --help`.
 #[must_use]
@@ -61,9 +63,4 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Compare(args) => command::compare(args),
         Command::Export(args) => command::export(args),
     }
-}
-
-/// Prints a line on standard error. Where that is full or closed there is nobody left to tell.
-fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }

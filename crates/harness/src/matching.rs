@@ -1,10 +1,14 @@
-//! What `bp match` does with a pair: options make a plan, a session runs it, outputs are written, a report is told.
+//! What `bp match` does with a pair: options make a plan, a session runs it, outputs are written, a report is told;
+//! and how `batch` does so with many.
 
+pub(crate) mod batch;
 mod outputs;
+mod pairs;
 pub(crate) mod plan;
 mod report;
 mod session;
 
+pub(crate) use batch::Shard;
 pub(crate) use outputs::Outputs;
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

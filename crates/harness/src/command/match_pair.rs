@@ -13,13 +13,14 @@ use crate::{
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
-    matching::{self, Outputs, Report, Session, plan},
-    tell, threads,
+    matching::{self, Outputs, Report, Session, batch, plan},
+    note, threads,
 };
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     plan::check_options(&args.plan)?;
+    let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truth_options =
         args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
     if args.ground_truth.is_none() && truth_options {
@@ -27,10 +28,10 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     }
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let outputs = Outputs::of(args);
-    let inputs: Vec<&Path> = [&args.left, &args.right].into_iter().chain(truths).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = [left, right].into_iter().chain(truths).map(PathBuf::as_path).collect();
     outputs.check(&inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
-    let pair = read_pair(&args.left, &args.right, limit)?;
+    let pair = read_pair(left, right, limit)?;
     let plan = plan::plan(&args.plan, pair.size())?;
     outputs.check_range(plan.model())?;
     warn_of_labels(&plan);
@@ -56,19 +57,20 @@ fn run(
 }
 
 /// Warns of labels that match nothing inside the right image.
-fn warn_of_labels(plan: &Plan) {
+pub(crate) fn warn_of_labels(plan: &Plan) {
     let (model, width) = (plan.model(), plan.image_size().width);
     if model.labels() > width {
         let labels = model.labels();
-        tell(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
+        note(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
     }
     let matches_any = |label| (model.disparity(label).unsigned_abs() as usize) < width;
     if !(0..model.labels() as u16).any(matches_any) {
-        tell("warning: with this --min-disparity no label matches anything inside the right image");
+        note("warning: with this --min-disparity no label matches anything inside the right image");
     }
 }
 
-fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {
+/// Reads both images of a pair.
+pub(crate) fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {
     let named = |error| Failure::input(format!("{} and {}: {error}", left.display(), right.display()));
     StereoPair::new(read_image(left, limit)?, read_image(right, limit)?).map_err(named)
 }

@@ -50,7 +50,7 @@ impl Outputs {
     }
 
     /// All files.
-    fn paths(&self) -> impl Iterator<Item = &Path> {
+    pub(crate) fn paths(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.map).chain(&self.picture).map(PathBuf::as_path)
     }
 }

@@ -6,7 +6,7 @@ use crate::{
     args::{MatchArgs, PlanArgs},
     backends::Opened,
     failure::Failure,
-    machine, record, tell,
+    machine, note, record,
 };
 
 /// The algorithms that take loops of the thesis's schedules, as messages name them.
@@ -129,7 +129,7 @@ pub(crate) fn fitting(args: &MatchArgs, plan: Plan, opened: &Opened) -> Result<P
     if chosen > 0 {
         let (needed, takes, option) = (bytes[0], bytes[chosen], SMALLER[chosen - 1].0);
         let instead = format!("matching with {option}, which takes {takes} and is less accurate");
-        tell(&format!("--max-memory: the default plan needs {needed} bytes; {instead}"));
+        note(&format!("--max-memory: the default plan needs {needed} bytes; {instead}"));
     }
     Ok(plans.swap_remove(chosen))
 }

@@ -1,0 +1,143 @@
+//! What is to be done for each pair, and whether it can be.
+
+use std::{
+    collections::{BTreeSet, HashMap, HashSet},
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, SystemTime},
+};
+
+use super::{Shard, record::PairRecord, summary};
+use crate::{
+    args::MatchArgs,
+    failure::Failure,
+    files::{check_range, create_folder},
+    matching::{Outputs, pairs::Pair},
+};
+
+/// The folder of the records, in that of the outputs.
+const RECORDS: &str = "records";
+
+/// After how long nobody can be writing to a temporary file any more.
+const ABANDONED: Duration = Duration::from_hours(1);
+
+/// A pair, where its outputs go and where its record is.
+pub(super) struct Job {
+    pub(super) pair: Pair,
+    pub(super) outputs: Outputs,
+    pub(super) record: PathBuf,
+}
+
+/// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite an
+/// image.
+pub(super) fn jobs(args: &MatchArgs, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
+    let jobs: Vec<Job> = pairs.iter().map(|pair| Job::new(args, pair)).collect();
+    check_apart(args, &jobs)?;
+    // An ending that stands for no format is the fault of none of the pairs.
+    jobs.iter().take(1).try_for_each(|job| check_range(&job.outputs.map, 0, 0))?;
+    let own = jobs.into_iter().enumerate().filter(|(index, _)| shard.has(*index));
+    let jobs: Vec<Job> = own.map(|(_, job)| job).collect();
+    folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
+    Ok(jobs)
+}
+
+impl Job {
+    fn new(args: &MatchArgs, pair: &Pair) -> Self {
+        let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
+        let of_pair = MatchArgs {
+            left: Some(pair.left.clone()),
+            right: Some(pair.right.clone()),
+            output: named(&args.many.format),
+            picture: args.many.pictures.then(|| named("picture.png")),
+            ..args.clone()
+        };
+        let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
+        Self { pair: pair.clone(), outputs: Outputs::of(&of_pair), record }
+    }
+
+    /// Whether nothing is to be done.
+    pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
+        let outputs: Vec<&Path> = self.outputs.paths().collect();
+        let images = [self.pair.left.as_path(), &self.pair.right];
+        PairRecord::read(&self.record).is_some_and(|record| record.is_current(settings_sha256, &images, &outputs))
+    }
+
+    /// Fails where an output cannot be written.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        self.outputs.check(&[&self.pair.left, &self.pair.right])
+    }
+
+    /// Removes what an earlier success has left: the outputs of a pair that fails now would be taken for its own.
+    pub(super) fn remove_outputs(&self) {
+        // One that is not there is as good as removed, and one that cannot be is told where it is written next.
+        self.outputs.paths().for_each(|path| drop(fs::remove_file(path)));
+    }
+
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        self.outputs.paths().chain([self.record.as_path()])
+    }
+}
+
+/// Fails where two jobs write the same file, one's file is another's folder, or one is an image. Letters count as equal
+/// in both cases: on some file systems they are.
+fn check_apart(args: &MatchArgs, jobs: &[Job]) -> Result<(), Failure> {
+    let key = |path: &Path| path.as_os_str().to_ascii_lowercase();
+    let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
+    let images: HashSet<PathBuf> =
+        jobs.iter().flat_map(|job| [&job.pair.left, &job.pair.right]).map(|path| whole(path)).collect();
+    let summary = summary::path(&args.output, Shard::default());
+    let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
+    for job in jobs {
+        for path in job.files() {
+            if images.contains(&whole(path)) {
+                let advice = "choose another --output";
+                return Err(Failure::usage(format!("{} would be overwritten, an image; {advice}", path.display())));
+            }
+            let name = job.pair.left.display().to_string();
+            if let Some(other) = owners.insert(key(path), name.clone()) {
+                return Err(clash(path, &other, &name));
+            }
+        }
+    }
+    for job in jobs {
+        let name = job.pair.left.display().to_string();
+        for folder in job.files().flat_map(|path| path.ancestors().skip(1)) {
+            if let Some(other) = owners.get(&key(folder)) {
+                return Err(clash(folder, other, &name));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn clash(path: &Path, one: &str, other: &str) -> Failure {
+    let advice = "give them other names, by a list as --pairs takes it";
+    Failure::usage(format!("{}: {one} and {other} would both go there; {advice}", path.display()))
+}
+
+/// All folders that files of these jobs are in.
+fn folders(args: &MatchArgs, jobs: &[Job]) -> BTreeSet<PathBuf> {
+    let parents = jobs.iter().flat_map(Job::files).filter_map(Path::parent);
+    parents.chain([args.output.as_path()]).map(Path::to_owned).collect()
+}
+
+/// Removes temporary files of an earlier run of this shard that was killed, and of others that nobody writes any more.
+pub(super) fn clear_leftovers(args: &MatchArgs, jobs: &[Job], shard: Shard) -> Result<(), Failure> {
+    let own = format!(".bp-{}-", shard.file_part());
+    for folder in folders(args, jobs) {
+        let entries = fs::read_dir(&folder).map_err(|error| Failure::writing(&folder, &error))?;
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let is_old = || {
+                let modified = entry.metadata().and_then(|metadata| metadata.modified()).ok();
+                let age = modified.and_then(|modified| SystemTime::now().duration_since(modified).ok());
+                age.is_some_and(|age| age > ABANDONED)
+            };
+            let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
+            if is(&own) || (is(".bp-") && is_old()) {
+                fs::remove_file(entry.path()).map_err(|error| Failure::writing(&entry.path(), &error))?;
+            }
+        }
+    }
+    Ok(())
+}

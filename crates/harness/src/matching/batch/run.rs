@@ -1,0 +1,177 @@
+//! Three threads, a pair in each: one reads, one matches, one writes.
+
+use std::{
+    io,
+    sync::mpsc::{Receiver, SyncSender, sync_channel},
+    thread,
+    time::Instant,
+};
+
+use bp_core::StereoPair;
+
+use super::{
+    job::Job,
+    record::{Done, FileState, Outcome, PairRecord, PairTimes},
+};
+use crate::{
+    args::MatchArgs,
+    command::match_pair::{read_pair, warn_of_labels},
+    failure::Failure,
+    files::PixelLimit,
+    interrupt::{self, ProgressBar},
+    matching::{Answer, Session, plan},
+    record, tell,
+};
+
+/// A pair in memory.
+struct Read<'a> {
+    job: &'a Job,
+    inputs: Vec<FileState>,
+    pair: Result<StereoPair, Failure>,
+    read_ms: f64,
+}
+
+/// An answer, not yet written.
+struct Matched<'a> {
+    job: &'a Job,
+    inputs: Vec<FileState>,
+    done: Result<(Done, Answer), Failure>,
+}
+
+/// Matches and writes all jobs; a pair that fails is recorded, and the others go on.
+pub(super) fn run(args: &MatchArgs, jobs: &[&Job], settings_sha256: &str) -> Result<(), Failure> {
+    let bar = ProgressBar::new(jobs.len() as u64);
+    // Nothing waits in the channels: at most three pairs are in memory.
+    let (read, to_match) = sync_channel(0);
+    let (matched, to_write) = sync_channel(0);
+    let limit = PixelLimit::megapixels(args.max_megapixels);
+    let begun = Instant::now();
+    let result = thread::scope(|scope| {
+        scope.spawn(move || read_all(jobs, limit, &read));
+        let writer = scope.spawn(|| Writer { bar: &bar, settings_sha256, last: begun, failed: 0 }.write_all(to_write));
+        let solved = solve_all(args, to_match, matched);
+        let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        // Where writing fails, matching ends for want of a writer.
+        written.and(solved)
+    });
+    bar.finish();
+    result
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    1000.0 * start.elapsed().as_secs_f64()
+}
+
+/// Reads pair after pair until nobody wants more.
+fn read_all<'a>(jobs: &[&'a Job], limit: PixelLimit, to: &SyncSender<Read<'a>>) {
+    for &job in jobs {
+        let start = Instant::now();
+        // Before they are read: whatever is written to them after this is noticed.
+        let inputs: io::Result<Vec<FileState>> =
+            [&job.pair.left, &job.pair.right].into_iter().map(|path| FileState::of(path)).collect();
+        let pair = read_pair(&job.pair.left, &job.pair.right, limit);
+        let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
+        if interrupt::check().is_err() || to.send(read).is_err() {
+            return;
+        }
+    }
+}
+
+/// Matches pair after pair. A device that is lost is opened again for the next.
+fn solve_all<'a>(args: &MatchArgs, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Failure> {
+    let mut session = Session::open(args)?;
+    for Read { job, inputs, pair, read_ms } in from {
+        let done = pair.and_then(|pair| solve(args, &mut session, job, &pair, read_ms));
+        if let Err(failure) = &done {
+            if failure.is_interrupted() {
+                break;
+            }
+            if failure.is_device_lost() {
+                session = Session::open(args)?;
+            }
+        }
+        if to.send(Matched { job, inputs, done }).is_err() {
+            break;
+        }
+    }
+    interrupt::check()
+}
+
+fn solve(
+    args: &MatchArgs,
+    session: &mut Session<'_>,
+    job: &Job,
+    pair: &StereoPair,
+    read_ms: f64,
+) -> Result<(Done, Answer), Failure> {
+    let start = Instant::now();
+    let plan = plan::plan(&args.plan, pair.size())?;
+    job.outputs.check_range(plan.model())?;
+    warn_of_labels(&plan);
+    let answer = session.solve(pair, plan)?;
+    let solve_ms = answer.samples.iter().map(|times| 1000.0 * times.total.as_secs_f64()).sum();
+    let done = Done {
+        outputs: Vec::new(),
+        width: pair.size().width,
+        height: pair.size().height,
+        backend: session.opened().name.clone(),
+        device: record::Device::from(&session.opened().info),
+        settings: answer.settings.clone(),
+        energy: answer.energy.into(),
+        times: PairTimes { read_ms, solve_ms, match_ms: milliseconds_since(start), write_ms: 0.0 },
+    };
+    Ok((done, answer))
+}
+
+/// Writes outputs and, after them, records.
+struct Writer<'a> {
+    bar: &'a ProgressBar,
+    settings_sha256: &'a str,
+    last: Instant,
+    failed: usize,
+}
+
+impl Writer<'_> {
+    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<(), Failure> {
+        for (index, Matched { job, inputs, done }) in from.into_iter().enumerate() {
+            let outcome = match done {
+                Ok((done, answer)) => Outcome::Done(Box::new(write(job, done, &answer)?)),
+                Err(failure) => {
+                    self.failed += 1;
+                    tell(&format!("{}: {failure}", job.pair.name.display()));
+                    job.remove_outputs();
+                    Outcome::Failed(failure.to_string())
+                }
+            };
+            self.record(job, inputs, outcome)?;
+            let failed = if self.failed > 0 { format!(", {} failed", self.failed) } else { String::new() };
+            self.bar.message(format!("{} pairs{failed}", index + 1));
+            // Stopping is for the thread that matches; what it has handed over is still written.
+            let _ = self.bar.update(index as u64 + 1);
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, job: &Job, inputs: Vec<FileState>, outcome: Outcome) -> Result<(), Failure> {
+        let elapsed_ms = milliseconds_since(self.last);
+        self.last = Instant::now();
+        let record = PairRecord {
+            name: job.pair.name.clone(),
+            left: job.pair.left.clone(),
+            right: job.pair.right.clone(),
+            settings_sha256: self.settings_sha256.to_owned(),
+            inputs,
+            elapsed_ms,
+            outcome,
+        };
+        record.write(&job.record)
+    }
+}
+
+fn write(job: &Job, done: Done, answer: &Answer) -> Result<Done, Failure> {
+    let start = Instant::now();
+    job.outputs.write(answer)?;
+    let state = |path| FileState::of(path).map_err(|error| Failure::writing(path, &error));
+    let outputs = job.outputs.paths().map(state).collect::<Result<_, _>>()?;
+    Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
+}
