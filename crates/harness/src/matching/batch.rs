@@ -13,6 +13,7 @@ mod summary;
 
 use std::io::Write as _;
 
+use bp_core::{Algorithm, Schedule};
 pub(crate) use shard::Shard;
 use summary::Summary;
 
@@ -23,6 +24,11 @@ use crate::{
 
 /// Matches all pairs that the options name.
 pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
+    let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
+    if args.many.warm_start.is_some() && swept {
+        let what = "--warm-start needs messages that are kept; of the schedule sweep they are not";
+        return Err(Failure::usage(format!("{what}: take --algorithm cfbp --half-steps 10, say")));
+    }
     let found = pairs::find(args)?;
     found.notes.iter().for_each(|line| note(line));
     let shard = args.many.shard.unwrap_or_default();
@@ -31,8 +37,9 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     files::name_temporary(&format!(".bp-{}-", shard.file_part()));
     job::clear_leftovers(args, &jobs, shard)?;
     let settings = record::settings_sha256(args);
-    let is_due = |job: &&Job| args.many.force || !job.is_complete(&settings);
-    let due: Vec<&Job> = jobs.iter().filter(is_due).collect();
+    let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
+    let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
+    let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
     due.iter().try_for_each(|job| job.check())?;
     if !due.is_empty() {
         let ran = threads::run_on(args.plan.threads, || run::run(args, &due, &settings));

@@ -1,6 +1,6 @@
 //! A device that is opened once and prepared anew only where a pair needs another plan than the one before.
 
-use bp_core::{DisparityMap, Energy, Matcher, Plan, Side, StereoPair, Times};
+use bp_core::{DisparityMap, Energy, Matcher, Plan, Progress, Side, StereoPair, Times};
 use sha2::{Digest, Sha256};
 
 use super::plan;
@@ -17,6 +17,8 @@ pub(crate) struct Session<'a> {
     args: &'a MatchArgs,
     opened: Opened,
     matcher: Option<Matcher>,
+    /// Whether the next pair is the next frame of a video and starts from the messages of the one before.
+    pub(crate) starts_warm: bool,
 }
 
 /// What came out of a pair.
@@ -40,7 +42,7 @@ impl<'a> Session<'a> {
     pub(crate) fn open(args: &'a MatchArgs) -> Result<Self, Failure> {
         let opened = backends::open(&args.plan.backend, args.plan.device.as_deref())?;
         threads::check(args.plan.threads, &[&opened])?;
-        Ok(Self { args, opened, matcher: None })
+        Ok(Self { args, opened, matcher: None, starts_warm: false })
     }
 
     /// The device.
@@ -50,13 +52,13 @@ impl<'a> Session<'a> {
 
     /// Matches a pair as often as the options say.
     pub(crate) fn solve(&mut self, pair: &StereoPair, plan: Plan) -> Result<Answer, Failure> {
-        let Self { args, opened, matcher } = self;
+        let Self { args, opened, matcher, starts_warm } = self;
         let plan = plan::fitting(args, plan, opened)?;
         let mut prepared = match matcher.take() {
             Some(prepared) if *prepared.plan() == plan => prepared,
             _ => Matcher::new(opened.device.as_ref(), plan)?,
         };
-        let samples = take_samples(&mut prepared, pair, args.repeat)?;
+        let samples = take_samples(&mut prepared, pair, args.repeat, *starts_warm)?;
         let answer = Answer {
             map: prepared.disparities(),
             samples,
@@ -72,13 +74,15 @@ impl<'a> Session<'a> {
 }
 
 /// Matches the pair so many times.
-fn take_samples(matcher: &mut Matcher, pair: &StereoPair, repeat: u32) -> Result<Vec<Times>, Failure> {
+fn take_samples(matcher: &mut Matcher, pair: &StereoPair, repeat: u32, warm: bool) -> Result<Vec<Times>, Failure> {
     let updates = matcher.plan().message_updates();
     let bar = interrupt::ProgressBar::new(updates.saturating_mul(repeat.into()));
     let mut samples = Vec::new();
     for index in 0..u64::from(repeat) {
         let before = updates.saturating_mul(index);
-        samples.push(matcher.solve_observed(pair, &mut |progress| bar.update(before.saturating_add(progress.done)))?);
+        let observer = &mut |progress: Progress| bar.update(before.saturating_add(progress.done));
+        let solve = if warm { Matcher::solve_warm_observed } else { Matcher::solve_observed };
+        samples.push(solve(matcher, pair, observer)?);
     }
     bar.finish();
     Ok(samples)

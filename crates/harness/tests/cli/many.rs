@@ -298,3 +298,42 @@ fn frames_are_matched_in_order_and_gaps_are_told() {
         folder.fails(&format!("match --output no --video {patterns}"), 2, &["--video", "%04d"]);
     }
 }
+
+#[test]
+fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
+    let folder = Folder::new();
+    for frame in 0..7 {
+        place(&folder, &[&format!("v/left/{frame}.png"), &format!("v/right/{frame}.png")]);
+        let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
+        let view = |shift: u32| image::GrayImage::from_fn(40, 24, |x, y| image::Luma([noise(x + shift + frame, y)]));
+        view(0).save(folder.path(&format!("v/left/{frame}.png"))).unwrap();
+        view(5).save(folder.path(&format!("v/right/{frame}.png"))).unwrap();
+    }
+    let options = "--algorithm cfbp --half-steps 2 --labels 12 --threads 1";
+    let run = |output: &str, rest: &str| {
+        folder.json(&format!("match --video v/left/%d.png v/right/%d.png --json {options} --output {output} {rest}"))
+    };
+    run("cold", "");
+    assert_eq!(run("warm", "--warm-start=3")["done"], 7);
+    let whole = maps(&folder.path("warm"));
+    let same: Vec<bool> = maps(&folder.path("cold")).iter().zip(&whole).map(|(cold, warm)| cold == warm).collect();
+    assert!(same[0] && same[3] && same[6] && !same.iter().all(|&same| same), "{same:?}");
+    fs::remove_file(folder.path("warm/4.pfm")).unwrap();
+    assert_eq!(run("warm", "--warm-start=3")["skipped"], 4);
+    assert_eq!(maps(&folder.path("warm")), whole);
+    assert_eq!(
+        [1, 2].map(|shard| run("shared", &format!("--warm-start=3 --shard {shard}/2"))["done"].as_u64().unwrap()),
+        [4, 3]
+    );
+    assert_eq!(maps(&folder.path("shared")), whole);
+    // A frame that fails at the head of a chain leaves no way for another chain's messages to come in.
+    fs::write(folder.path("v/left/3.png"), "broken").unwrap();
+    let broken =
+        "match --video v/left/%d.png v/right/%d.png --warm-start=3 --algorithm cfbp --half-steps 2 --labels 12";
+    for output in ["warm", "anew"] {
+        assert_eq!(folder.run(&format!("{broken} --output {output}")).status.code(), Some(3));
+    }
+    assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
+    folder.fails("match --video l%d r%d --output no --warm-start", 2, &["--warm-start", "cfbp"]);
+    folder.fails("match --pairs v --output no --warm-start --algorithm cfbp", 2, &["--video"]);
+}

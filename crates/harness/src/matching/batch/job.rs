@@ -26,23 +26,24 @@ pub(super) struct Job {
     pub(super) pair: Pair,
     pub(super) outputs: Outputs,
     pub(super) record: PathBuf,
+    /// Which of the pairs that are done together it belongs to.
+    pub(super) chain: usize,
 }
 
 /// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite an
 /// image.
 pub(super) fn jobs(args: &MatchArgs, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
-    let jobs: Vec<Job> = pairs.iter().map(|pair| Job::new(args, pair)).collect();
+    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, index, pair)).collect();
     check_apart(args, &jobs)?;
     // An ending that stands for no format is the fault of none of the pairs.
     jobs.iter().take(1).try_for_each(|job| check_range(&job.outputs.map, 0, 0))?;
-    let own = jobs.into_iter().enumerate().filter(|(index, _)| shard.has(*index));
-    let jobs: Vec<Job> = own.map(|(_, job)| job).collect();
+    let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
     folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
     Ok(jobs)
 }
 
 impl Job {
-    fn new(args: &MatchArgs, pair: &Pair) -> Self {
+    fn new(args: &MatchArgs, index: usize, pair: &Pair) -> Self {
         let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
         let of_pair = MatchArgs {
             left: Some(pair.left.clone()),
@@ -52,7 +53,7 @@ impl Job {
             ..args.clone()
         };
         let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
-        Self { pair: pair.clone(), outputs: Outputs::of(&of_pair), record }
+        Self { pair: pair.clone(), outputs: Outputs::of(&of_pair), record, chain: index / args.many.chain() }
     }
 
     /// Whether nothing is to be done.

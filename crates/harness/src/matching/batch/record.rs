@@ -145,14 +145,14 @@ impl FileState {
 /// SHA-256 of the program's version and of all options but those that change no output: where files lie, which device
 /// computes, and what is told.
 pub(super) fn settings_sha256(args: &MatchArgs) -> String {
-    let ManyArgs { format, pictures, .. } = args.many.clone();
+    let ManyArgs { format, pictures, warm_start, .. } = args.many.clone();
     let of_output = MatchArgs {
         left: None,
         right: None,
         output: PathBuf::new(),
         json: false,
         max_megapixels: 0,
-        many: ManyArgs { format, pictures, ..ManyArgs::default() },
+        many: ManyArgs { format, pictures, warm_start, ..ManyArgs::default() },
         plan: PlanArgs { backend: String::new(), device: None, threads: None, ..args.plan.clone() },
         ..args.clone()
     };

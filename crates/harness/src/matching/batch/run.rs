@@ -80,8 +80,12 @@ fn read_all<'a>(jobs: &[&'a Job], limit: PixelLimit, to: &SyncSender<Read<'a>>) 
 /// Matches pair after pair. A device that is lost is opened again for the next.
 fn solve_all<'a>(args: &MatchArgs, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Failure> {
     let mut session = Session::open(args)?;
+    let mut last_chain = None;
     for Read { job, inputs, pair, read_ms } in from {
+        // Not from another chain's messages: whether that is matched in this run must make no difference.
+        session.starts_warm = last_chain == Some(job.chain);
         let done = pair.and_then(|pair| solve(args, &mut session, job, &pair, read_ms));
+        last_chain = if done.is_ok() { Some(job.chain) } else { last_chain };
         if let Err(failure) = &done {
             if failure.is_interrupted() {
                 break;
