@@ -77,7 +77,10 @@ impl Matcher {
     /// # Errors
     /// Those of [`Device::prepare`].
     pub fn new(device: &dyn Device, plan: Plan) -> Result<Self, Error> {
+        let start = Instant::now();
         let solver = device.prepare(&plan)?;
+        let (size, labels, bytes) = (plan.image_size(), plan.model().labels(), solver.allocated_bytes());
+        log::debug!("prepared for {size} pixels and {labels} labels in {:?}, {bytes} bytes", start.elapsed());
         let labels = memory::filled("labels", plan.image_size().pixels(), 0)?;
         Ok(Self { plan, solver, labels, has_answer: false })
     }
@@ -158,6 +161,7 @@ impl Matcher {
         times.total = start.elapsed();
         times.device = solver.device_times();
         self.has_answer = true;
+        log::debug!("solved in {:?}", times.total);
         Ok(times)
     }
 

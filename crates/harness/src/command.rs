@@ -9,6 +9,7 @@ mod export;
 mod gate;
 pub(crate) mod match_pair;
 pub(crate) mod scenes;
+mod shell;
 mod speed;
 
 use std::io::Write;
@@ -22,6 +23,7 @@ pub(crate) use export::export;
 pub(crate) use gate::gate;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
+pub(crate) use shell::{completions, man};
 pub(crate) use speed::{check_speed, speed, write_speed};
 
 use crate::failure::Failure;

@@ -37,6 +37,7 @@ use notes::{note, tell};
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    notes::set_up(cli.quiet);
     match run(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -62,5 +63,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Gate(args) => command::gate(args),
         Command::Compare(args) => command::compare(args),
         Command::Export(args) => command::export(args),
+        Command::Completions(args) => command::completions(args),
+        Command::Man(args) => command::man(args),
     }
 }

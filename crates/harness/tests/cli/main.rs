@@ -3,6 +3,7 @@
 
 mod devices;
 mod folder;
+mod manners;
 mod many;
 mod recorded;
 mod running;
