@@ -1,51 +1,81 @@
-// What the profile compares, of every pixel of one image: its grey value, its census code, or its colour.
+// What the profile compares, of every pixel of one image: its grey value, its census code, its colour, or its grey value
+// with what lies beside it.
 
-// Red, green and blue bytes of all pixels, without gaps.
+// Red, green and blue bytes of all pixels, without gaps, and of those of so many rows above and below the image.
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read_write> values: array<u32>;
+
+override APRON: u32 = 2;
 
 fn image_byte(index: u32) -> u32 {
     return (image[index / 4] >> (8 * (index % 4))) & 0xff;
 }
 
-fn colour(x: u32, y: u32) -> vec3<u32> {
-    let first = 3 * (y * parameters.width + x);
+// Of a pixel whose row is counted from the apron's first.
+fn colour(x: u32, row: u32) -> vec3<u32> {
+    let first = 3 * (row * parameters.width + x);
     return vec3(image_byte(first), image_byte(first + 1), image_byte(first + 2));
 }
 
 // Luma in integers with the weights of ITU-R BT.601.
-fn grey(x: u32, y: u32) -> u32 {
-    let weighted = colour(x, y) * vec3(299u, 587u, 114u);
+fn grey(x: u32, row: u32) -> u32 {
+    let weighted = colour(x, row) * vec3(299u, 587u, 114u);
     return (weighted.x + weighted.y + weighted.z + 500) / 1000;
 }
 
-// A bit for each neighbour in row order, from the highest bit: whether it is lighter (Zabih and Woodfill 1994). Border
-// pixels are repeated outward.
-fn census(x: u32, y: u32) -> u32 {
-    let columns = vec3(max(x, 1) - 1, x, min(x + 1, parameters.width - 1));
-    let rows = vec3(max(y, 1) - 1, y, min(y + 1, parameters.height - 1));
-    let centre = grey(x, y);
+// The grey value so many columns aside, where border columns are repeated outward.
+fn grey_aside(x: u32, dx: i32, row: u32) -> u32 {
+    return grey(u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1)), row);
+}
+
+// A bit for each neighbour up to so many columns and rows away, in row order, from the highest bit: whether it is lighter
+// (Zabih and Woodfill 1994).
+fn census(x: u32, row: u32, reach: i32) -> u32 {
+    let centre = grey(x, row);
     var code = 0u;
-    for (var j = 0; j < 3; j++) {
-        for (var i = 0; i < 3; i++) {
-            if i != 1 || j != 1 {
-                code = 2 * code + u32(grey(columns[i], rows[j]) > centre);
+    for (var dy = -reach; dy <= reach; dy++) {
+        for (var dx = -reach; dx <= reach; dx++) {
+            if dx != 0 || dy != 0 {
+                code = 2 * code + u32(grey_aside(x, dx, u32(i32(row) + dy)) > centre);
             }
         }
     }
     return code;
 }
 
-fn value(x: u32, y: u32) -> u32 {
+// Grey value and horizontal gradient.
+fn gradient(x: u32, row: u32) -> u32 {
+    let gradient = (256 + grey_aside(x, 1, row) - grey_aside(x, -1, row)) / 2;
+    return grey(x, row) | (gradient << 8);
+}
+
+// Grey value, the least and the greatest one up to half a pixel away.
+fn half_samples(x: u32, row: u32) -> u32 {
+    let centre = grey(x, row);
+    let left = (centre + grey_aside(x, -1, row) + 1) / 2;
+    let right = (centre + grey_aside(x, 1, row) + 1) / 2;
+    return centre | (min(centre, min(left, right)) << 8) | (max(centre, max(left, right)) << 16);
+}
+
+fn value(x: u32, row: u32) -> u32 {
     switch PROFILE {
         case THESIS: {
-            return grey(x, y);
+            return grey(x, row);
         }
         case CENSUS: {
-            return census(x, y);
+            return census(x, row, 1);
+        }
+        case CENSUS_5X5: {
+            return census(x, row, 2);
+        }
+        case GRADIENT: {
+            return gradient(x, row);
+        }
+        case BIRCHFIELD_TOMASI: {
+            return half_samples(x, row);
         }
         default: {
-            let rgb = colour(x, y);
+            let rgb = colour(x, row);
             return rgb.r | (rgb.g << 8) | (rgb.b << 16);
         }
     }
@@ -59,5 +89,5 @@ fn features(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let x = id.x - line * parameters.width;
     let y = parameters.row + line;
-    values[y * parameters.width + x] = value(x, y);
+    values[y * parameters.width + x] = value(x, y + APRON);
 }

@@ -1,12 +1,12 @@
 //! What goes up to a device and what comes down: pairs, labels and messages in their layouts there.
 
-use bp_core::{Error, Plan, Schedule, Seed, Side, Size, StereoPair};
+use bp_core::{Error, Plan, Schedule, Seed, Side, Size, StereoPair, image::APRON};
 
 use crate::{Program, Queue, layout::colour};
 
-/// Bytes of one image in the upload buffer, up to the next vector.
+/// Bytes of one image in the upload buffer, [`APRON`] rows above and below included, up to the next vector.
 pub(crate) fn image_bytes(size: Size) -> u64 {
-    (3 * size.pixels() as u64).next_multiple_of(16)
+    (3 * size.width as u64 * (size.height + 2 * APRON) as u64).next_multiple_of(16)
 }
 
 /// Bytes of the seed behind both images: x, y, label and whether there is one.
@@ -21,8 +21,9 @@ pub(crate) fn label_bytes(size: Size) -> u64 {
 pub(crate) fn write_pair(pair: &StereoPair, seed: Option<Seed>, upload: &mut [u8]) {
     let bytes = image_bytes(pair.size()) as usize;
     for (view, place) in [pair.left(), pair.right()].into_iter().zip(upload.chunks_mut(bytes)) {
-        let pixels = view.pixels().as_flattened();
-        place[..pixels.len()].copy_from_slice(pixels);
+        for (y, row) in (-(APRON as isize)..).zip(place.chunks_exact_mut(3 * view.size().width)) {
+            row.copy_from_slice(view.row_near(y).as_flattened());
+        }
     }
     let seed = seed.map_or([0; 4], |seed| [seed.x as u32, seed.y as u32, seed.label.into(), 1]);
     upload[2 * bytes..][..SEED_BYTES as usize].copy_from_slice(bytemuck::cast_slice(&seed));

@@ -1,4 +1,4 @@
-//! The 3x3 census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
+//! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
 use crate::{Image, Model, Seed, StereoPair};
 
@@ -6,25 +6,31 @@ use crate::{Image, Model, Seed, StereoPair};
 const HALF_LENGTH: usize = 10;
 
 /// The census code of the pixel at (x, y): its eight neighbours in row order, from the highest bit to the lowest, 1
-/// where the neighbour's grey value is greater. Border pixels are repeated outward.
+/// where the neighbour's grey value is greater. Border pixels are repeated outward, see [`Image::grey_near`].
 ///
 /// # Panics
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    let size = image.size();
+    compare_window(image, (x, y), 1) as u8
+}
+
+/// The same with the 24 neighbours in a window of 5x5 pixels, in as many bits.
+///
+/// # Panics
+/// Where (x, y) lies outside.
+#[must_use]
+pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
+    compare_window(image, (x, y), 2)
+}
+
+/// A bit for each neighbour at most `reach` columns and rows away.
+fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize) -> u32 {
     let centre = image.grey(x, y);
-    let columns = [x.saturating_sub(1), x, (x + 1).min(size.width - 1)];
-    let rows = [y.saturating_sub(1), y, (y + 1).min(size.height - 1)];
-    let mut code = 0;
-    for (j, &row) in rows.iter().enumerate() {
-        for (i, &column) in columns.iter().enumerate() {
-            if (i, j) != (1, 1) {
-                code = code << 1 | u8::from(image.grey(column, row) > centre);
-            }
-        }
-    }
-    code
+    let (x, y) = (x as isize, y as isize);
+    let window = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
+    let neighbours = window.filter(|&offset| offset != (0, 0));
+    neighbours.fold(0, |code, (dx, dy)| code << 1 | u32::from(image.grey_near(x + dx, y + dy) > centre))
 }
 
 /// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the
@@ -74,6 +80,16 @@ mod tests {
         assert_eq!(code(&image, 1, 1), 0b1000_1010);
         let flat = Image::from_grey(1, 1, &[5]).unwrap();
         assert_eq!(code(&flat, 0, 0), 0);
+    }
+
+    #[test]
+    fn a_window_of_5x5_is_compared_as_far_as_its_corners() {
+        let mut pixels = [7; 25];
+        (pixels[0], pixels[13], pixels[24]) = (8, 9, 10);
+        let image = Image::from_grey(5, 5, &pixels).unwrap();
+        assert_eq!(code_5x5(&image, 2, 2), 1 << 23 | 1 << 11 | 1);
+        // The corner is repeated outward.
+        assert_eq!(code_5x5(&image, 1, 1), 0b1100_0110_0000_0000_0010_0000);
     }
 
     #[test]

@@ -1,9 +1,14 @@
 //! Images and rectified stereo pairs.
 
+use std::ops::Range;
+
 use crate::Error;
 
 /// Most pixels per row or column: coordinates and disparities fit `i32` with room to add.
 pub const MAX_SIDE: usize = 1 << 24;
+
+/// Most rows of an apron, see [`Image::strip`]: as far up and down as any data cost looks.
+pub const APRON: usize = 2;
 
 /// Width and height of an image or grid in pixels; both at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -50,9 +55,16 @@ impl std::fmt::Display for Size {
 }
 
 /// An image of 8-bit colours, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
+///
+/// A strip of a larger image may have an *apron*: up to [`APRON`] rows of what lies above and below it there. They belong
+/// to no pixel of the strip, but data costs that look at neighbouring rows see them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     size: Size,
+    /// Rows of the apron above the image, and below.
+    above: usize,
+    below: usize,
+    /// `[above + height + below][width]`.
     pixels: Vec<[u8; 3]>,
 }
 
@@ -66,7 +78,7 @@ impl Image {
         if pixels.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: pixels.len() });
         }
-        Ok(Self { size, pixels })
+        Ok(Self { size, above: 0, below: 0, pixels })
     }
 
     /// An image from grey values, `[height][width]`.
@@ -77,16 +89,68 @@ impl Image {
         Self::from_rgb(width, height, pixels.iter().map(|&v| [v; 3]).collect())
     }
 
+    /// The same turned left to right.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mut pixels = self.pixels.clone();
+        pixels.chunks_exact_mut(self.size.width).for_each(<[_]>::reverse);
+        Self { pixels, ..*self }
+    }
+
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {
         self.size
     }
 
-    /// All colours, `[height][width]`.
+    /// All colours, `[height][width]`; those of an apron are not among them.
     #[must_use]
     pub fn pixels(&self) -> &[[u8; 3]] {
-        &self.pixels
+        &self.pixels[self.above * self.size.width..][..self.size.pixels()]
+    }
+
+    /// The colours of the row `y`, `[width]`, which may lie outside the image: those of its apron where it has one, else
+    /// those of the last row known in that direction.
+    #[must_use]
+    pub fn row_near(&self, y: isize) -> &[[u8; 3]] {
+        let last = self.above + self.size.height + self.below - 1;
+        let row = y.saturating_add_unsigned(self.above).clamp(0, last as isize) as usize;
+        &self.pixels[row * self.size.width..][..self.size.width]
+    }
+
+    /// The grey value at column `x`, row `y`, which may lie outside the image: its border columns are repeated outward,
+    /// rows are those of [`Image::row_near`].
+    #[must_use]
+    pub fn grey_near(&self, x: isize, y: isize) -> u8 {
+        grey(self.row_near(y)[x.clamp(0, self.size.width as isize - 1) as usize])
+    }
+
+    /// A copy of some rows as an image of its own, with an apron of what lies above and below them: rows of this image, or
+    /// of its own apron. So the strip's data costs are what they are in the whole image.
+    ///
+    /// # Panics
+    /// Where `rows` are none, or lie outside.
+    #[must_use]
+    pub fn strip(&self, rows: Range<usize>) -> Self {
+        assert!(rows.start < rows.end && rows.end <= self.size.height, "rows {rows:?} of an image of {}", self.size);
+        let width = self.size.width;
+        let (above, below) = (rows.start + self.above, self.size.height - rows.end + self.below);
+        let (above, below) = (above.min(APRON), below.min(APRON));
+        let known = rows.start + self.above - above..rows.end + self.above + below;
+        let pixels = self.pixels[known.start * width..known.end * width].to_vec();
+        Self { size: Size { width, height: rows.len() }, above, below, pixels }
+    }
+
+    /// A copy of some columns as an image of its own, with the apron's. Nothing is known of the columns beside them.
+    ///
+    /// # Panics
+    /// Where `columns` are none, or lie outside.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        let Self { size: Size { width, height }, above, below, ref pixels } = *self;
+        assert!(!columns.is_empty() && columns.end <= width, "columns {columns:?} of an image of {}", self.size);
+        let pixels = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
+        Self { size: Size { width: columns.len(), height }, above, below, pixels }
     }
 
     /// The colour at column `x`, row `y`.
@@ -95,7 +159,7 @@ impl Image {
     /// Where (x, y) lies outside.
     #[must_use]
     pub fn rgb(&self, x: usize, y: usize) -> [u8; 3] {
-        self.pixels[y * self.size.width + x]
+        self.pixels()[y * self.size.width + x]
     }
 
     /// The grey value at column `x`, row `y`.
@@ -146,6 +210,14 @@ impl StereoPair {
         Ok(Self { left, right })
     }
 
+    /// The pair in a mirror: the right image, turned left to right, is its left one and the other way round. What is its
+    /// disparity map in the mirror is the right image's: right pixel (x, y) with disparity d shows what left pixel
+    /// (x + d, y) shows.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self { left: self.right.mirrored(), right: self.left.mirrored() }
+    }
+
     /// The size of both images.
     #[must_use]
     pub fn size(&self) -> Size {
@@ -163,6 +235,24 @@ impl StereoPair {
     pub fn right(&self) -> &Image {
         &self.right
     }
+
+    /// Some rows of both images, see [`Image::strip`].
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn strip(&self, rows: Range<usize>) -> Self {
+        Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
+    }
+
+    /// Some columns of both images, the same of each, see [`Image::columns`].
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        Self { left: self.left.columns(columns.clone()), right: self.right.columns(columns) }
+    }
 }
 
 #[cfg(test)]
@@ -179,6 +269,31 @@ mod tests {
     fn narrow_inverts_widening_by_257() {
         assert!((0..=255u8).all(|v| narrow(u16::from(v) * 257) == v));
         assert_eq!([narrow(128), narrow(129), narrow(u16::MAX)], [0, 1, 255]);
+    }
+
+    /// Five rows of their own number.
+    fn rows() -> Image {
+        Image::from_grey(2, 5, &[0, 0, 1, 1, 2, 2, 3, 3, 4, 4]).unwrap()
+    }
+
+    #[test]
+    fn a_strip_knows_the_rows_around_it() {
+        let near = |image: &Image| (-4..6).map(|y| image.grey_near(0, y)).collect::<Vec<_>>();
+        assert_eq!(near(&rows()), [0, 0, 0, 0, 0, 1, 2, 3, 4, 4]);
+        let strip = rows().strip(3..4);
+        assert_eq!((strip.size().height, strip.pixels()), (1, [[3; 3]; 2].as_slice()));
+        assert_eq!(near(&strip), [1, 1, 1, 2, 3, 4, 4, 4, 4, 4]);
+        // Nothing is known any more of what lies further away than an apron.
+        assert_eq!(near(&rows().strip(0..2)), [0, 0, 0, 0, 0, 1, 2, 3, 3, 3]);
+        assert_eq!(strip.grey_near(isize::MIN, isize::MIN), 1);
+        assert_eq!(strip.grey_near(isize::MAX, isize::MAX), 4);
+    }
+
+    #[test]
+    fn a_strip_of_a_strip_is_a_strip_of_the_image() {
+        assert_eq!(rows().strip(1..4).strip(0..2), rows().strip(1..3));
+        assert_eq!(rows().strip(0..5), rows());
+        assert_ne!(rows().strip(1..2), Image::from_grey(2, 1, &[1, 1]).unwrap());
     }
 
     #[test]

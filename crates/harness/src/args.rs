@@ -4,6 +4,7 @@ mod examples;
 mod many;
 mod matching;
 mod measuring;
+mod outputs;
 mod records;
 
 use std::path::PathBuf;
@@ -13,9 +14,10 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-pub(crate) use many::ManyArgs;
-pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
+pub(crate) use many::{Also, ManyArgs};
+pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
+pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
@@ -36,6 +38,9 @@ pub(crate) enum Command {
     /// Compute the disparity map of a rectified pair.
     #[command(after_help = examples::MATCH)]
     Match(Box<MatchArgs>),
+    /// Make depth, points, a picture or another format of a disparity map that is there.
+    #[command(after_help = examples::CONVERT)]
+    Convert(Box<ConvertArgs>),
     /// Measure the errors of a disparity map against ground truth.
     #[command(after_help = examples::EVALUATE)]
     Evaluate(EvaluateArgs),

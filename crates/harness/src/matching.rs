@@ -2,13 +2,15 @@
 //! and how `batch` does so with many.
 
 pub(crate) mod batch;
+pub(crate) mod labels;
 mod outputs;
 mod pairs;
 pub(crate) mod plan;
 mod report;
 mod session;
+pub(crate) mod warnings;
 
 pub(crate) use batch::Shard;
-pub(crate) use outputs::Outputs;
+pub(crate) use outputs::{Content, Making, Outputs};
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

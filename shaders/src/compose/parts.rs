@@ -1,6 +1,6 @@
 //! The commands of every part.
 
-use bp_core::{MessageStart, Schedule, Side};
+use bp_core::{MessageStart, Schedule, Side, image::APRON};
 
 use super::{Composer, Nodes, PartRecorder, Rows, Work};
 use crate::{
@@ -19,18 +19,25 @@ impl Composer<'_> {
         part.push_short(upload(buffers.images[1], image, image));
         part.push_short(upload(buffers.seed, 2 * image, SEED_BYTES));
         part.push_short(Command::Barrier);
-        let profile = ("PROFILE", self.plan.model().profile() as u32);
+        let compared = self.plan.model().profile();
+        let profile = ("PROFILE", compared as u32);
         for side in 0..2 {
             let parameters =
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
             let rows = Rows { first: 0, step: 1, count: size.height };
             let work = Work { parameters, rows, row_invocations: size.width };
-            let pipeline = Pipeline { kernel: Kernel::Features, constants: vec![profile] };
+            let constants = vec![profile, ("APRON", APRON as u32)];
+            let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
         }
         part.push_short(Command::Barrier);
         for nodes in self.nodes(0) {
-            let constants = vec![profile, ("SUM_BYTES", self.grids[0].sum_bytes as u32)];
+            let constants = vec![
+                profile,
+                ("LARGEST_COST", compared.max_cost().into()),
+                ("OUT_OF_RANGE_COST", compared.out_of_range_cost().into()),
+                ("SUM_BYTES", self.grids[0].sum_bytes as u32),
+            ];
             let pipeline = Pipeline { kernel: Kernel::MatchCost, constants };
             let [left, right] = buffers.features;
             let bound = [self.costs_written(nodes).as_slice(), &[left, right, buffers.seed]].concat();

@@ -4,7 +4,7 @@ use super::Case;
 use crate::{Algorithm, Cut, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
 /// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels, and
-/// with the smoothness that strains 8 bits most.
+/// with the smoothness that strains 8 bits most; strips of a higher image with aprons of every kind.
 pub fn cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
     let small = sizes.into_iter().flat_map(|size| [1, 2, 3, 16].map(|labels| (size, labels)));
@@ -18,12 +18,27 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let large = wide_or_high.into_iter().flat_map(|size| {
         Profile::ALL.into_iter().filter_map(move |profile| Some((size, Model::new(profile, 5).ok()?)))
     });
-    every.chain(large).flat_map(|((width, height), model)| {
+    let whole = every.chain(large).flat_map(|((width, height), model)| {
         let pair = noise_pair(width, height, model.labels() as u64);
-        settings(pair.size()).into_iter().filter_map(move |settings| {
-            Some(Case { plan: Plan::new(pair.size(), model, settings).ok()?, pair: pair.clone() })
-        })
+        settings(pair.size()).into_iter().filter_map(move |settings| case(&pair, model, settings))
+    });
+    whole.chain(strips())
+}
+
+/// Strips of one pair with no, one or more known rows above and below, of each profile.
+fn strips() -> impl Iterator<Item = Case> {
+    let pair = noise_pair(19, 9, 8);
+    let rows = [0..1, 0..7, 1..8, 2..9, 4..5];
+    let strips = rows.map(|rows| pair.strip(rows)).into_iter();
+    strips.flat_map(|strip| Profile::ALL.map(|profile| (strip.clone(), profile))).flat_map(|(strip, profile)| {
+        let settings = Schedule::ALL.map(|schedule| Algorithm::Cfbp.settings(strip.size(), 7, 2, schedule));
+        let model = Model::new(profile, 6).ok();
+        settings.into_iter().filter_map(move |settings| case(&strip, model?, settings))
     })
+}
+
+fn case(pair: &StereoPair, model: Model, settings: Settings) -> Option<Case> {
+    Some(Case { plan: Plan::new(pair.size(), model, settings).ok()?, pair: pair.clone() })
 }
 
 fn models(labels: usize) -> Vec<Model> {

@@ -3,19 +3,21 @@
 use fastrand::Rng;
 
 use super::{Case, noise_pair};
-use crate::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings};
+use crate::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, image::APRON};
 
 /// Most data costs of a case, unless one row has more: a tenth of a second for the reference.
 const VOLUME: usize = 60_000;
 
 /// A case drawn at random, the same for the same seed as long as `fastrand` draws the same. Sizes lie around one and
-/// several vectors, blocks, strips and bands; there are fewer rows where there are many labels.
+/// several vectors, blocks, strips and bands; there are fewer rows where there are many labels. Half of the pairs have
+/// an apron.
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
     let (model, width) = (model(&mut random), width(&mut random));
     let height = random.usize(1..80).min(1 + VOLUME / (width * model.labels()));
-    let pair = noise_pair(width, height, random.u32(..).into());
+    let [above, below] = if random.bool() { [random.usize(..=APRON), random.usize(..=APRON)] } else { [0, 0] };
+    let pair = noise_pair(width, above + height + below, random.u32(..).into()).strip(above..above + height);
     let plan = Plan::new(pair.size(), model, settings(&mut random, width, height));
     Case { plan: plan.unwrap_or_else(|error| panic!("{error}")), pair }
 }

@@ -24,11 +24,17 @@ opened, prepared and solved; NO_COLOR=1 leaves out colours.",
 pub(super) const MATCH: &str = "\
 Examples:
   bp match left.png right.png --output map.pfm --picture map.png
+  bp match left.png right.png --output map.pfm --labels auto
   bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
   bp match left.png right.png --output map.pfm --ground-truth truth.png --scale 2 --json
   bp match --pairs dataset --output maps                        # the same again goes on where it was
   bp match --pairs list.csv --output maps --shard 2/4           # the second of four processes
-  bp match --video 'left/%04d.png' 'right/%04d.png' --output maps --format png --pictures";
+  bp match --video 'left/%04d.png' 'right/%04d.png' --output maps --format png --also picture";
+
+pub(super) const CONVERT: &str = "\
+Examples:
+  bp convert map.pfm --picture map.png
+  bp convert map.pfm --image left.png --points cloud.ply --calib calib.txt";
 
 pub(super) const EVALUATE: &str = "\
 Examples:

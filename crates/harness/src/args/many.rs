@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::named;
 use crate::matching::Shard;
 
 /// Many pairs with one command.
@@ -24,9 +25,10 @@ pub(crate) struct ManyArgs {
     /// Ending of the maps, which says how disparities are stored: as that of --output does for one pair.
     #[arg(long, value_name = "ENDING", default_value = "pfm", requires = "many")]
     pub(crate) format: String,
-    /// Also write every map as a coloured picture, NAME.picture.png.
-    #[arg(long, requires = "many")]
-    pub(crate) pictures: bool,
+    /// What else is written of every pair, separated by commas: picture (NAME.picture.png), depth (NAME.depth with the
+    /// ending of --format) and points (NAME.points.ply).
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "many", value_parser = named(&Also::ALL, Also::name))]
+    pub(crate) also: Vec<Also>,
     /// Match only every N-th pair, from the I-th on: N processes with I from 1 to N share the work.
     #[arg(long, value_name = "I/N", requires = "many")]
     pub(crate) shard: Option<Shard>,
@@ -39,6 +41,30 @@ pub(crate) struct ManyArgs {
     /// Match pairs again that are complete.
     #[arg(long, requires = "many")]
     pub(crate) force: bool,
+}
+
+/// What is written beside a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Also {
+    /// A coloured picture.
+    Picture,
+    /// A depth map.
+    Depth,
+    /// A point cloud.
+    Points,
+}
+
+impl Also {
+    /// All of these.
+    const ALL: [Self; 3] = [Self::Picture, Self::Depth, Self::Points];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Picture => "picture",
+            Self::Depth => "depth",
+            Self::Points => "points",
+        }
+    }
 }
 
 impl ManyArgs {

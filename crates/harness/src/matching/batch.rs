@@ -17,9 +17,14 @@ use bp_core::{Algorithm, Schedule};
 pub(crate) use shard::Shard;
 use summary::Summary;
 
-use super::pairs;
+use super::{Making, pairs};
 use crate::{
-    args::MatchArgs, command::print_json, failure::Failure, files, interrupt, matching::batch::job::Job, note, threads,
+    args::{MatchArgs, OutputArgs},
+    command::print_json,
+    failure::Failure,
+    files, interrupt,
+    matching::batch::job::Job,
+    note, threads,
 };
 
 /// Matches all pairs that the options name.
@@ -29,10 +34,16 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
         let what = "--warm-start needs messages that are kept; of the schedule sweep they are not";
         return Err(Failure::usage(format!("{what}: take --algorithm cfbp --half-steps 10, say")));
     }
+    let OutputArgs { picture, depth, points, .. } = &args.outputs;
+    if picture.is_some() || depth.is_some() || points.is_some() {
+        let what = "--picture, --depth and --points name one file";
+        return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points")));
+    }
     let found = pairs::find(args)?;
     found.notes.iter().for_each(|line| note(line));
     let shard = args.many.shard.unwrap_or_default();
-    let jobs = job::jobs(args, &found.pairs, shard)?;
+    let making = Making::of(&args.outputs.making)?;
+    let jobs = job::jobs(args, &making, &found.pairs, shard)?;
     interrupt::listen()?;
     files::name_temporary(&format!(".bp-{}-", shard.file_part()));
     job::clear_leftovers(args, &jobs, shard)?;
@@ -40,9 +51,9 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
-    due.iter().try_for_each(|job| job.check())?;
+    due.iter().try_for_each(|job| job.check(&making))?;
     if !due.is_empty() {
-        let ran = threads::run_on(args.plan.threads, || run::run(args, &due, &settings));
+        let ran = threads::run_on(args.plan.threads, || run::run(args, &making, &due, &settings));
         ran.inspect_err(|failure| {
             if failure.is_interrupted() {
                 note("the same command goes on with the pairs that are not complete");

@@ -1,6 +1,6 @@
 //! What the options of `bp match` ask to run.
 
-use bp_core::{Algorithm, Cut, MAX_LABELS, Model, Plan, Schedule, Settings, Size};
+use bp_core::{Algorithm, Cut, Model, Plan, Schedule, Settings, Size, survey::DisparityRange};
 
 use crate::{
     args::{MatchArgs, PlanArgs},
@@ -23,13 +23,12 @@ const SMALLER: [Smaller; 3] = [
     ("--grids 1", |settings| Settings { grids: 1, ..settings }),
 ];
 
-/// The plan that the options describe for images of `size`.
-pub(crate) fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
-    let labels = args.labels.map_or_else(|| default_labels(size), usize::from);
-    let model = Model::new(args.profile, labels)?.with_min_disparity(args.min_disparity)?;
+/// The plan that the options describe for images of `size`, with the labels of `range`.
+pub(crate) fn plan(args: &PlanArgs, size: Size, range: DisparityRange) -> Result<Plan, Failure> {
+    let model = Model::new(args.profile, range.labels)?.with_min_disparity(range.min_disparity)?;
     let slope = args.slope.unwrap_or(model.slope());
     let model = model.with_smoothness(slope, args.truncation.unwrap_or(model.truncation()))?;
-    Ok(Plan::new(size, model, settings(args, size, labels))?)
+    Ok(Plan::new(size, model, settings(args, size, range.labels))?)
 }
 
 /// Refuses options that contradict each other or would do nothing.
@@ -71,11 +70,6 @@ fn check_algorithm_options(args: &PlanArgs) -> Result<(), Failure> {
 /// Whether loops or half-steps are counted on each grid and divided by nothing.
 fn counts_on_each_grid(args: &PlanArgs) -> bool {
     args.grids.is_some() || args.half_steps.is_some() || args.algorithm() == Algorithm::Sweep
-}
-
-/// A quarter of the width, as OpenCV recommends for belief propagation, rounded up to a multiple of 16.
-fn default_labels(size: Size) -> usize {
-    size.width.div_ceil(4).next_multiple_of(16).min(MAX_LABELS)
 }
 
 fn loops(args: &PlanArgs, labels: usize) -> u32 {

@@ -1,11 +1,11 @@
 //! What is told of a match, as text or as JSON.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::PathBuf};
 
 use bp_core::{Errors, Stage, StereoPair, Times};
 use serde::Serialize;
 
-use super::{Answer, Outputs};
+use super::Answer;
 use crate::{
     backends::Opened,
     command::evaluate::{self, ErrorReport},
@@ -29,7 +29,10 @@ pub(crate) struct Report {
     energy: record::Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
-    output: String,
+    /// What may be wrong with the images or the labels, as standard error tells it.
+    warnings: Vec<String>,
+    /// The files, the disparity map first.
+    written: Vec<String>,
 }
 
 impl Report {
@@ -39,7 +42,8 @@ impl Report {
         opened: &Opened,
         answer: Answer,
         errors: Option<Errors>,
-        outputs: &Outputs,
+        warnings: Vec<String>,
+        written: Vec<PathBuf>,
     ) -> Self {
         let median = median(&answer.samples);
         Self {
@@ -55,7 +59,8 @@ impl Report {
             energy: answer.energy.into(),
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
-            output: outputs.map.display().to_string(),
+            warnings,
+            written: written.iter().map(|path| path.display().to_string()).collect(),
         }
     }
 }
@@ -108,6 +113,6 @@ pub(crate) fn text(report: &Report) -> String {
     if let Some(errors) = &report.errors {
         text += &evaluate::error_table(errors);
     }
-    let _ = writeln!(text, "{:<10}{}", "written", report.output);
+    let _ = writeln!(text, "{:<10}{}", "written", report.written.join(", "));
     text
 }

@@ -5,6 +5,7 @@ mod devices;
 mod folder;
 mod manners;
 mod many;
+mod outputs;
 mod recorded;
 mod running;
 mod speed;

@@ -4,8 +4,9 @@ use std::{fs, process::Stdio, time::Duration};
 
 use crate::folder::{Folder, MATCH, text};
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "match",
+    "convert",
     "evaluate",
     "reproduce",
     "report",

@@ -88,9 +88,16 @@ fn lists_name_maps_and_broken_lines_are_told_by_number() {
     let folder = Folder::new();
     place(&folder, &["a b/left.png", "a b/right.png"]);
     fs::write(folder.path("list"), "a b/left.png\ta b/right.png\nleft.png right.png x/y\n").unwrap();
-    assert!(folder.run(&format!("match --pairs list --output out --pictures {TINY}")).status.success());
-    let expected =
-        ["a b/left.pfm", "a b/left.picture.png", "records/a b/left.json", "records/x/y.json", "summary.json"];
+    assert!(folder.run(&format!("match --pairs list --output out --also picture {TINY}")).status.success());
+    let expected = [
+        "a b/left.pfm",
+        "a b/left.pfm.json",
+        "x/y.pfm.json",
+        "a b/left.picture.png",
+        "records/a b/left.json",
+        "records/x/y.json",
+        "summary.json",
+    ];
     let expected: BTreeSet<_> = expected.into_iter().chain(["x/y.pfm", "x/y.picture.png"]).map(PathBuf::from).collect();
     assert_eq!(files(&folder.path("out")), expected);
     fs::write(folder.path("bad"), "left.png right.png\nleft.png\n").unwrap();
@@ -108,7 +115,11 @@ fn outputs_that_would_collide_are_refused_before_the_work() {
         ("left.png right.png\nright.png left.png left\n", "", ["left.pfm", "right.png"]),
         ("left.png right.png a\nright.png left.png A\n", "", ["A.pfm", "names"]),
         ("left.png right.png a\nright.png left.png a.pfm/b\n", "", ["a.pfm", "right.png"]),
-        ("left.png right.png a\nright.png left.png a.picture\n", "--pictures --format png", ["a.picture.png", "names"]),
+        (
+            "left.png right.png a\nright.png left.png a.picture\n",
+            "--also picture --format png",
+            ["a.picture.png", "names"],
+        ),
         ("left.png right.png\n", "--format png --output .", ["left.png", "overwritten"]),
     ] {
         list(lines);
@@ -151,10 +162,10 @@ fn only_what_changed_is_done_again() {
     fs::write(folder.path("out/left/3.pfm"), "").unwrap();
     assert_eq!((done(""), done("")), (2, 0));
     fs::write(folder.path("out/records/left/2.json"), "{").unwrap();
-    assert_eq!((done(""), done("--slope 3"), done("--slope 3"), done("--slope 3 --pictures")), (1, 3, 0, 3));
+    assert_eq!((done(""), done("--slope 3"), done("--slope 3"), done("--slope 3 --also picture")), (1, 3, 0, 3));
     fs::rename(folder.path("out"), folder.path("moved")).unwrap();
     fs::rename(folder.path("moved"), folder.path("out")).unwrap();
-    assert_eq!(done("--slope 3 --pictures"), 0);
+    assert_eq!(done("--slope 3 --also picture"), 0);
 }
 
 #[test]

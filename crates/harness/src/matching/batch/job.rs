@@ -9,10 +9,10 @@ use std::{
 
 use super::{Shard, record::PairRecord, summary};
 use crate::{
-    args::MatchArgs,
+    args::{Also, MatchArgs},
     failure::Failure,
-    files::{check_range, create_folder},
-    matching::{Outputs, pairs::Pair},
+    files::create_folder,
+    matching::{Making, Outputs, pairs::Pair},
 };
 
 /// The folder of the records, in that of the outputs.
@@ -24,75 +24,84 @@ const ABANDONED: Duration = Duration::from_hours(1);
 /// A pair, where its outputs go and where its record is.
 pub(super) struct Job {
     pub(super) pair: Pair,
+    pub(super) calibration: Option<PathBuf>,
     pub(super) outputs: Outputs,
+    /// Of the outputs, in the order in which their states are recorded.
+    pub(super) paths: Vec<PathBuf>,
     pub(super) record: PathBuf,
     /// Which of the pairs that are done together it belongs to.
     pub(super) chain: usize,
 }
 
-/// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite an
-/// image.
-pub(super) fn jobs(args: &MatchArgs, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
-    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, index, pair)).collect();
+/// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
+/// what is read.
+pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
+    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, making, index, pair)).collect();
     check_apart(args, &jobs)?;
-    // An ending that stands for no format is the fault of none of the pairs.
-    jobs.iter().take(1).try_for_each(|job| check_range(&job.outputs.map, 0, 0))?;
     let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
     folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
     Ok(jobs)
 }
 
 impl Job {
-    fn new(args: &MatchArgs, index: usize, pair: &Pair) -> Self {
+    fn new(args: &MatchArgs, making: &Making, index: usize, pair: &Pair) -> Self {
         let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
-        let of_pair = MatchArgs {
-            left: Some(pair.left.clone()),
-            right: Some(pair.right.clone()),
-            output: named(&args.many.format),
-            picture: args.many.pictures.then(|| named("picture.png")),
-            ..args.clone()
+        let also = |what: Also, ending: &str| args.many.also.contains(&what).then(|| named(ending));
+        let outputs = Outputs {
+            map: Some(named(&args.many.format)),
+            picture: also(Also::Picture, "picture.png"),
+            depth: also(Also::Depth, &format!("depth.{}", args.many.format)),
+            points: also(Also::Points, "points.ply"),
         };
         let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
-        Self { pair: pair.clone(), outputs: Outputs::of(&of_pair), record, chain: index / args.many.chain() }
+        let paths = outputs.paths(making);
+        let (calibration, chain) = (args.outputs.making.calib.clone(), index / args.many.chain());
+        Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
+    }
+
+    /// The files that the outputs are made of, the images first.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        [&self.pair.left, &self.pair.right].into_iter().chain(&self.calibration).map(PathBuf::as_path).collect()
     }
 
     /// Whether nothing is to be done.
     pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
-        let outputs: Vec<&Path> = self.outputs.paths().collect();
-        let images = [self.pair.left.as_path(), &self.pair.right];
-        PairRecord::read(&self.record).is_some_and(|record| record.is_current(settings_sha256, &images, &outputs))
+        let record = PairRecord::read(&self.record);
+        record.is_some_and(|record| record.is_current(settings_sha256, &self.inputs(), &self.paths))
     }
 
     /// Fails where an output cannot be written.
-    pub(super) fn check(&self) -> Result<(), Failure> {
-        self.outputs.check(&[&self.pair.left, &self.pair.right])
+    pub(super) fn check(&self, making: &Making) -> Result<(), Failure> {
+        self.outputs.check(making, &self.inputs())
     }
 
     /// Removes what an earlier success has left: the outputs of a pair that fails now would be taken for its own.
     pub(super) fn remove_outputs(&self) {
         // One that is not there is as good as removed, and one that cannot be is told where it is written next.
-        self.outputs.paths().for_each(|path| drop(fs::remove_file(path)));
+        self.paths.iter().for_each(|path| drop(fs::remove_file(path)));
     }
 
     fn files(&self) -> impl Iterator<Item = &Path> {
-        self.outputs.paths().chain([self.record.as_path()])
+        self.paths.iter().map(PathBuf::as_path).chain([self.record.as_path()])
     }
 }
 
-/// Fails where two jobs write the same file, one's file is another's folder, or one is an image. Letters count as equal
+/// Fails where two jobs write the same file, one's file is another's folder, or one is read. Letters count as equal
 /// in both cases: on some file systems they are.
 fn check_apart(args: &MatchArgs, jobs: &[Job]) -> Result<(), Failure> {
     let key = |path: &Path| path.as_os_str().to_ascii_lowercase();
     let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
-    let images: HashSet<PathBuf> =
-        jobs.iter().flat_map(|job| [&job.pair.left, &job.pair.right]).map(|path| whole(path)).collect();
+    let images: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(whole).collect();
     let summary = summary::path(&args.output, Shard::default());
     let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
     for job in jobs {
         for path in job.files() {
             if images.contains(&whole(path)) {
                 let advice = "choose another --output";
-                return Err(Failure::usage(format!("{} would be overwritten, an image; {advice}", path.display())));
+                return Err(Failure::usage(format!(
+                    "{} would be overwritten, which is read; {advice}",
+                    path.display()
+                )));
             }
             let name = job.pair.left.display().to_string();
             if let Some(other) = owners.insert(key(path), name.clone()) {

@@ -47,6 +47,7 @@ pub(super) struct Done {
     pub(super) device: record::Device,
     pub(super) settings: record::Settings,
     pub(super) energy: record::Energy,
+    pub(super) warnings: Vec<String>,
     pub(super) times: PairTimes,
 }
 
@@ -71,7 +72,7 @@ pub(super) struct PairRecord {
     pub(super) right: PathBuf,
     /// Of all settings that outputs depend on; see [`settings_sha256`].
     pub(super) settings_sha256: String,
-    /// The images, where they could be read.
+    /// The images and the calibration, where they could be read.
     pub(super) inputs: Vec<FileState>,
     /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
     pub(super) elapsed_ms: f64,
@@ -98,13 +99,13 @@ impl PairRecord {
         }
     }
 
-    /// Whether its outputs are still what these images and settings give.
-    pub(super) fn is_current(&self, settings_sha256: &str, images: &[&Path], outputs: &[&Path]) -> bool {
-        let same = |then: &[FileState], now: &[&Path]| {
-            then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now))
-        };
+    /// Whether its outputs are still what these inputs and settings give.
+    pub(super) fn is_current(&self, settings_sha256: &str, inputs: &[&Path], outputs: &[PathBuf]) -> bool {
+        fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
+            then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
+        }
         let done = self.done().filter(|_| self.settings_sha256 == settings_sha256);
-        done.is_some_and(|done| same(&self.inputs, images) && same(&done.outputs, outputs))
+        done.is_some_and(|done| same(&self.inputs, inputs) && same(&done.outputs, outputs))
     }
 }
 
@@ -145,14 +146,14 @@ impl FileState {
 /// SHA-256 of the program's version and of all options but those that change no output: where files lie, which device
 /// computes, and what is told.
 pub(super) fn settings_sha256(args: &MatchArgs) -> String {
-    let ManyArgs { format, pictures, warm_start, .. } = args.many.clone();
+    let ManyArgs { format, also, warm_start, .. } = args.many.clone();
     let of_output = MatchArgs {
         left: None,
         right: None,
         output: PathBuf::new(),
         json: false,
         max_megapixels: 0,
-        many: ManyArgs { format, pictures, warm_start, ..ManyArgs::default() },
+        many: ManyArgs { format, also, warm_start, ..ManyArgs::default() },
         plan: PlanArgs { backend: String::new(), device: None, threads: None, ..args.plan.clone() },
         ..args.clone()
     };

@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 
-use bp_core::StereoPair;
+use bp_core::{StereoPair, survey::Survey};
 
 use super::{
     job::Job,
@@ -15,11 +15,11 @@ use super::{
 };
 use crate::{
     args::MatchArgs,
-    command::match_pair::{read_pair, warn_of_labels},
+    command::match_pair::{planned, read_pair},
     failure::Failure,
     files::PixelLimit,
     interrupt::{self, ProgressBar},
-    matching::{Answer, Session, plan},
+    matching::{Answer, Content, Making, Session},
     record, tell,
 };
 
@@ -27,7 +27,7 @@ use crate::{
 struct Read<'a> {
     job: &'a Job,
     inputs: Vec<FileState>,
-    pair: Result<StereoPair, Failure>,
+    pair: Result<(StereoPair, Survey), Failure>,
     read_ms: f64,
 }
 
@@ -35,11 +35,11 @@ struct Read<'a> {
 struct Matched<'a> {
     job: &'a Job,
     inputs: Vec<FileState>,
-    done: Result<(Done, Answer), Failure>,
+    done: Result<(Done, Answer, StereoPair), Failure>,
 }
 
 /// Matches and writes all jobs; a pair that fails is recorded, and the others go on.
-pub(super) fn run(args: &MatchArgs, jobs: &[&Job], settings_sha256: &str) -> Result<(), Failure> {
+pub(super) fn run(args: &MatchArgs, making: &Making, jobs: &[&Job], settings_sha256: &str) -> Result<(), Failure> {
     let bar = ProgressBar::new(jobs.len() as u64);
     // Nothing waits in the channels: at most three pairs are in memory.
     let (read, to_match) = sync_channel(0);
@@ -48,8 +48,9 @@ pub(super) fn run(args: &MatchArgs, jobs: &[&Job], settings_sha256: &str) -> Res
     let begun = Instant::now();
     let result = thread::scope(|scope| {
         scope.spawn(move || read_all(jobs, limit, &read));
-        let writer = scope.spawn(|| Writer { bar: &bar, settings_sha256, last: begun, failed: 0 }.write_all(to_write));
-        let solved = solve_all(args, to_match, matched);
+        let writer =
+            scope.spawn(|| Writer { bar: &bar, making, settings_sha256, last: begun, failed: 0 }.write_all(to_write));
+        let solved = solve_all(args, making, to_match, matched);
         let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         // Where writing fails, matching ends for want of a writer.
         written.and(solved)
@@ -67,9 +68,11 @@ fn read_all<'a>(jobs: &[&'a Job], limit: PixelLimit, to: &SyncSender<Read<'a>>) 
     for &job in jobs {
         let start = Instant::now();
         // Before they are read: whatever is written to them after this is noticed.
-        let inputs: io::Result<Vec<FileState>> =
-            [&job.pair.left, &job.pair.right].into_iter().map(|path| FileState::of(path)).collect();
-        let pair = read_pair(&job.pair.left, &job.pair.right, limit);
+        let inputs: io::Result<Vec<FileState>> = job.inputs().into_iter().map(FileState::of).collect();
+        let pair = read_pair(&job.pair.left, &job.pair.right, limit).and_then(|pair| {
+            let survey = Survey::of(&pair)?;
+            Ok((pair, survey))
+        });
         let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
         if interrupt::check().is_err() || to.send(read).is_err() {
             return;
@@ -78,13 +81,25 @@ fn read_all<'a>(jobs: &[&'a Job], limit: PixelLimit, to: &SyncSender<Read<'a>>) 
 }
 
 /// Matches pair after pair. A device that is lost is opened again for the next.
-fn solve_all<'a>(args: &MatchArgs, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Failure> {
+fn solve_all<'a>(
+    args: &MatchArgs,
+    making: &Making,
+    from: Receiver<Read<'a>>,
+    to: SyncSender<Matched<'a>>,
+) -> Result<(), Failure> {
     let mut session = Session::open(args)?;
     let mut last_chain = None;
     for Read { job, inputs, pair, read_ms } in from {
         // Not from another chain's messages: whether that is matched in this run must make no difference.
         session.starts_warm = last_chain == Some(job.chain);
-        let done = pair.and_then(|pair| solve(args, &mut session, job, &pair, read_ms));
+        let done = pair.and_then(|(pair, survey)| {
+            let start = Instant::now();
+            let files = [job.pair.left.as_path(), &job.pair.right];
+            let (plan, warnings) = planned(&args.plan, files, pair.size(), &survey, (&job.outputs, making))?;
+            let answer = session.solve(&pair, plan)?;
+            let times = PairTimes { read_ms, match_ms: milliseconds_since(start), ..PairTimes::default() };
+            Ok((done(&session, &pair, &answer, warnings, times), answer, pair))
+        });
         last_chain = if done.is_ok() { Some(job.chain) } else { last_chain };
         if let Err(failure) = &done {
             if failure.is_interrupted() {
@@ -101,20 +116,10 @@ fn solve_all<'a>(args: &MatchArgs, from: Receiver<Read<'a>>, to: SyncSender<Matc
     interrupt::check()
 }
 
-fn solve(
-    args: &MatchArgs,
-    session: &mut Session<'_>,
-    job: &Job,
-    pair: &StereoPair,
-    read_ms: f64,
-) -> Result<(Done, Answer), Failure> {
-    let start = Instant::now();
-    let plan = plan::plan(&args.plan, pair.size())?;
-    job.outputs.check_range(plan.model())?;
-    warn_of_labels(&plan);
-    let answer = session.solve(pair, plan)?;
+/// What is recorded of an answer, but for the files that are still to be written.
+fn done(session: &Session<'_>, pair: &StereoPair, answer: &Answer, warnings: Vec<String>, times: PairTimes) -> Done {
     let solve_ms = answer.samples.iter().map(|times| 1000.0 * times.total.as_secs_f64()).sum();
-    let done = Done {
+    Done {
         outputs: Vec::new(),
         width: pair.size().width,
         height: pair.size().height,
@@ -122,14 +127,15 @@ fn solve(
         device: record::Device::from(&session.opened().info),
         settings: answer.settings.clone(),
         energy: answer.energy.into(),
-        times: PairTimes { read_ms, solve_ms, match_ms: milliseconds_since(start), write_ms: 0.0 },
-    };
-    Ok((done, answer))
+        warnings,
+        times: PairTimes { solve_ms, ..times },
+    }
 }
 
 /// Writes outputs and, after them, records.
 struct Writer<'a> {
     bar: &'a ProgressBar,
+    making: &'a Making,
     settings_sha256: &'a str,
     last: Instant,
     failed: usize,
@@ -139,7 +145,7 @@ impl Writer<'_> {
     fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<(), Failure> {
         for (index, Matched { job, inputs, done }) in from.into_iter().enumerate() {
             let outcome = match done {
-                Ok((done, answer)) => Outcome::Done(Box::new(write(job, done, &answer)?)),
+                Ok((done, answer, pair)) => Outcome::Done(Box::new(self.write(job, done, &answer, &pair)?)),
                 Err(failure) => {
                     self.failed += 1;
                     tell(&format!("{}: {failure}", job.pair.name.display()));
@@ -170,12 +176,14 @@ impl Writer<'_> {
         };
         record.write(&job.record)
     }
-}
 
-fn write(job: &Job, done: Done, answer: &Answer) -> Result<Done, Failure> {
-    let start = Instant::now();
-    job.outputs.write(answer)?;
-    let state = |path| FileState::of(path).map_err(|error| Failure::writing(path, &error));
-    let outputs = job.outputs.paths().map(state).collect::<Result<_, _>>()?;
-    Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
+    fn write(&self, job: &Job, done: Done, answer: &Answer, pair: &StereoPair) -> Result<Done, Failure> {
+        let start = Instant::now();
+        let inputs = job.inputs();
+        let (image, plan) = (Some(pair.left()), Some(&answer.settings));
+        job.outputs.write(self.making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+        let state = |path| FileState::of(path).map_err(|error| Failure::writing(path, &error));
+        let outputs = job.paths.iter().map(|path| state(path)).collect::<Result<_, _>>()?;
+        Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
+    }
 }

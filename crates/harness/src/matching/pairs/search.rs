@@ -19,7 +19,7 @@ const IN_ONE_FOLDER: [[&str; 2]; 5] =
 const IN_TWO_FOLDERS: [[&str; 2]; 3] = [["left", "right"], ["image_2", "image_3"], ["image_0", "image_1"]];
 
 /// Endings of images, in the order in which one of several is taken.
-const ENDINGS: [&str; 4] = ["png", "ppm", "pgm", "pnm"];
+const ENDINGS: [&str; 8] = ["png", "ppm", "pgm", "pnm", "tif", "tiff", "jpg", "jpeg"];
 
 /// Images by their folders, both relative to where the search began.
 type Folders = BTreeMap<PathBuf, BTreeSet<String>>;
