@@ -3,6 +3,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod labels;
+mod memory;
 mod outputs;
 mod pairs;
 pub(crate) mod plan;

@@ -32,8 +32,8 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
-    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given:
-    /// bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
+    /// Keep within so much memory, images and answer included: larger pairs are matched strip by strip or tile by tile.
+    /// Bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024). [default: what is free]
     #[arg(long, value_name = "SIZE")]
     pub(crate) max_memory: Option<ByteSize>,
     /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
