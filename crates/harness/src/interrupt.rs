@@ -42,7 +42,7 @@ pub(crate) fn check() -> Result<(), Failure> {
 /// Writes to standard error where a bar may be shown.
 pub(crate) fn beside_bar(write: impl FnOnce()) {
     let bar = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    bar.map_or_else(indicatif::ProgressBar::hidden, |bar| bar).suspend(write);
+    bar.unwrap_or_else(indicatif::ProgressBar::hidden).suspend(write);
 }
 
 /// A bar on standard error, with the time left; not drawn where that is no terminal, where only errors are told, or where

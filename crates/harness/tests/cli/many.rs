@@ -277,7 +277,7 @@ fn a_signal_ends_a_batch_between_pairs_without_a_trace() {
         assert!(text(&output.stderr).contains("the same command goes on"), "{}", text(&output.stderr));
         let found = files(&folder.path("out"));
         let maps = maps(&folder.path("out")).len();
-        assert!(maps > 0 && maps < 200 && found.len() == 2 * maps, "{found:?}");
+        assert!(maps > 0 && maps < 200 && found.len() == 3 * maps, "{found:?}");
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::{
     collections::{BTreeSet, HashMap, HashSet},
+    ffi::OsString,
     fs,
-    path::{Path, PathBuf},
+    path::{Display, Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
@@ -11,7 +12,7 @@ use super::{Shard, record::PairRecord, summary};
 use crate::{
     args::{Also, MatchArgs},
     failure::Failure,
-    files::create_folder,
+    files::{MapFormat, create_folder},
     matching::{Making, Outputs, pairs::Pair},
 };
 
@@ -36,6 +37,8 @@ pub(super) struct Job {
 /// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
 /// what is read.
 pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
+    // An ending that stands for no format is the fault of none of the pairs.
+    MapFormat::of(&Path::new("NAME").with_added_extension(&args.many.format))?;
     let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, making, index, pair)).collect();
     check_apart(args, &jobs)?;
     let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
@@ -86,38 +89,32 @@ impl Job {
     }
 }
 
-/// Fails where two jobs write the same file, one's file is another's folder, or one is read. Letters count as equal
-/// in both cases: on some file systems they are.
+/// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.
 fn check_apart(args: &MatchArgs, jobs: &[Job]) -> Result<(), Failure> {
-    let key = |path: &Path| path.as_os_str().to_ascii_lowercase();
     let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
-    let images: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(whole).collect();
+    let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(whole).collect();
+    let files = || jobs.iter().flat_map(|job| job.files().map(move |path| (job.pair.left.display(), path)));
+    if let Some((_, path)) = files().find(|(_, path)| inputs.contains(&whole(path))) {
+        let what = format!("{} would be overwritten, which is read", path.display());
+        return Err(Failure::usage(format!("{what}; choose another --output")));
+    }
     let summary = summary::path(&args.output, Shard::default());
     let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
-    for job in jobs {
-        for path in job.files() {
-            if images.contains(&whole(path)) {
-                let advice = "choose another --output";
-                return Err(Failure::usage(format!(
-                    "{} would be overwritten, which is read; {advice}",
-                    path.display()
-                )));
-            }
-            let name = job.pair.left.display().to_string();
-            if let Some(other) = owners.insert(key(path), name.clone()) {
-                return Err(clash(path, &other, &name));
-            }
+    for (owner, path) in files() {
+        if let Some(other) = owners.insert(key(path), owner.to_string()) {
+            return Err(clash(path, &other, &owner.to_string()));
         }
     }
-    for job in jobs {
-        let name = job.pair.left.display().to_string();
-        for folder in job.files().flat_map(|path| path.ancestors().skip(1)) {
-            if let Some(other) = owners.get(&key(folder)) {
-                return Err(clash(folder, other, &name));
-            }
-        }
-    }
-    Ok(())
+    let taken = |(owner, path): (Display<'_>, &Path)| {
+        let folder = path.ancestors().skip(1).find(|folder| owners.contains_key(&key(folder)))?;
+        Some(clash(folder, &owners[&key(folder)], &owner.to_string()))
+    };
+    files().find_map(taken).map_or(Ok(()), Err)
+}
+
+/// What tells paths apart: letters count as equal in both cases, as they do on some file systems.
+fn key(path: &Path) -> OsString {
+    path.as_os_str().to_ascii_lowercase()
 }
 
 fn clash(path: &Path, one: &str, other: &str) -> Failure {

@@ -92,14 +92,7 @@ fn solve_all<'a>(
     for Read { job, inputs, pair, read_ms } in from {
         // Not from another chain's messages: whether that is matched in this run must make no difference.
         session.starts_warm = last_chain == Some(job.chain);
-        let done = pair.and_then(|(pair, survey)| {
-            let start = Instant::now();
-            let files = [job.pair.left.as_path(), &job.pair.right];
-            let (plan, warnings) = planned(&args.plan, files, pair.size(), &survey, (&job.outputs, making))?;
-            let answer = session.solve(&pair, plan)?;
-            let times = PairTimes { read_ms, match_ms: milliseconds_since(start), ..PairTimes::default() };
-            Ok((done(&session, &pair, &answer, warnings, times), answer, pair))
-        });
+        let done = pair.and_then(|read| match_one(args, making, &mut session, job, read, read_ms));
         last_chain = if done.is_ok() { Some(job.chain) } else { last_chain };
         if let Err(failure) = &done {
             if failure.is_interrupted() {
@@ -114,6 +107,22 @@ fn solve_all<'a>(
         }
     }
     interrupt::check()
+}
+
+fn match_one(
+    args: &MatchArgs,
+    making: &Making,
+    session: &mut Session<'_>,
+    job: &Job,
+    (pair, survey): (StereoPair, Survey),
+    read_ms: f64,
+) -> Result<(Done, Answer, StereoPair), Failure> {
+    let start = Instant::now();
+    let files = [job.pair.left.as_path(), &job.pair.right];
+    let (plan, warnings) = planned(&args.plan, files, pair.size(), &survey, (&job.outputs, making))?;
+    let answer = session.solve(&pair, plan)?;
+    let times = PairTimes { read_ms, match_ms: milliseconds_since(start), ..PairTimes::default() };
+    Ok((done(session, &pair, &answer, warnings, times), answer, pair))
 }
 
 /// What is recorded of an answer, but for the files that are still to be written.

@@ -95,26 +95,22 @@ fn in_one_folder(folder: &Path, images: &BTreeSet<String>, found: &mut Found) {
 
 /// The pairs of a folder and the one beside it, where they are called as in a known data set.
 fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
-    let named = |name: &str| folder.file_name().is_some_and(|own| own == name);
-    for [left, right] in IN_TWO_FOLDERS {
-        if named(right) && !folders.contains_key(&folder.with_file_name(left)) {
-            found.notes.push(format!("passed over: {} has no folder {left} with images beside it", folder.display()));
-        }
-        if !named(left) {
-            continue;
-        }
-        let other = folder.with_file_name(right);
-        let Some(partners) = folders.get(&other) else {
-            found.notes.push(format!("passed over: {} has no folder {right} with images beside it", folder.display()));
+    for layout in IN_TWO_FOLDERS {
+        let Some(side) = layout.iter().position(|&name| folder.file_name().is_some_and(|own| own == name)) else {
             continue;
         };
-        let images = &folders[folder];
-        for lonely in images.symmetric_difference(partners) {
-            let [here, there] = if images.contains(lonely) { [folder, &other] } else { [&other, folder] };
-            let (here, there) = (here.join(lonely), there.display());
-            found.notes.push(format!("passed over: {} has no image of its name in {there}", here.display()));
+        let other = layout[1 - side];
+        let Some(partners) = folders.get(&folder.with_file_name(other)) else {
+            found.notes.push(format!("passed over: {} has no folder {other} with images beside it", folder.display()));
+            continue;
+        };
+        let lonely = folders[folder].difference(partners).map(|image| folder.join(image));
+        found.notes.extend(
+            lonely.map(|image| format!("passed over: {} has no image of its name in {other}", image.display())),
+        );
+        if side == 0 {
+            pairs_of_equal_names(folder, &folder.with_file_name(other), folders[folder].intersection(partners), found);
         }
-        pairs_of_equal_names(folder, &other, images.intersection(partners), found);
     }
 }
 
