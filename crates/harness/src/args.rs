@@ -1,6 +1,7 @@
 //! The command line.
 
 mod examples;
+mod finishing;
 mod many;
 mod matching;
 mod measuring;
@@ -14,6 +15,7 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
+pub(crate) use finishing::FinishArgs;
 pub(crate) use many::{Also, ManyArgs};
 pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};

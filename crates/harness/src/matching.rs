@@ -2,6 +2,7 @@
 //! and how `batch` does so with many.
 
 pub(crate) mod batch;
+mod finishing;
 pub(crate) mod labels;
 mod memory;
 mod outputs;
@@ -12,6 +13,7 @@ mod session;
 pub(crate) mod warnings;
 
 pub(crate) use batch::Shard;
+pub(crate) use finishing::Sample;
 pub(crate) use outputs::{Content, Making, Outputs};
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

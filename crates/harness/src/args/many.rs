@@ -25,8 +25,8 @@ pub(crate) struct ManyArgs {
     /// Ending of the maps, which says how disparities are stored: as that of --output does for one pair.
     #[arg(long, value_name = "ENDING", default_value = "pfm", requires = "many")]
     pub(crate) format: String,
-    /// What else is written of every pair, separated by commas: picture (NAME.picture.png), depth (NAME.depth with the
-    /// ending of --format) and points (NAME.points.ply).
+    /// What else is written of every pair, separated by commas: picture (NAME.picture.png), points (NAME.points.ply),
+    /// depth and confidence (NAME.depth and NAME.confidence with the ending of --format).
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "many", value_parser = named(&Also::ALL, Also::name))]
     pub(crate) also: Vec<Also>,
     /// Match only every N-th pair, from the I-th on: N processes with I from 1 to N share the work.
@@ -52,17 +52,20 @@ pub(crate) enum Also {
     Depth,
     /// A point cloud.
     Points,
+    /// How far the map can be trusted.
+    Confidence,
 }
 
 impl Also {
     /// All of these.
-    const ALL: [Self; 3] = [Self::Picture, Self::Depth, Self::Points];
+    const ALL: [Self; 4] = [Self::Picture, Self::Depth, Self::Points, Self::Confidence];
 
     fn name(self) -> &'static str {
         match self {
             Self::Picture => "picture",
             Self::Depth => "depth",
             Self::Points => "points",
+            Self::Confidence => "confidence",
         }
     }
 }

@@ -6,7 +6,7 @@ use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Sche
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{ManyArgs, OutputArgs, named, positive, switch, threads};
+use super::{FinishArgs, ManyArgs, OutputArgs, named, positive, switch, threads};
 use crate::{backends, files::PixelLimit};
 
 /// `bp match`.
@@ -46,6 +46,9 @@ pub(crate) struct MatchArgs {
     /// Many pairs with one command.
     #[command(flatten)]
     pub(crate) many: ManyArgs,
+    /// What is done to the map after matching.
+    #[command(flatten)]
+    pub(crate) finish: FinishArgs,
     /// What else is written, and how.
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,

@@ -11,7 +11,7 @@ mod run;
 mod shard;
 mod summary;
 
-use std::io::Write as _;
+use std::{io::Write as _, path::PathBuf};
 
 use bp_core::{Algorithm, Schedule};
 pub(crate) use shard::Shard;
@@ -19,7 +19,7 @@ use summary::Summary;
 
 use super::{Making, pairs};
 use crate::{
-    args::{MatchArgs, OutputArgs},
+    args::{Also, FinishArgs, MatchArgs, OutputArgs},
     command::print_json,
     failure::Failure,
     files, interrupt,
@@ -29,16 +29,8 @@ use crate::{
 
 /// Matches all pairs that the options name.
 pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
-    let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
-    if args.many.warm_start.is_some() && swept {
-        let what = "--warm-start needs messages that are kept; of the schedule sweep they are not";
-        return Err(Failure::usage(format!("{what}: take --algorithm cfbp --half-steps 10, say")));
-    }
-    let OutputArgs { picture, depth, points, .. } = &args.outputs;
-    if picture.is_some() || depth.is_some() || points.is_some() {
-        let what = "--picture, --depth and --points name one file";
-        return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points")));
-    }
+    check_options(args)?;
+    let args = &as_for_one(args);
     let found = pairs::find(args)?;
     found.notes.iter().for_each(|line| note(line));
     let shard = args.many.shard.unwrap_or_default();
@@ -69,4 +61,31 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
         write!(std::io::stdout(), "{}", summary.text())?
     }
     summary.outcome(&told)
+}
+
+/// Refuses options that are for one pair, and warm starts from messages that are not there.
+fn check_options(args: &MatchArgs) -> Result<(), Failure> {
+    let OutputArgs { picture, depth, points, .. } = &args.outputs;
+    if [picture, depth, points, &args.finish.confidence].into_iter().any(Option::is_some) {
+        let what = "--picture, --depth, --points and --confidence name one file";
+        return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points,confidence")));
+    }
+    let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
+    let both_views = args.finish.check.is_some() || args.many.also.contains(&Also::Confidence);
+    if args.many.warm_start.is_some() && (swept || both_views) {
+        let what = "--warm-start needs messages of the frame before, which the schedule sweep does not keep";
+        let advice = "take --algorithm cfbp --half-steps 10, say, and neither --check nor --also confidence";
+        return Err(Failure::usage(format!("{what}, and matching both views overwrites: {advice}")));
+    }
+    Ok(())
+}
+
+/// The options as they would be for one pair: that there is a file says what is computed and what memory that takes.
+fn as_for_one(args: &MatchArgs) -> MatchArgs {
+    let file = |what| args.many.also.contains(&what).then(PathBuf::new);
+    MatchArgs {
+        outputs: OutputArgs { depth: file(Also::Depth), points: file(Also::Points), ..args.outputs.clone() },
+        finish: FinishArgs { confidence: file(Also::Confidence), ..args.finish.clone() },
+        ..args.clone()
+    }
 }

@@ -133,6 +133,7 @@ fn outputs_that_would_collide_are_refused_before_the_work() {
         "left.png right.png --pairs list",
         "--pairs list --shard 3/2",
         "--pairs list --repeat 2",
+        "--pairs list --confidence c.pfm",
     ] {
         folder.fails(&format!("match --output out {options}"), 2, &["--"]);
     }
@@ -344,5 +345,8 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
         assert_eq!(folder.run(&format!("{broken} --output {output}")).status.code(), Some(3));
     }
     assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
-    folder.fails("match --video l%d r%d --output no --warm-start", 2, &["--warm-start", "cfbp"]);
+    for options in ["", "--algorithm cfbp --check left-right", "--algorithm cfbp --also confidence"] {
+        let run = format!("match --video l%d r%d --output no --warm-start {options}");
+        folder.fails(&run, 2, &["--warm-start", "cfbp", "--check"]);
+    }
 }

@@ -55,6 +55,7 @@ impl Job {
             picture: also(Also::Picture, "picture.png"),
             depth: also(Also::Depth, &format!("depth.{}", args.many.format)),
             points: also(Also::Points, "points.ply"),
+            confidence: also(Also::Confidence, &format!("confidence.{}", args.many.format)),
         };
         let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
         let paths = outputs.paths(making);

@@ -56,7 +56,7 @@ pub(super) struct Done {
 pub(super) struct PairTimes {
     /// Reading both images, while another pair is matched.
     pub(super) read_ms: f64,
-    /// From the images in memory to the labels in memory.
+    /// From the images in memory to the map in memory.
     pub(super) solve_ms: f64,
     /// The same with all that matching needs besides: preparing a device for another size, the energy, the map.
     pub(super) match_ms: f64,

@@ -127,7 +127,7 @@ fn match_one(
 
 /// What is recorded of an answer, but for the files that are still to be written.
 fn done(session: &Session<'_>, pair: &StereoPair, answer: &Answer, warnings: Vec<String>, times: PairTimes) -> Done {
-    let solve_ms = answer.samples.iter().map(|times| 1000.0 * times.total.as_secs_f64()).sum();
+    let solve_ms = answer.samples.iter().map(|sample| 1000.0 * sample.total().as_secs_f64()).sum();
     Done {
         outputs: Vec::new(),
         width: pair.size().width,
@@ -190,7 +190,8 @@ impl Writer<'_> {
         let start = Instant::now();
         let inputs = job.inputs();
         let (image, plan) = (Some(pair.left()), Some(&answer.settings));
-        job.outputs.write(self.making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+        let confidence = answer.confidence.as_deref();
+        job.outputs.write(self.making, &Content { map: &answer.map, confidence, image, plan, inputs: &inputs })?;
         let state = |path| FileState::of(path).map_err(|error| Failure::writing(path, &error));
         let outputs = job.paths.iter().map(|path| state(path)).collect::<Result<_, _>>()?;
         Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
