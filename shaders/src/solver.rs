@@ -2,7 +2,7 @@
 
 use std::{ops::Range, time::Duration};
 
-use bp_core::{Error, Plan, Seed, Side, Solver, Stage, StereoPair};
+use bp_core::{Error, Plan, Schedule, Seed, Settings, Side, Solver, Stage, StereoPair};
 
 use crate::{Program, Queue, answer, compose, program::Part};
 
@@ -75,6 +75,17 @@ impl Solver for GpuSolver {
 
     fn refine(&mut self, grid: usize) -> Result<(), Error> {
         self.run(Stage::Refine, [Part::Refine(grid)].into_iter())
+    }
+
+    /// They are where they were, and the first step reads them there, except that of an odd number of synchronous loops
+    /// the last one writes what the next first one would write too.
+    fn keep_messages(&mut self) -> Result<(), Error> {
+        let Settings { schedule, steps, .. } = *self.plan.settings();
+        if schedule == Schedule::Sync && steps % 2 == 1 {
+            let reason = "a warm start needs an even number of loops here, or the schedule checkerboard".to_owned();
+            return Err(Error::Unsupported { device: "the GPU".to_owned(), reason });
+        }
+        Ok(())
     }
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {

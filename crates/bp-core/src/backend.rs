@@ -142,6 +142,14 @@ pub trait Solver: Send {
     /// Those of the device.
     fn refine(&mut self, grid: usize) -> Result<(), Error>;
 
+    /// In place of [`Solver::refine`] of grid 0, after a solve that was not stopped and before any coarser grid is
+    /// refined again: makes the messages that grid 0 holds its first messages. Not under
+    /// [`crate::Schedule::Sweep`]; see [`crate::Matcher::solve_warm_observed`].
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the plan's messages are not kept, and those of the device.
+    fn keep_messages(&mut self) -> Result<(), Error>;
+
     /// Runs these steps of the schedule on `grid`.
     ///
     /// # Errors

@@ -6,6 +6,7 @@
 mod cases;
 mod oracle;
 mod random;
+mod warm;
 
 pub use cases::{cases, noise_pair};
 pub use oracle::Oracle;
@@ -56,6 +57,7 @@ fn answer(matcher: &mut Matcher) -> Result<Answer, Error> {
 /// Where the tested device fails any of it.
 pub fn assert_conforms(reference: &dyn Device, tested: &dyn Device) {
     cases().for_each(|case| assert_same(reference, tested, &case));
+    warm::assert_same_warm(reference, tested);
     for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
         for profile in Profile::ALL {
             // One loop: what an old message leaves behind is not yet washed out.

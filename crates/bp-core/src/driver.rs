@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{Device, DisparityMap, Error, Plan, Side, Solver, StereoPair, census, memory};
+use crate::{Device, DisparityMap, Error, Plan, Schedule, Side, Solver, StereoPair, census, memory};
 
 /// A timed stage: the kernel of the same name, over all grids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -80,6 +80,8 @@ pub struct Matcher {
     plan: Plan,
     solver: Box<dyn Solver>,
     labels: Vec<u16>,
+    /// Whether the last solve came to its end.
+    has_answer: bool,
 }
 
 impl Matcher {
@@ -88,9 +90,12 @@ impl Matcher {
     /// # Errors
     /// Those of [`Device::prepare`].
     pub fn new(device: &dyn Device, plan: Plan) -> Result<Self, Error> {
+        let start = Instant::now();
         let solver = device.prepare(&plan)?;
+        let (size, labels, bytes) = (plan.image_size(), plan.model().labels(), solver.allocated_bytes());
+        log::debug!("prepared for {size} pixels and {labels} labels in {:?}, {bytes} bytes", start.elapsed());
         let labels = memory::filled("labels", plan.image_size().pixels(), 0)?;
-        Ok(Self { plan, solver, labels })
+        Ok(Self { plan, solver, labels, has_answer: false })
     }
 
     /// The plan.
@@ -131,23 +136,45 @@ impl Matcher {
     /// # Errors
     /// As [`Matcher::solve`], and [`Error::Stopped`].
     pub fn solve_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
+        self.solve_from(pair, Start::Cold, observer)
+    }
+
+    /// Matches the next frame of a video, starting from the messages of the frame before: the last messages of grid 0 are
+    /// its first ones, and the plan's steps run on grid 0 alone, counted from 0. No coarser grid takes part, so that such
+    /// a solve is the faster one, and as good only where little moved. The first solve of a matcher, and one after a
+    /// solve that was stopped or failed, is that of [`Matcher::solve_observed`].
+    ///
+    /// # Errors
+    /// As [`Matcher::solve_observed`]; [`Error::Plan`] under [`Schedule::Sweep`], whose bands hold messages only while
+    /// they are swept, and [`Error::Unsupported`] where the device does not keep the plan's messages.
+    pub fn solve_warm_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
+        if self.plan.settings().schedule == Schedule::Sweep {
+            return Err(Error::Plan("a warm start needs messages that are kept: the schedule sync or checkerboard"));
+        }
+        self.solve_from(pair, if self.has_answer { Start::Warm } else { Start::Cold }, observer)
+    }
+
+    fn solve_from(&mut self, pair: &StereoPair, from: Start, observer: &mut Observer<'_>) -> Result<Times, Error> {
         if pair.size() != self.plan.image_size() {
             let (found, expected) = (pair.size(), self.plan.image_size());
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
-        let Self { plan, solver, labels } = self;
+        self.has_answer = false;
+        let Self { plan, solver, labels, .. } = self;
         let mut times = Times::default();
         let start = Instant::now();
         let seed = plan.settings().cut.filter(|cut| cut.seed_start);
         let seed = seed.and_then(|cut| census::find_match(pair, plan.model(), (cut.x, cut.y)));
         timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
-        for grid in 1..plan.grids() {
+        for grid in 1..from.grids(plan) {
             timed(&mut times, Stage::Coarsen, || solver.coarsen(grid))?;
         }
-        pass_messages(plan, solver.as_mut(), &mut times, observer)?;
+        pass_messages(plan, solver.as_mut(), from, &mut times, observer)?;
         timed(&mut times, Stage::SelectLabels, || solver.select_labels(labels))?;
         times.total = start.elapsed();
         times.device = solver.device_times();
+        self.has_answer = true;
+        log::debug!("solved in {:?}", times.total);
         Ok(times)
     }
 
@@ -174,15 +201,40 @@ impl Matcher {
     }
 }
 
+/// What a solve starts from.
+#[derive(Clone, Copy)]
+enum Start {
+    /// Zeros on the coarsest grid.
+    Cold,
+    /// What grid 0 holds.
+    Warm,
+}
+
+impl Start {
+    /// On how many grids messages are passed.
+    fn grids(self, plan: &Plan) -> usize {
+        match self {
+            Self::Cold => plan.grids(),
+            Self::Warm => 1,
+        }
+    }
+}
+
 fn pass_messages(
     plan: &Plan,
     solver: &mut dyn Solver,
+    from: Start,
     times: &mut Times,
     observer: &mut Observer<'_>,
 ) -> Result<(), Error> {
-    let mut progress = Progress { done: 0, total: plan.message_updates() };
-    for grid in (0..plan.grids()).rev() {
-        timed(times, Stage::Refine, || solver.refine(grid))?;
+    let grids = from.grids(plan);
+    let total = (0..grids).map(|grid| u64::from(plan.settings().steps).saturating_mul(plan.updates_per_step(grid)));
+    let mut progress = Progress { done: 0, total: total.fold(0, u64::saturating_add) };
+    for grid in (0..grids).rev() {
+        timed(times, Stage::Refine, || match from {
+            Start::Cold => solver.refine(grid),
+            Start::Warm => solver.keep_messages(),
+        })?;
         let mut steps = 0..plan.settings().steps;
         while !steps.is_empty() {
             let end = steps.start.saturating_add(solver.fused_steps()).min(steps.end);

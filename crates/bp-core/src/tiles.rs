@@ -82,7 +82,24 @@ impl Tiled {
         Ok(times)
     }
 
-    /// The same without an observer.
+    /// Matches the next frame of a video from the messages of the frame before, see [`Matcher::solve_warm_observed`]. Where
+    /// there are several tiles, whose messages are gone, every frame is matched as if it were the first.
+    ///
+    /// # Errors
+    /// As there, and those of [`Tiled::solve_observed`].
+    pub fn solve_warm_observed(
+        &mut self,
+        device: &dyn Device,
+        pair: &StereoPair,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        match self.matcher.as_mut().filter(|_| self.tiling.is_whole()) {
+            Some(matcher) => matcher.solve_warm_observed(pair, observer),
+            None => self.solve_observed(device, pair, observer),
+        }
+    }
+
+    /// [`Tiled::solve_observed`] without an observer.
     ///
     /// # Errors
     /// As there.

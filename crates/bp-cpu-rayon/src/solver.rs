@@ -30,6 +30,8 @@ pub(crate) struct RayonSolver {
     /// are needed at a time.
     messages: [Messages; 2],
     windows: Windows,
+    /// Whether grid 0 starts with the messages that it holds.
+    keeps_messages: bool,
     seed: Option<Seed>,
     /// Labels of a swept image, decided while its messages are in cache.
     decided: Vec<u16>,
@@ -98,6 +100,7 @@ impl RayonSolver {
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
             messages: [messages(even)?, messages(odd)?],
             windows: Windows::new(plan)?,
+            keeps_messages: false,
             seed: None,
             decided: memory::filled("labels", decided, 0)?,
             plan: plan.clone(),
@@ -136,14 +139,16 @@ impl RayonSolver {
 
 /// What the nodes of either checkerboard colour of a grid received last.
 fn received<'a>(plan: &Plan, layout: &'a Layout, messages: &'a Messages) -> [Rows<'a>; 2] {
+    received_in(plan).map(|set| messages.sets[set].rows(layout))
+}
+
+/// The set of messages that holds it.
+fn received_in(plan: &Plan) -> [usize; 2] {
     let steps = plan.settings().steps as usize;
-    [0, 1].map(|colour| {
-        let set = match plan.settings().schedule {
-            Schedule::Sync => (colour + steps) % 2,
-            Schedule::Checkerboard => usize::from(colour == steps % 2),
-            Schedule::Sweep => 0,
-        };
-        messages.sets[set].rows(layout)
+    [0, 1].map(|colour| match plan.settings().schedule {
+        Schedule::Sync => (colour + steps) % 2,
+        Schedule::Checkerboard => usize::from(colour == steps % 2),
+        Schedule::Sweep => 0,
     })
 }
 
@@ -163,6 +168,8 @@ pub(crate) struct Grid<'a> {
     pub(crate) first: usize,
     pub(crate) costs: &'a [u8],
     pub(crate) coarser: Option<Coarser<'a>>,
+    /// Whether it starts with the messages that it holds in place of the coarser grid's.
+    pub(crate) keeps_messages: bool,
 }
 
 impl Grid<'_> {
@@ -212,7 +219,7 @@ fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&
     let step = |[rows, other]: [&mut [u8]; 2], y: usize, t: usize| {
         let t = steps.start + t;
         let place = ((y + t + sends_first) % 2, y);
-        if t == 0 {
+        if t == 0 && !grid.keeps_messages {
             grid.refine(place, &Side::ALL, rows);
         }
         if last == Some(t) {
@@ -251,6 +258,15 @@ impl Solver for RayonSolver {
 
     /// Nothing yet: nodes take over first messages when they first send, see [`crate::refine`].
     fn refine(&mut self, _grid: usize) -> Result<(), Error> {
+        self.keeps_messages = false;
+        Ok(())
+    }
+
+    /// Even nodes send first, in the first set: that is to be the one with what they received last.
+    fn keep_messages(&mut self) -> Result<(), Error> {
+        let [of_even, _] = received_in(&self.plan);
+        self.messages[0].sets.rotate_left(of_even);
+        self.keeps_messages = true;
         Ok(())
     }
 
@@ -265,7 +281,8 @@ impl Solver for RayonSolver {
         let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
         let coarser = self.coarser(grid);
-        let grid_of = Grid { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser };
+        let keeps_messages = grid == 0 && self.keeps_messages;
+        let grid_of = Grid { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser, keeps_messages };
         run(&grid_of, steps.start as usize..steps.end as usize, &mut messages);
         self.messages[grid % 2] = messages;
         Ok(())

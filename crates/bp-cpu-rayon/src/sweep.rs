@@ -147,7 +147,11 @@ impl Bands<'_> {
                 }
             };
             let Self { level, plan, layout, coarser, .. } = *self;
-            let band = Band { grid: Grid { level, plan, layout, first, costs, coarser }, first, last: end - 1 };
+            let band = Band {
+                grid: Grid { level, plan, layout, first, costs, coarser, keeps_messages: false },
+                first,
+                last: end - 1,
+            };
             (0..plan.settings().steps).for_each(|step| band.pass(step == 0, edges));
             then(costs, edges)
         })

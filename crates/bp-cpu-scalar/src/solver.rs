@@ -59,6 +59,11 @@ impl Solver for ScalarSolver {
         Ok(())
     }
 
+    /// They are where they were.
+    fn keep_messages(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];

@@ -1,6 +1,8 @@
 //! The command line.
 
+mod examples;
 mod finishing;
+mod many;
 mod matching;
 mod measuring;
 mod outputs;
@@ -14,6 +16,7 @@ use clap::{
 };
 
 pub(crate) use finishing::FinishArgs;
+pub(crate) use many::{Also, ManyArgs};
 pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};
@@ -21,55 +24,64 @@ pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
-#[command(name = "bp", version, max_term_width = 110, after_help = AFTER_HELP)]
+#[command(name = "bp", version, max_term_width = 110, after_help = examples::program())]
 pub(crate) struct Cli {
+    /// Tell errors only: no progress, notes or warnings.
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
     /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-const AFTER_HELP: &str = "\
-Examples:
-  bp match left.png right.png --output map.pfm --picture map.png
-  bp match left.png right.png --output map.pfm --labels auto
-  bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
-  bp convert map.pfm --image left.png --points cloud.ply --calib calib.txt
-  bp evaluate map.png truth.png --scale 2
-  bp reproduce --quick
-  bp doctor
-
-Exit codes: 0 done, 1 other, 2 usage, 3 input, 4 the gate failed, 5 backend or device
-unavailable or unable to run the plan, 6 out of memory, 130 interrupted.";
-
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Compute the disparity map of a rectified pair.
+    #[command(after_help = examples::MATCH)]
     Match(Box<MatchArgs>),
     /// Make depth, points, a picture or another format of a disparity map that is there.
+    #[command(after_help = examples::CONVERT)]
     Convert(Box<ConvertArgs>),
     /// Measure the errors of a disparity map against ground truth.
+    #[command(after_help = examples::EVALUATE)]
     Evaluate(EvaluateArgs),
     /// Run all algorithms on six scenes and write every table, chart and figure of the thesis beside its numbers.
+    #[command(after_help = examples::REPRODUCE)]
     Reproduce(ReproduceArgs),
     /// Write the report of a recorded run again, or the part of a README that comes from it.
+    #[command(after_help = examples::REPORT)]
     Report(ReportArgs),
     /// List the scenes and check the files of a data folder.
+    #[command(after_help = examples::SCENES)]
     Scenes(ScenesArgs),
     /// List every device of every backend, by the names that --backend takes.
+    #[command(after_help = examples::DEVICES)]
     Devices(DevicesArgs),
     /// Check what this machine has, and tell what is missing and which package brings it.
+    #[command(after_help = examples::DOCTOR)]
     Doctor(DoctorArgs),
     /// Check that backends give the reference's labels and messages, to the bit.
+    #[command(after_help = examples::CONFORM)]
     Conform(ConformArgs),
     /// Time devices against each other on fixed problems, in turns and in one process.
+    #[command(after_help = examples::SPEED)]
     Speed(SpeedArgs),
     /// Check that speed-ups, accuracy, energy and memory are still what committed baselines say; exit code 4 where not.
+    #[command(after_help = examples::GATE)]
     Gate(GateArgs),
     /// Set recorded runs of several machines, commits or backends beside one another.
+    #[command(after_help = examples::COMPARE)]
     Compare(CompareArgs),
     /// Write a recorded run in the format of another program.
+    #[command(after_help = examples::EXPORT)]
     Export(ExportArgs),
+    /// Print what makes a shell complete commands and options.
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(CompletionsArgs),
+    /// Write man pages.
+    #[command(after_help = examples::MAN)]
+    Man(ManArgs),
 }
 
 /// Which scenes.
@@ -90,6 +102,20 @@ pub(crate) struct ScenesArgs {
     /// Which scenes.
     #[command(flatten)]
     pub(crate) data: DataArgs,
+}
+
+/// `bp completions`.
+#[derive(Debug, Args)]
+pub(crate) struct CompletionsArgs {
+    /// The shell.
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// `bp man`.
+#[derive(Debug, Args)]
+pub(crate) struct ManArgs {
+    /// The folder that bp.1, bp-match.1 and so on are written into.
+    pub(crate) folder: PathBuf,
 }
 
 /// `bp devices`.

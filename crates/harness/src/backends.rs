@@ -81,6 +81,7 @@ impl Chosen {
         let start = Instant::now();
         let device = backend.open(index)?;
         let open_time = start.elapsed();
+        log::debug!("opened device {index} of backend {name} in {open_time:?}");
         let unlisted =
             || Error::Unavailable { backend: backend.name(), device: index, reason: "not listed".to_owned() };
         Ok(Opened { name, info: info.ok_or_else(unlisted)?, device, open_time, backend, index, lost: false })

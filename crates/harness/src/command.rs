@@ -10,6 +10,7 @@ mod export;
 mod gate;
 pub(crate) mod match_pair;
 pub(crate) mod scenes;
+mod shell;
 mod speed;
 
 use std::io::Write;
@@ -24,12 +25,13 @@ pub(crate) use export::export;
 pub(crate) use gate::gate;
 pub(crate) use match_pair::match_pair;
 pub(crate) use scenes::scenes;
+pub(crate) use shell::{completions, man};
 pub(crate) use speed::{check_speed, speed, write_speed};
 
 use crate::failure::Failure;
 
 /// Prints what `--json` asks for.
-fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+pub(crate) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, report).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)

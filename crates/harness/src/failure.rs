@@ -24,6 +24,24 @@ enum Kind {
     Interrupted,
 }
 
+/// What the exit codes mean, in their order; help, man page and README take it from here.
+pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
+    (0, "done"),
+    (1, "other"),
+    (2, "usage"),
+    (3, "input"),
+    (4, "the gate failed"),
+    (5, "backend or device unavailable or unable to run the plan"),
+    (6, "out of memory"),
+    (130, "interrupted"),
+];
+
+/// The same as a sentence.
+pub(crate) fn exit_codes() -> String {
+    let codes: Vec<String> = EXIT_CODES.iter().map(|(code, what)| format!("{code} {what}")).collect();
+    format!("Exit codes: {}.", codes.join(", "))
+}
+
 impl Failure {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
         Self { kind, message: message.into() }
@@ -140,5 +158,17 @@ impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         let kind = if error.kind() == io::ErrorKind::BrokenPipe { Kind::ReaderGone } else { Kind::Other };
         Self::new(kind, format!("cannot write to standard output: {error}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_readme_lists_the_exit_codes() {
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let readme = include_str!("../../../README.md");
+        assert!(words(readme).contains(&exit_codes()), "{}", exit_codes());
     }
 }

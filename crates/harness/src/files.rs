@@ -16,6 +16,7 @@ use std::{
     fs,
     io::{BufWriter, Write},
     path::Path,
+    sync::OnceLock,
 };
 
 pub(crate) use calibration::Geometry;
@@ -28,6 +29,14 @@ pub(crate) use ply::write_points;
 pub(crate) use sidecar::{Origin, sidecar_of, write_sidecar};
 
 use crate::failure::Failure;
+
+/// What the names of temporary files begin with.
+static TEMPORARY: OnceLock<String> = OnceLock::new();
+
+/// Makes the names of this process's temporary files begin so; for finding them when it was killed.
+pub(crate) fn name_temporary(prefix: &str) {
+    TEMPORARY.get_or_init(|| prefix.to_owned());
+}
 
 /// Writes a file beside its final place and renames it, so that nobody ever sees half of it; `write` fills it.
 pub(crate) fn write_whole<E: std::fmt::Display>(
@@ -76,7 +85,10 @@ fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     // Temporary files are made for their owner alone; a result is for whom the user's mask says.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.prefix(".bp-").tempfile_in(folder).map_err(|error| Failure::writing(path, &error))
+    builder
+        .prefix(TEMPORARY.get().map_or(".bp-", |prefix| prefix))
+        .tempfile_in(folder)
+        .map_err(|error| Failure::writing(path, &error))
 }
 
 /// Fails where writing `output` would overwrite `other`.

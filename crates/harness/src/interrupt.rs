@@ -3,15 +3,21 @@
 
 use std::{
     ops::ControlFlow,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 
-use crate::{failure::Failure, tell};
+use crate::{failure::Failure, notes};
 
 static STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// The bar that is shown: the first of those that there are, as a batch has one that its pairs have theirs below.
+static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
 
 /// Makes Ctrl-C and SIGTERM stop the program at the next step, and a second one at once. For commands that take steps;
 /// others are stopped by the system.
@@ -33,48 +39,74 @@ pub(crate) fn check() -> Result<(), Failure> {
     if STOPPED.load(Ordering::Relaxed) { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
-/// A bar on standard error, with the time left; not drawn where that is no terminal.
-pub(crate) struct ProgressBar(indicatif::ProgressBar);
+/// Writes to standard error where a bar may be shown.
+pub(crate) fn beside_bar(write: impl FnOnce()) {
+    let bar = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    bar.unwrap_or_else(indicatif::ProgressBar::hidden).suspend(write);
+}
+
+/// A bar on standard error, with the time left; not drawn where that is no terminal, where only errors are told, or where
+/// another is shown.
+pub(crate) struct ProgressBar {
+    bar: indicatif::ProgressBar,
+    is_shown: bool,
+}
 
 impl ProgressBar {
-    /// A bar for so many message entries.
+    /// A bar for so much work: message entries, pairs.
     pub(crate) fn new(total: u64) -> Self {
+        let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if shown.is_some() || notes::is_quiet() {
+            return Self { bar: indicatif::ProgressBar::hidden(), is_shown: false };
+        }
         let bar = indicatif::ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(5));
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(500));
-        Self(bar)
+        *shown = Some(bar.clone());
+        Self { bar, is_shown: true }
     }
 
     /// Shows how much is done; breaks where the user has asked to stop.
     pub(crate) fn update(&self, done: u64) -> ControlFlow<()> {
-        self.0.set_position(done);
+        self.bar.set_position(done);
         if STOPPED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Starts from a run that was interrupted after so many entries: they say nothing about the time left.
+    /// Starts from a run that was interrupted after so much: it says nothing about the time left.
     pub(crate) fn resume_at(&self, done: u64) {
-        self.0.set_position(done);
-        self.0.reset_eta();
+        self.bar.set_position(done);
+        self.bar.reset_eta();
     }
 
-    /// Corrects how many entries there are.
+    /// Corrects how much there is.
     pub(crate) fn set_total(&self, total: u64) {
-        self.0.set_length(total);
+        self.bar.set_length(total);
     }
 
     /// Shows what is being done.
     pub(crate) fn message(&self, message: String) {
-        self.0.set_message(message);
+        self.bar.set_message(message);
     }
 
-    /// Prints a line above the bar.
+    /// Prints a line above the bar, unless only errors are told.
     pub(crate) fn line(&self, line: &str) {
-        self.0.suspend(|| tell(line));
+        if !notes::is_quiet() {
+            notes::tell(line);
+        }
     }
 
     /// Removes the bar.
     pub(crate) fn finish(&self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Drop for ProgressBar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        if self.is_shown {
+            *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        }
     }
 }

@@ -17,6 +17,7 @@ mod gate;
 mod interrupt;
 mod machine;
 mod matching;
+mod notes;
 pub mod record;
 pub mod report;
 pub mod reproduce;
@@ -25,16 +26,18 @@ mod speed;
 mod summary;
 mod threads;
 
-use std::{io::Write, process::ExitCode};
+use std::process::ExitCode;
 
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
+use notes::{note, tell};
 
 /// Runs the program; the exit codes are documented in `bp --help`.
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    notes::set_up(cli.quiet);
     match run(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -61,10 +64,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Gate(args) => command::gate(args),
         Command::Compare(args) => command::compare(args),
         Command::Export(args) => command::export(args),
+        Command::Completions(args) => command::completions(args),
+        Command::Man(args) => command::man(args),
     }
-}
-
-/// Prints a line on standard error. Where that is full or closed there is nobody left to tell.
-fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -25,8 +25,8 @@ use crate::{
     args::ReportArgs,
     failure::Failure,
     files::{write_text, write_whole},
+    note,
     record::{RECORD_FILE, Record, load},
-    tell,
 };
 use readme::{BEGIN, END};
 use results::Results;
@@ -101,7 +101,7 @@ pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
     match &args.readme {
         None => {
             write(run, &record)?;
-            tell(&format!("report: {}", run.join(PAGE_FILE).display()));
+            note(&format!("report: {}", run.join(PAGE_FILE).display()));
             Ok(())
         }
         Some(path) => {

@@ -16,11 +16,11 @@ use crate::{
     args::ReproduceArgs,
     backends::{self, Asked},
     failure::Failure,
-    interrupt, machine,
+    interrupt, machine, note,
     record::{Cell, Labelling, Outcome, Record, Run},
     report,
     scenes::Source,
-    tell, threads,
+    threads,
 };
 
 /// Loops of plain BP in a quick run: the fewest of which CFBP and CFCSBP make different numbers of loops. A whole k = L
@@ -53,17 +53,17 @@ fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
     threads::check(args.threads, &opened)?;
     let samples = args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES });
     let settings = settings(&source, &devices, args.quick, samples);
-    tell(&format!("scenes: {}", source.set.described));
+    note(&format!("scenes: {}", source.set.described));
     source.check()?;
     let machine = machine::machine(args.machine.as_deref());
     let mut storage = storage::open(&args.results, machine, settings)?;
     let outcome = run(&source, &mut devices, &mut storage, &|_| true);
     if outcome.as_ref().is_err_and(Failure::is_interrupted) {
-        tell(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
+        note(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
     }
     let late = outcome?;
     report::write(storage.folder(), storage.record())?;
-    tell(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
+    note(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
     check_cells(storage.record(), late)
 }
 

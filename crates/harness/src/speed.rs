@@ -20,7 +20,7 @@ use crate::{
     args::SpeedArgs,
     backends::{Asked, Opened},
     failure::Failure,
-    interrupt, machine, tell,
+    interrupt, machine, note,
 };
 use measure::Work;
 use record::{Contestant, SCHEMA_VERSION};
@@ -81,6 +81,6 @@ fn contestant(asked: &Asked) -> Result<Contestant, Failure> {
 /// How fast a device copies. One that cannot tell may still solve problems.
 fn copy_gb_per_s(opened: &Opened) -> Option<f64> {
     let rate = opened.device.copy_rate();
-    let told = rate.inspect_err(|error| tell(&format!("{}: its copy rate is not known: {error}", opened.name)));
+    let told = rate.inspect_err(|error| note(&format!("{}: its copy rate is not known: {error}", opened.name)));
     told.ok().flatten().map(|rate| rate / 1e9)
 }

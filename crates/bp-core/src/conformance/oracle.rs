@@ -144,6 +144,10 @@ impl Solver for OracleSolver {
         Ok(())
     }
 
+    fn keep_messages(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         steps.for_each(|step| match self.plan.settings().schedule {
             Schedule::Sync | Schedule::Checkerboard => self.step(grid, step),

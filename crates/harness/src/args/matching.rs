@@ -6,17 +6,19 @@ use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Sche
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{FinishArgs, OutputArgs, named, positive, switch, threads};
+use super::{FinishArgs, ManyArgs, OutputArgs, named, positive, switch, threads};
 use crate::{backends, files::PixelLimit};
 
 /// `bp match`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct MatchArgs {
     /// The left image: PNG, PGM, PPM or TIFF of 8 or 16 bits, JPEG, or PFM (0 to 1 or to 255), grey or colour; a noted
     /// orientation (EXIF) is ignored.
-    pub(crate) left: PathBuf,
+    #[arg(required_unless_present = "many", conflicts_with = "many")]
+    pub(crate) left: Option<PathBuf>,
     /// The right image, of the same size; rows must correspond (a rectified pair).
-    pub(crate) right: PathBuf,
+    #[arg(required_unless_present = "many", conflicts_with = "many")]
+    pub(crate) right: Option<PathBuf>,
     /// The disparity map to write: .pfm, .tif and .npy hold disparities in pixels as 32-bit floats, .png 256 times them
     /// in 16 bits (a disparity of 0 as 1, since 0 is unknown).
     #[arg(long, short, value_name = "MAP")]
@@ -25,7 +27,7 @@ pub(crate) struct MatchArgs {
     #[arg(long)]
     pub(crate) json: bool,
     /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "many")]
     pub(crate) messages_hash: bool,
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
@@ -36,11 +38,14 @@ pub(crate) struct MatchArgs {
     pub(crate) max_memory: Option<ByteSize>,
     /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
     /// later ones.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000), conflicts_with = "many")]
     pub(crate) repeat: u32,
     /// Ground truth of the left image: errors are measured where it is given.
-    #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
+    #[arg(long, value_name = "MAP", help_heading = "Ground truth", conflicts_with = "many")]
     pub(crate) ground_truth: Option<PathBuf>,
+    /// Many pairs with one command.
+    #[command(flatten)]
+    pub(crate) many: ManyArgs,
     /// What is done to the map after matching.
     #[command(flatten)]
     pub(crate) finish: FinishArgs,
@@ -56,7 +61,7 @@ pub(crate) struct MatchArgs {
 }
 
 /// What to run.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Plan")]
 pub(crate) struct PlanArgs {
     /// Algorithm: one of the thesis's five, or sweep, which is ours. [default: sweep]
@@ -140,7 +145,7 @@ impl PlanArgs {
 }
 
 /// How ground truth is read.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Ground truth")]
 pub(crate) struct TruthArgs {
     /// Ground truth of the right image: tells which pixels both cameras see.

@@ -8,7 +8,7 @@ use super::{named, positive};
 use crate::files::{Colours, PixelLimit};
 
 /// What is made of a map.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct OutputArgs {
     /// Write the map as a coloured picture.
@@ -28,7 +28,7 @@ pub(crate) struct OutputArgs {
 }
 
 /// How files are made: the same for every pair.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct MakingArgs {
     /// Colours of the picture; unknown pixels are black.

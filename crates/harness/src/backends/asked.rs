@@ -1,7 +1,7 @@
 //! The devices that a run asks for.
 
 use super::{Opened, choose, reason};
-use crate::{failure::Failure, tell};
+use crate::{failure::Failure, note};
 
 /// A backend that a run asks for.
 pub(crate) struct Asked {
@@ -22,7 +22,7 @@ pub(crate) fn open_all(names: &[String]) -> Result<Vec<Asked>, Failure> {
         }
         all.push(Asked { name, device: chosen.open().map_err(reason) });
     }
-    all.iter().filter_map(warning).for_each(|line| tell(&line));
+    all.iter().filter_map(warning).for_each(|line| note(&line));
     if all.iter().all(|asked| asked.device.is_err()) {
         return Err(Failure::unavailable(format!("--backend {}: none is available", names.join(","))));
     }

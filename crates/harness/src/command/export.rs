@@ -7,8 +7,8 @@ use crate::{
     export,
     failure::Failure,
     files::{check_distinct, check_writable, write_text},
+    note,
     record::{load, record_file},
-    tell,
 };
 
 /// Runs the command.
@@ -24,6 +24,6 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let text = export::export(&record, args.format)?;
     let Some(output) = &args.output else { return Ok(write!(std::io::stdout(), "{text}")?) };
     write_text(output, &text)?;
-    tell(&format!("written: {}", output.display()));
+    note(&format!("written: {}", output.display()));
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::print_json;
-use crate::{args::GateArgs, failure::Failure, gate, interrupt, tell, threads};
+use crate::{args::GateArgs, failure::Failure, gate, interrupt, note, threads};
 
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
@@ -28,7 +28,7 @@ fn print(args: &GateArgs, judgement: &impl Serialize, page: &str) -> Result<(), 
 }
 
 fn written(files: &str) -> Result<(), Failure> {
-    tell(&format!("written: {files}"));
+    note(&format!("written: {files}"));
     Ok(())
 }
 

@@ -9,17 +9,18 @@ use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair, survey::Survey};
 
 use super::{evaluate, print_json};
 use crate::{
-    args::MatchArgs,
+    args::{MatchArgs, PlanArgs},
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
-    matching::{self, Content, Making, Outputs, Report, Session, labels, plan, warnings},
-    tell, threads,
+    matching::{self, Content, Making, Outputs, Report, Session, batch, labels, plan, warnings},
+    note, threads,
 };
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     plan::check_options(&args.plan)?;
+    let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truth_options =
         args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
     if args.ground_truth.is_none() && truth_options {
@@ -32,18 +33,30 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
-    let pair = read_pair(&args.left, &args.right, limit)?;
+    let pair = read_pair(left, right, limit)?;
     let survey = Survey::of(&pair)?;
-    let range = labels::range(&args.plan, pair.size(), &survey, &outputs);
-    let plan = plan::plan(&args.plan, pair.size(), range.unwrap_or_else(|| labels::default(&args.plan, pair.size())))?;
-    let warnings = warnings::of(&survey, &plan, [&args.left, &args.right], range.is_none());
-    warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
-    outputs.check_model(&making, plan.model(), pair.size())?;
+    let (plan, warnings) = planned(&args.plan, [left, right], pair.size(), &survey, (&outputs, &making))?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
     let outputs = (&outputs, &making);
     let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), warnings, outputs))?;
     if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
+}
+
+/// The plan for a pair, which its outputs can hold, and what may be wrong with the two: that is told too.
+pub(crate) fn planned(
+    args: &PlanArgs,
+    files: [&Path; 2],
+    size: Size,
+    survey: &Survey,
+    (outputs, making): (&Outputs, &Making),
+) -> Result<(Plan, Vec<String>), Failure> {
+    let range = labels::range(args, size, survey, outputs);
+    let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
+    outputs.check_model(making, plan.model(), size)?;
+    let warnings = warnings::of(survey, &plan, files, range.is_none());
+    warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
+    Ok((plan, warnings))
 }
 
 /// Matches the pair and writes its files.
@@ -67,10 +80,11 @@ fn run(
 
 /// The files that the outputs are made of.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
-    [&args.left, &args.right].into_iter().chain(&args.outputs.making.calib).map(PathBuf::as_path)
+    [&args.left, &args.right].into_iter().flatten().chain(&args.outputs.making.calib).map(PathBuf::as_path)
 }
 
-fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {
+/// Reads both images of a pair.
+pub(crate) fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {
     let named = |error| Failure::input(format!("{} and {}: {error}", left.display(), right.display()));
     StereoPair::new(read_image(left, limit)?, read_image(right, limit)?).map_err(named)
 }

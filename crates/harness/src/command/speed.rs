@@ -12,9 +12,9 @@ use crate::{
     backends,
     failure::Failure,
     files::{check_new, check_writable, create_folder, write_new},
-    interrupt,
+    interrupt, note,
     speed::{self, CHART_NAMES, Outcome, Speed, charts},
-    tell, threads,
+    threads,
 };
 
 /// Runs the command.
@@ -79,7 +79,7 @@ impl Files {
             write_new(&text, svg)?;
         }
         write_new(&self.page, page)?;
-        tell(&format!("written: {} and {}", self.page.display(), self.record.display()));
+        note(&format!("written: {} and {}", self.page.display(), self.record.display()));
         Ok(())
     }
 }

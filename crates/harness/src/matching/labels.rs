@@ -8,7 +8,7 @@ use bp_core::{
 use super::Outputs;
 use crate::{
     args::{Labels, PlanArgs},
-    tell,
+    note,
 };
 
 /// The labels that the options ask for; what auto takes is told on standard error. `None` where auto finds none: the
@@ -22,7 +22,7 @@ pub(crate) fn range(args: &PlanArgs, size: Size, survey: &Survey, outputs: &Outp
         (Some(Labels::Auto), Some(seen)) => {
             let range = seen.range().starting_at(args.min_disparity.unwrap_or_else(|| first(seen, outputs)));
             let (labels, low, high) = (range.labels, range.min_disparity, range.max_disparity());
-            tell(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
+            note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
             Some(range)
         }
     }

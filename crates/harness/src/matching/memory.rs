@@ -2,7 +2,7 @@
 
 use bp_core::{DeviceKind, Error, Plan, Schedule, Size, Tiling};
 
-use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, tell};
+use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, note};
 
 /// What the program takes itself, with stacks of threads and what allocators keep.
 const PROGRAM: u64 = 16 << 20;
@@ -64,7 +64,7 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         }
         let bytes = |bytes| format!("{} bytes are needed", beside.peak(bytes));
         let whole = needed(plan).map_or_else(|error| error.to_string(), bytes);
-        tell(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
+        note(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
     }
     Ok(Fitted { tiling, peak_bytes })
 }

@@ -11,7 +11,7 @@ use crate::{
         Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
         check_writable, sidecar_of, write_points, write_sidecar,
     },
-    record, tell,
+    note, record,
 };
 
 /// Where the files of one map go.
@@ -172,7 +172,7 @@ fn write_depth(path: &Path, making: &Making, content: &Content<'_>, calibration:
         let unknown = depths.iter_mut().filter(beyond).map(|depth| *depth = DisparityMap::UNKNOWN).count();
         if unknown > 0 {
             let what = "pixels are farther than the 65535 mm that a 16-bit PNG holds, and unknown there";
-            tell(&format!("warning: {}: {unknown} {what}", path.display()));
+            note(&format!("warning: {}: {unknown} {what}", path.display()));
         }
     }
     let raster = Raster { size: content.map.size(), values: &depths, quantity: Quantity::Depth };

@@ -24,6 +24,8 @@ pub(crate) struct Session<'a> {
     opened: Opened,
     /// And how many bytes it was predicted to take.
     prepared: Option<(Tiled, u64)>,
+    /// Whether the next pair is the next frame of a video and starts from the messages of the one before.
+    pub(crate) starts_warm: bool,
 }
 
 /// What came out of a pair.
@@ -53,7 +55,7 @@ impl<'a> Session<'a> {
     pub(crate) fn open(args: &'a MatchArgs) -> Result<Self, Failure> {
         let opened = backends::open(&args.plan.backend, args.plan.device.as_deref())?;
         threads::check(args.plan.threads, &[&opened])?;
-        Ok(Self { args, opened, prepared: None })
+        Ok(Self { args, opened, prepared: None, starts_warm: false })
     }
 
     /// The device.
@@ -63,7 +65,7 @@ impl<'a> Session<'a> {
 
     /// Matches a pair as often as the options say.
     pub(crate) fn solve(&mut self, pair: &StereoPair, plan: Plan) -> Result<Answer, Failure> {
-        let Self { args, opened, prepared } = self;
+        let Self { args, opened, prepared, starts_warm } = self;
         let device = opened.device.as_ref();
         // What was prepared for another plan is freed first.
         let (mut tiled, peak_bytes) = match prepared.take().filter(|(tiled, _)| *tiled.plan() == plan) {
@@ -73,7 +75,7 @@ impl<'a> Session<'a> {
                 (Tiled::new(device, tiling)?, peak_bytes)
             }
         };
-        let (samples, last) = take_samples(args, &mut tiled, device, pair)?;
+        let (samples, last) = take_samples(args, &mut tiled, device, (pair, *starts_warm))?;
         let messages_sha256 = args.messages_hash.then(|| hash_messages(&mut tiled)).transpose()?;
         tiled.free_tiles();
         let answer = Answer {
@@ -102,7 +104,7 @@ fn take_samples(
     args: &MatchArgs,
     tiled: &mut Tiled,
     device: &dyn Device,
-    pair: &StereoPair,
+    (pair, starts_warm): (&StereoPair, bool),
 ) -> Result<(Vec<Sample>, Finished), Failure> {
     let updates = tiled.tiling().message_updates();
     let matches = u64::from(args.repeat) * if args.finish.needs_right() { 2 } else { 1 };
@@ -110,7 +112,8 @@ fn take_samples(
     let mut done = 0_u64;
     let mut solve = |pair: &StereoPair| {
         let observer = &mut |progress: Progress| bar.update(done.saturating_add(progress.done));
-        let times = tiled.solve_observed(device, pair, observer)?;
+        let solve = if starts_warm { Tiled::solve_warm_observed } else { Tiled::solve_observed };
+        let times = solve(tiled, device, pair, observer)?;
         done = done.saturating_add(updates);
         Ok::<_, Failure>((times, tiled.disparities()))
     };

@@ -10,10 +10,9 @@ use jiff::{Timestamp, Zoned};
 use crate::{
     failure::Failure,
     files::{create_folder, write_text},
-    machine,
+    machine, note,
     record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
-    tell,
 };
 
 /// Name of the file whose lock says that a run is at work.
@@ -39,7 +38,7 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
         let Some(lock) = lock(&folder)? else { continue };
         // Judged again under the lock: until then another process may have been at work on it.
         let Some(record) = interrupted(&folder) else { continue };
-        tell(&format!("going on with the interrupted run in {}", folder.display()));
+        note(&format!("going on with the interrupted run in {}", folder.display()));
         return Ok(Storage { folder, record, _lock: lock });
     }
     begin(results, program, machine, run)

@@ -3,6 +3,8 @@
 
 mod devices;
 mod folder;
+mod manners;
+mod many;
 mod outputs;
 mod recorded;
 mod running;

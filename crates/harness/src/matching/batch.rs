@@ -1,0 +1,91 @@
+//! Many pairs with one command: what is complete stays, what is not is matched, one pair after another on one device,
+//! while the next is read and the last is written.
+//!
+//! Nothing but files tells how far a batch has come, so that it may end at any moment and in any way: outputs are
+//! written whole, and after them the record of the pair, whole too, with checksums of what went in and came out.
+//! Processes that share the work share no file but those.
+
+mod job;
+mod record;
+mod run;
+mod shard;
+mod summary;
+
+use std::{io::Write as _, path::PathBuf};
+
+use bp_core::{Algorithm, Schedule};
+pub(crate) use shard::Shard;
+use summary::Summary;
+
+use super::{Making, pairs};
+use crate::{
+    args::{Also, FinishArgs, MatchArgs, OutputArgs},
+    command::print_json,
+    failure::Failure,
+    files, interrupt,
+    matching::batch::job::Job,
+    note, threads,
+};
+
+/// Matches all pairs that the options name.
+pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
+    check_options(args)?;
+    let args = &as_for_one(args);
+    let found = pairs::find(args)?;
+    found.notes.iter().for_each(|line| note(line));
+    let shard = args.many.shard.unwrap_or_default();
+    let making = Making::of(&args.outputs.making)?;
+    let jobs = job::jobs(args, &making, &found.pairs, shard)?;
+    interrupt::listen()?;
+    files::name_temporary(&format!(".bp-{}-", shard.file_part()));
+    job::clear_leftovers(args, &jobs, shard)?;
+    let settings = record::settings_sha256(args);
+    let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
+    let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
+    let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
+    due.iter().try_for_each(|job| job.check(&making))?;
+    if !due.is_empty() {
+        let ran = threads::run_on(args.plan.threads, || run::run(args, &making, &due, &settings));
+        ran.inspect_err(|failure| {
+            if failure.is_interrupted() {
+                note("the same command goes on with the pairs that are not complete");
+            }
+        })?;
+    }
+    let summary = Summary::of(args, shard, &jobs, jobs.len() - due.len())?;
+    let told = summary::path(&args.output, shard);
+    summary.write(&told)?;
+    if args.json {
+        print_json(&summary)?
+    } else {
+        write!(std::io::stdout(), "{}", summary.text())?
+    }
+    summary.outcome(&told)
+}
+
+/// Refuses options that are for one pair, and warm starts from messages that are not there.
+fn check_options(args: &MatchArgs) -> Result<(), Failure> {
+    let OutputArgs { picture, depth, points, .. } = &args.outputs;
+    if [picture, depth, points, &args.finish.confidence].into_iter().any(Option::is_some) {
+        let what = "--picture, --depth, --points and --confidence name one file";
+        return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points,confidence")));
+    }
+    let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
+    let both_views = args.finish.check.is_some() || args.many.also.contains(&Also::Confidence);
+    if args.many.warm_start.is_some() && (swept || both_views) {
+        let what = "--warm-start needs messages of the frame before, which the schedule sweep does not keep";
+        let advice = "take --algorithm cfbp --half-steps 10, say, and neither --check nor --also confidence";
+        return Err(Failure::usage(format!("{what}, and matching both views overwrites: {advice}")));
+    }
+    Ok(())
+}
+
+/// The options as they would be for one pair: that there is a file says what is computed and what memory that takes.
+fn as_for_one(args: &MatchArgs) -> MatchArgs {
+    let file = |what| args.many.also.contains(&what).then(PathBuf::new);
+    MatchArgs {
+        outputs: OutputArgs { depth: file(Also::Depth), points: file(Also::Points), ..args.outputs.clone() },
+        finish: FinishArgs { confidence: file(Also::Confidence), ..args.finish.clone() },
+        ..args.clone()
+    }
+}

@@ -1,0 +1,151 @@
+//! What is to be done for each pair, and whether it can be.
+
+use std::{
+    collections::{BTreeSet, HashMap, HashSet},
+    ffi::OsString,
+    fs,
+    path::{Display, Path, PathBuf},
+    time::{Duration, SystemTime},
+};
+
+use super::{Shard, record::PairRecord, summary};
+use crate::{
+    args::{Also, MatchArgs},
+    failure::Failure,
+    files::{MapFormat, create_folder},
+    matching::{Making, Outputs, pairs::Pair},
+};
+
+/// The folder of the records, in that of the outputs.
+const RECORDS: &str = "records";
+
+/// After how long nobody can be writing to a temporary file any more.
+const ABANDONED: Duration = Duration::from_hours(1);
+
+/// A pair, where its outputs go and where its record is.
+pub(super) struct Job {
+    pub(super) pair: Pair,
+    pub(super) calibration: Option<PathBuf>,
+    pub(super) outputs: Outputs,
+    /// Of the outputs, in the order in which their states are recorded.
+    pub(super) paths: Vec<PathBuf>,
+    pub(super) record: PathBuf,
+    /// Which of the pairs that are done together it belongs to.
+    pub(super) chain: usize,
+}
+
+/// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
+/// what is read.
+pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
+    // An ending that stands for no format is the fault of none of the pairs.
+    MapFormat::of(&Path::new("NAME").with_added_extension(&args.many.format))?;
+    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, making, index, pair)).collect();
+    check_apart(args, &jobs)?;
+    let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
+    folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
+    Ok(jobs)
+}
+
+impl Job {
+    fn new(args: &MatchArgs, making: &Making, index: usize, pair: &Pair) -> Self {
+        let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
+        let also = |what: Also, ending: &str| args.many.also.contains(&what).then(|| named(ending));
+        let outputs = Outputs {
+            map: Some(named(&args.many.format)),
+            picture: also(Also::Picture, "picture.png"),
+            depth: also(Also::Depth, &format!("depth.{}", args.many.format)),
+            points: also(Also::Points, "points.ply"),
+            confidence: also(Also::Confidence, &format!("confidence.{}", args.many.format)),
+        };
+        let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
+        let paths = outputs.paths(making);
+        let (calibration, chain) = (args.outputs.making.calib.clone(), index / args.many.chain());
+        Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
+    }
+
+    /// The files that the outputs are made of, the images first.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        [&self.pair.left, &self.pair.right].into_iter().chain(&self.calibration).map(PathBuf::as_path).collect()
+    }
+
+    /// Whether nothing is to be done.
+    pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
+        let record = PairRecord::read(&self.record);
+        record.is_some_and(|record| record.is_current(settings_sha256, &self.inputs(), &self.paths))
+    }
+
+    /// Fails where an output cannot be written.
+    pub(super) fn check(&self, making: &Making) -> Result<(), Failure> {
+        self.outputs.check(making, &self.inputs())
+    }
+
+    /// Removes what an earlier success has left: the outputs of a pair that fails now would be taken for its own.
+    pub(super) fn remove_outputs(&self) {
+        // One that is not there is as good as removed, and one that cannot be is told where it is written next.
+        self.paths.iter().for_each(|path| drop(fs::remove_file(path)));
+    }
+
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        self.paths.iter().map(PathBuf::as_path).chain([self.record.as_path()])
+    }
+}
+
+/// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.
+fn check_apart(args: &MatchArgs, jobs: &[Job]) -> Result<(), Failure> {
+    let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
+    let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(whole).collect();
+    let files = || jobs.iter().flat_map(|job| job.files().map(move |path| (job.pair.left.display(), path)));
+    if let Some((_, path)) = files().find(|(_, path)| inputs.contains(&whole(path))) {
+        let what = format!("{} would be overwritten, which is read", path.display());
+        return Err(Failure::usage(format!("{what}; choose another --output")));
+    }
+    let summary = summary::path(&args.output, Shard::default());
+    let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
+    for (owner, path) in files() {
+        if let Some(other) = owners.insert(key(path), owner.to_string()) {
+            return Err(clash(path, &other, &owner.to_string()));
+        }
+    }
+    let taken = |(owner, path): (Display<'_>, &Path)| {
+        let folder = path.ancestors().skip(1).find(|folder| owners.contains_key(&key(folder)))?;
+        Some(clash(folder, &owners[&key(folder)], &owner.to_string()))
+    };
+    files().find_map(taken).map_or(Ok(()), Err)
+}
+
+/// What tells paths apart: letters count as equal in both cases, as they do on some file systems.
+fn key(path: &Path) -> OsString {
+    path.as_os_str().to_ascii_lowercase()
+}
+
+fn clash(path: &Path, one: &str, other: &str) -> Failure {
+    let advice = "give them other names, by a list as --pairs takes it";
+    Failure::usage(format!("{}: {one} and {other} would both go there; {advice}", path.display()))
+}
+
+/// All folders that files of these jobs are in.
+fn folders(args: &MatchArgs, jobs: &[Job]) -> BTreeSet<PathBuf> {
+    let parents = jobs.iter().flat_map(Job::files).filter_map(Path::parent);
+    parents.chain([args.output.as_path()]).map(Path::to_owned).collect()
+}
+
+/// Removes temporary files of an earlier run of this shard that was killed, and of others that nobody writes any more.
+pub(super) fn clear_leftovers(args: &MatchArgs, jobs: &[Job], shard: Shard) -> Result<(), Failure> {
+    let own = format!(".bp-{}-", shard.file_part());
+    for folder in folders(args, jobs) {
+        let entries = fs::read_dir(&folder).map_err(|error| Failure::writing(&folder, &error))?;
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let is_old = || {
+                let modified = entry.metadata().and_then(|metadata| metadata.modified()).ok();
+                let age = modified.and_then(|modified| SystemTime::now().duration_since(modified).ok());
+                age.is_some_and(|age| age > ABANDONED)
+            };
+            let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
+            if is(&own) || (is(".bp-") && is_old()) {
+                fs::remove_file(entry.path()).map_err(|error| Failure::writing(&entry.path(), &error))?;
+            }
+        }
+    }
+    Ok(())
+}

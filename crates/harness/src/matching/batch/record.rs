@@ -1,0 +1,161 @@
+//! What is written of every pair when it is done, by which it is known to be complete.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read as _},
+    path::{Path, PathBuf},
+    time::{Duration, SystemTime},
+};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    args::{ManyArgs, MatchArgs, PlanArgs},
+    failure::Failure,
+    files::{hex, write_text},
+    record,
+};
+
+/// A file as it was when a pair was done.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct FileState {
+    path: PathBuf,
+    bytes: u64,
+    /// Nanoseconds since 1970, where the file system tells.
+    modified_ns: Option<u64>,
+    sha256: String,
+}
+
+/// What came of a pair.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Outcome {
+    /// Its outputs.
+    Done(Box<Done>),
+    /// Why there are none.
+    Failed(String),
+}
+
+/// What was done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Done {
+    pub(super) outputs: Vec<FileState>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) backend: String,
+    pub(super) device: record::Device,
+    pub(super) settings: record::Settings,
+    pub(super) energy: record::Energy,
+    pub(super) warnings: Vec<String>,
+    pub(super) times: PairTimes,
+}
+
+/// Milliseconds by the wall clock.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct PairTimes {
+    /// Reading both images, while another pair is matched.
+    pub(super) read_ms: f64,
+    /// From the images in memory to the map in memory.
+    pub(super) solve_ms: f64,
+    /// The same with all that matching needs besides: preparing a device for another size, the energy, the map.
+    pub(super) match_ms: f64,
+    /// Writing the outputs, while another pair is matched.
+    pub(super) write_ms: f64,
+}
+
+/// The record of a pair.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct PairRecord {
+    pub(super) name: PathBuf,
+    pub(super) left: PathBuf,
+    pub(super) right: PathBuf,
+    /// Of all settings that outputs depend on; see [`settings_sha256`].
+    pub(super) settings_sha256: String,
+    /// The images and the calibration, where they could be read.
+    pub(super) inputs: Vec<FileState>,
+    /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
+    pub(super) elapsed_ms: f64,
+    pub(super) outcome: Outcome,
+}
+
+impl PairRecord {
+    /// Reads a record; none where there is none or it is broken.
+    pub(super) fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&fs::read(path).ok()?).ok()
+    }
+
+    /// Writes it, whole or not at all.
+    pub(super) fn write(&self, path: &Path) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| Failure::writing(path, &error))?;
+        write_text(path, &(text + "\n"))
+    }
+
+    /// What was done, where it was.
+    pub(super) fn done(&self) -> Option<&Done> {
+        match &self.outcome {
+            Outcome::Done(done) => Some(done),
+            Outcome::Failed(_) => None,
+        }
+    }
+
+    /// Whether its outputs are still what these inputs and settings give.
+    pub(super) fn is_current(&self, settings_sha256: &str, inputs: &[&Path], outputs: &[PathBuf]) -> bool {
+        fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
+            then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
+        }
+        let done = self.done().filter(|_| self.settings_sha256 == settings_sha256);
+        done.is_some_and(|done| same(&self.inputs, inputs) && same(&done.outputs, outputs))
+    }
+}
+
+impl FileState {
+    /// A file as it is now.
+    pub(super) fn of(path: &Path) -> io::Result<Self> {
+        let path = std::path::absolute(path)?;
+        let mut file = File::open(&path)?;
+        let (bytes, modified_ns) = Self::stamp(&file.metadata()?);
+        let mut hash = Sha256::new();
+        let mut part = vec![0; 1 << 16];
+        loop {
+            match file.read(&mut part)? {
+                0 => break,
+                bytes => hash.update(&part[..bytes]),
+            }
+        }
+        Ok(Self { path, bytes, modified_ns, sha256: hex(&hash.finalize()) })
+    }
+
+    /// Whether `path` holds the same. A file that was not written to since is not read again.
+    fn is_still(&self, path: &Path) -> bool {
+        let Ok(metadata) = fs::metadata(path) else { return false };
+        let (bytes, modified_ns) = Self::stamp(&metadata);
+        let same_file = std::path::absolute(path).is_ok_and(|path| path == self.path);
+        let untouched = same_file && modified_ns.is_some() && modified_ns == self.modified_ns;
+        let same_contents = || Self::of(path).is_ok_and(|now| now.sha256 == self.sha256);
+        metadata.is_file() && bytes == self.bytes && (untouched || same_contents())
+    }
+
+    fn stamp(metadata: &fs::Metadata) -> (u64, Option<u64>) {
+        let since = |time: SystemTime| time.duration_since(SystemTime::UNIX_EPOCH).ok();
+        let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
+        (metadata.len(), metadata.modified().ok().and_then(since).and_then(nanoseconds))
+    }
+}
+
+/// SHA-256 of the program's version and of all options but those that change no output: where files lie, which device
+/// computes, and what is told.
+pub(super) fn settings_sha256(args: &MatchArgs) -> String {
+    let ManyArgs { format, also, warm_start, .. } = args.many.clone();
+    let of_output = MatchArgs {
+        left: None,
+        right: None,
+        output: PathBuf::new(),
+        json: false,
+        max_megapixels: 0,
+        many: ManyArgs { format, also, warm_start, ..ManyArgs::default() },
+        plan: PlanArgs { backend: String::new(), device: None, threads: None, ..args.plan.clone() },
+        ..args.clone()
+    };
+    hex(&Sha256::digest(format!("{} {of_output:?}", env!("CARGO_PKG_VERSION"))))
+}

@@ -1,0 +1,352 @@
+//! Many pairs: what is found, what is done again, what is told.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    process::Stdio,
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+use crate::folder::{Folder, text};
+
+/// Options that make matching tiny pairs quick.
+const TINY: &str = "--labels 12 --threads 1";
+
+/// Copies the folder's pair to these places.
+fn place(folder: &Folder, images: &[&str]) {
+    for image in images {
+        let to = folder.path(image);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        let is_left =
+            ["view1", "im2", "im0", "imL", "left", "image_2", "image_0"].iter().any(|name| image.contains(name));
+        fs::copy(folder.path(if is_left { "left.png" } else { "right.png" }), to).unwrap();
+    }
+}
+
+/// All files below a folder, relative to it.
+fn files(folder: &Path) -> BTreeSet<PathBuf> {
+    let below = |entry: fs::DirEntry| {
+        let name = PathBuf::from(entry.file_name());
+        if entry.path().is_dir() {
+            files(&entry.path()).into_iter().map(|file| name.join(file)).collect()
+        } else {
+            vec![name]
+        }
+    };
+    fs::read_dir(folder).unwrap().flat_map(|entry| below(entry.unwrap())).collect()
+}
+
+fn maps(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let is_map = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "pfm");
+    files(folder).into_iter().filter(is_map).map(|path| (path.clone(), fs::read(folder.join(path)).unwrap())).collect()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    maps(folder).into_iter().map(|(path, _)| path.with_extension("").display().to_string()).collect()
+}
+
+#[test]
+fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
+    let folder = Folder::new();
+    place(
+        &folder,
+        &["in/a/view1.png", "in/a/view5.png", "in/b/im0.png", "in/b/im1.png", "in/c/imL.png", "in/c/imR.png"],
+    );
+    place(
+        &folder,
+        &["in/d/im2.png", "in/d/im6.png", "in/d/im0.png", "in/d/im1.png", "in/e/left.png", "in/e/right.png"],
+    );
+    place(&folder, &["in/k/image_2/f2.png", "in/k/image_3/f2.png", "in/k/image_2/f10.png", "in/k/image_3/f10.png"]);
+    place(&folder, &["in/k/image_0/f2.png", "in/k/image_1/f2.png", "in/k/image_2/f3.png"]);
+    place(&folder, &["in/v/left/1.png", "in/v/right/1.png", "in/l/view5.png", "in/m/left/1.png"]);
+    let output = folder.run(&format!("match --pairs in --output in/out {TINY}"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let expected =
+        ["a/view1", "b/im0", "c/imL", "d/im2", "e/left", "k/image_0/f2", "k/image_2/f10", "k/image_2/f2", "v/left/1"];
+    assert_eq!(names(&folder.path("in/out")), expected);
+    let told = text(&output.stderr);
+    for words in ["image_2/f3.png", "l/view5.png has no view1.png", "m/left has no folder right"] {
+        assert!(told.contains(words), "{told}");
+    }
+    assert!(told.contains("im2.png and im6.png are taken as its pair, not im0.png and im1.png"), "{told}");
+    assert_eq!(told.lines().count(), 4, "{told}");
+    // What was written is not searched, nothing is done twice, and a pair alone gives the same map.
+    let again = folder.json(&format!("match --pairs in --output in/out --json {TINY}"));
+    assert_eq!((&again["pairs"], &again["skipped"]), (&9.into(), &9.into()));
+    folder.run(&format!("match in/d/im2.png in/d/im6.png --output alone.pfm {TINY}"));
+    assert_eq!(fs::read(folder.path("alone.pfm")).unwrap(), fs::read(folder.path("in/out/d/im2.pfm")).unwrap());
+    fs::create_dir(folder.path("empty")).unwrap();
+    folder.fails("match --pairs empty --output out", 3, &["empty", "no pair"]);
+}
+
+#[test]
+fn lists_name_maps_and_broken_lines_are_told_by_number() {
+    let folder = Folder::new();
+    place(&folder, &["a b/left.png", "a b/right.png"]);
+    fs::write(folder.path("list"), "a b/left.png\ta b/right.png\nleft.png right.png x/y\n").unwrap();
+    assert!(folder.run(&format!("match --pairs list --output out --also picture {TINY}")).status.success());
+    let expected = [
+        "a b/left.pfm",
+        "a b/left.pfm.json",
+        "x/y.pfm.json",
+        "a b/left.picture.png",
+        "records/a b/left.json",
+        "records/x/y.json",
+        "summary.json",
+    ];
+    let expected: BTreeSet<_> = expected.into_iter().chain(["x/y.pfm", "x/y.picture.png"]).map(PathBuf::from).collect();
+    assert_eq!(files(&folder.path("out")), expected);
+    fs::write(folder.path("bad"), "left.png right.png\nleft.png\n").unwrap();
+    folder.fails("match --pairs bad --output no", 3, &["bad:2", "left, right"]);
+    let mut piped = folder.command(&format!("match --pairs - --output piped --format png {TINY}"));
+    let piped = piped.stdin(fs::File::open(folder.path("list")).unwrap()).output().unwrap();
+    assert!(piped.status.success() && folder.path("piped/x/y.png").exists());
+}
+
+#[test]
+fn outputs_that_would_collide_are_refused_before_the_work() {
+    let folder = Folder::new();
+    let list = |lines: &str| fs::write(folder.path("list"), lines).unwrap();
+    for (lines, options, words) in [
+        ("left.png right.png\nright.png left.png left\n", "", ["left.pfm", "right.png"]),
+        ("left.png right.png a\nright.png left.png A\n", "", ["A.pfm", "names"]),
+        ("left.png right.png a\nright.png left.png a.pfm/b\n", "", ["a.pfm", "right.png"]),
+        (
+            "left.png right.png a\nright.png left.png a.picture\n",
+            "--also picture --format png",
+            ["a.picture.png", "names"],
+        ),
+        ("left.png right.png\n", "--format png --output .", ["left.png", "overwritten"]),
+    ] {
+        list(lines);
+        let output = if options.contains("--output") { "" } else { "--output out" };
+        folder.fails(&format!("match --pairs list {output} {options} {TINY}"), 2, &words);
+    }
+    list("left.png right.png\n");
+    folder.fails("match --pairs list --output out --format tiff.gz", 2, &["tiff.gz"]);
+    for options in [
+        "left.png right.png --shard 1/2",
+        "left.png right.png --pairs list",
+        "--pairs list --shard 3/2",
+        "--pairs list --repeat 2",
+        "--pairs list --confidence c.pfm",
+    ] {
+        folder.fails(&format!("match --output out {options}"), 2, &["--"]);
+    }
+}
+
+#[test]
+fn only_what_changed_is_done_again() {
+    let folder = Folder::new();
+    place(
+        &folder,
+        &["in/left/1.png", "in/right/1.png", "in/left/2.png", "in/right/2.png", "in/left/3.png", "in/right/3.png"],
+    );
+    let done = |options: &str| {
+        let report = folder.json(&format!("match --pairs in --output out --json {TINY} {options}"));
+        let written = fs::read_to_string(folder.path("out/summary.json")).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), report);
+        3 - report["skipped"].as_u64().unwrap()
+    };
+    assert_eq!((done(""), done(""), done("--backend scalar"), done("--force")), (3, 0, 0, 3));
+    fs::copy(folder.path("truth.png"), folder.path("in/right/2.png")).unwrap();
+    assert_eq!((done(""), done("")), (1, 0));
+    // As `touch` does: the same contents.
+    let bytes = fs::read(folder.path("in/left/1.png")).unwrap();
+    fs::write(folder.path("in/left/1.png"), bytes).unwrap();
+    assert_eq!(done(""), 0);
+    fs::remove_file(folder.path("out/left/1.pfm")).unwrap();
+    fs::write(folder.path("out/left/3.pfm"), "").unwrap();
+    assert_eq!((done(""), done("")), (2, 0));
+    fs::write(folder.path("out/records/left/2.json"), "{").unwrap();
+    assert_eq!((done(""), done("--slope 3"), done("--slope 3"), done("--slope 3 --also picture")), (1, 3, 0, 3));
+    fs::rename(folder.path("out"), folder.path("moved")).unwrap();
+    fs::rename(folder.path("moved"), folder.path("out")).unwrap();
+    assert_eq!(done("--slope 3 --also picture"), 0);
+}
+
+#[test]
+fn a_pair_that_fails_is_told_recorded_and_tried_again() {
+    let folder = Folder::new();
+    fs::write(
+        folder.path("list"),
+        "left.png right.png a\nleft.png wide.png b\nno.png right.png c\nright.png left.png d\n",
+    )
+    .unwrap();
+    let run = format!("match --pairs list --output out {TINY}");
+    let output = folder.run(&run);
+    assert_eq!(output.status.code(), Some(3));
+    let told = text(&output.stderr);
+    for words in ["b: left.png and wide.png", "c: no.png", "2 of 4 pairs failed", "summary.json"] {
+        assert!(told.contains(words), "{told}");
+    }
+    let summary: Value = serde_json::from_slice(&fs::read(folder.path("out/summary.json")).unwrap()).unwrap();
+    assert_eq!((&summary["done"], &summary["failures"][0]["name"]), (&2.into(), &"b".into()));
+    assert!(summary["pairs_per_second"].as_f64().unwrap() > 0.0);
+    assert_eq!(names(&folder.path("out")), ["a", "d"]);
+    fs::copy(folder.path("left.png"), folder.path("no.png")).unwrap();
+    fs::copy(folder.path("right.png"), folder.path("wide.png")).unwrap();
+    let report = folder.json(&format!("{run} --json"));
+    assert_eq!(
+        (&report["done"], &report["skipped"], &report["failures"]),
+        (&4.into(), &2.into(), &Value::Array(vec![]))
+    );
+    // A map of before is not left to be taken for the answer to what fails now.
+    fs::write(folder.path("no.png"), "broken").unwrap();
+    assert_eq!(folder.run(&run).status.code(), Some(3));
+    assert_eq!(names(&folder.path("out")), ["a", "b", "d"]);
+}
+
+#[test]
+fn shards_share_all_pairs_in_one_folder() {
+    let folder = Folder::new();
+    let list: String = (0..7).map(|index| format!("left.png right.png p{index}\n")).collect();
+    fs::write(folder.path("list"), list).unwrap();
+    let shards: Vec<_> = (1..=3)
+        .map(|shard| {
+            folder
+                .command(&format!("match --pairs list --output out --json --shard {shard}/3 {TINY}"))
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap()
+        })
+        .collect();
+    assert!(shards.into_iter().all(|mut shard| shard.wait().unwrap().success()));
+    let count = |name: &str| {
+        let summary: Value = serde_json::from_slice(&fs::read(folder.path(name)).unwrap()).unwrap();
+        summary["done"].as_u64().unwrap()
+    };
+    assert_eq!([1, 2, 3].map(|shard| count(&format!("out/summary-{shard}-of-3.json"))), [3, 2, 2]);
+    let whole = folder.json(&format!("match --pairs list --output out --json {TINY}"));
+    assert_eq!((&whole["done"], &whole["skipped"]), (&7.into(), &7.into()));
+}
+
+/// Pairs that take a while, so that there is something to interrupt.
+fn slow(folder: &Folder, pairs: usize) -> String {
+    let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
+    for (name, shift) in [("l.pgm", 0), ("r.pgm", 3)] {
+        image::GrayImage::from_fn(160, 120, |x, y| image::Luma([noise(x + shift, y)])).save(folder.path(name)).unwrap();
+    }
+    let list: String = (0..pairs).map(|index| format!("l.pgm r.pgm p{index}\n")).collect();
+    fs::write(folder.path("list"), list).unwrap();
+    "match --pairs list --labels 16 --algorithm cfbp --threads 1".to_owned()
+}
+
+fn wait_for(what: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !what() && start.elapsed() < Duration::from_secs(60) {
+        sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_batch_that_is_killed_goes_on_and_ends_as_if_it_had_not_been() {
+    let folder = Folder::new();
+    let run = slow(&folder, 8);
+    assert!(folder.run(&format!("{run} --output whole")).status.success());
+    for done in [0, 1, 3, 5] {
+        let mut child = folder.command(&format!("{run} --output out")).stdout(Stdio::null()).spawn().unwrap();
+        wait_for(|| folder.path(&format!("out/records/p{done}.json")).exists());
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    fs::write(folder.path("out/.bp-1-of-1-left"), "half").unwrap();
+    let report = folder.json(&format!("{run} --output out --json"));
+    assert!(report["skipped"].as_u64().unwrap() >= 5, "{report}");
+    assert_eq!(report["done"], 8);
+    assert_eq!(maps(&folder.path("out")), maps(&folder.path("whole")));
+    assert_eq!(files(&folder.path("out")), files(&folder.path("whole")));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_batch_between_pairs_without_a_trace() {
+    let folder = Folder::new();
+    let run = slow(&folder, 200);
+    for signal in ["INT", "TERM"] {
+        let child = folder.command(&format!("{run} --output out")).stderr(Stdio::piped()).spawn().unwrap();
+        let before = maps(&folder.path("")).len();
+        wait_for(|| folder.path("out").exists() && maps(&folder.path("out")).len() > before + 2);
+        let kill = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("the same command goes on"), "{}", text(&output.stderr));
+        let found = files(&folder.path("out"));
+        let maps = maps(&folder.path("out")).len();
+        assert!(maps > 0 && maps < 200 && found.len() == 3 * maps, "{found:?}");
+    }
+}
+
+#[test]
+fn frames_are_matched_in_order_and_gaps_are_told() {
+    let folder = Folder::new();
+    place(&folder, &["l/left_8.png", "l/left_9.png", "l/left_10.png", "l/left_13.png", "l/left_x.png"]);
+    for frame in ["8", "9", "10", "13", "14"] {
+        fs::copy(folder.path("right.png"), folder.path(&format!("l/r{frame}.png"))).unwrap();
+    }
+    let output = folder
+        .command(&format!("match --output out --json {TINY} --video l/left_%d.png l/r%02d.png"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(names(&folder.path("out")), ["10", "13", "8", "9"]);
+    let told = text(&output.stderr);
+    assert!(told.contains("r14.png has no left frame 14") && told.contains("frames 11 to 12 are missing"), "{told}");
+    assert_eq!(told.lines().count(), 2, "{told}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["solved_per_second"].as_f64().unwrap() >= report["pairs_per_second"].as_f64().unwrap());
+    let order =
+        |frame: &str| fs::metadata(folder.path(&format!("out/records/{frame}.json"))).unwrap().modified().unwrap();
+    assert!(["8", "9", "10", "13"].map(order).is_sorted());
+    let globbed = folder.run(&format!("match --output globbed {TINY} --video l/left_*.png l/r*.png"));
+    assert!(globbed.status.success(), "{}", text(&globbed.stderr));
+    assert_eq!(maps(&folder.path("globbed")), maps(&folder.path("out")));
+    for patterns in ["left.png r%d.png", "l/%s.png r%d.png", "l/*/*.png r%d.png"] {
+        folder.fails(&format!("match --output no --video {patterns}"), 2, &["--video", "%04d"]);
+    }
+}
+
+#[test]
+fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
+    let folder = Folder::new();
+    for frame in 0..7 {
+        place(&folder, &[&format!("v/left/{frame}.png"), &format!("v/right/{frame}.png")]);
+        let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
+        let view = |shift: u32| image::GrayImage::from_fn(40, 24, |x, y| image::Luma([noise(x + shift + frame, y)]));
+        view(0).save(folder.path(&format!("v/left/{frame}.png"))).unwrap();
+        view(2 + 3 * (frame % 3)).save(folder.path(&format!("v/right/{frame}.png"))).unwrap();
+    }
+    let options = "--algorithm cfbp --half-steps 1 --slope 9 --truncation 60 --labels 12 --threads 1";
+    let run = |output: &str, rest: &str| {
+        folder.json(&format!("match --video v/left/%d.png v/right/%d.png --json {options} --output {output} {rest}"))
+    };
+    run("cold", "");
+    assert_eq!(run("warm", "--warm-start=3")["done"], 7);
+    let whole = maps(&folder.path("warm"));
+    let same: Vec<bool> = maps(&folder.path("cold")).iter().zip(&whole).map(|(cold, warm)| cold == warm).collect();
+    assert!(same[0] && same[3] && same[6] && !same.iter().all(|&same| same), "{same:?}");
+    fs::remove_file(folder.path("warm/4.pfm")).unwrap();
+    assert_eq!(run("warm", "--warm-start=3")["skipped"], 4);
+    assert_eq!(maps(&folder.path("warm")), whole);
+    assert_eq!(
+        [1, 2].map(|shard| run("shared", &format!("--warm-start=3 --shard {shard}/2"))["done"].as_u64().unwrap()),
+        [4, 3]
+    );
+    assert_eq!(maps(&folder.path("shared")), whole);
+    // A frame that fails at the head of a chain leaves no way for another chain's messages to come in.
+    fs::write(folder.path("v/left/3.png"), "broken").unwrap();
+    let broken = "match --video v/left/%d.png v/right/%d.png --warm-start=3 --algorithm cfbp --half-steps 1 --slope 9 --truncation 60 --labels 12";
+    for output in ["warm", "anew"] {
+        assert_eq!(folder.run(&format!("{broken} --output {output}")).status.code(), Some(3));
+    }
+    assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
+    for options in ["", "--algorithm cfbp --check left-right", "--algorithm cfbp --also confidence"] {
+        let run = format!("match --video l%d r%d --output no --warm-start {options}");
+        folder.fails(&run, 2, &["--warm-start", "cfbp", "--check"]);
+    }
+}
