@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-pub use tiling::{HALO, Needed, Span, Tile, Tiling};
+pub use tiling::{HALO, Likeness, Needed, Span, Tile, Tiling};
 
 use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 

@@ -85,11 +85,8 @@ impl Beside {
 
 /// What a tiling is, in words.
 fn described(tiling: &Tiling) -> String {
-    let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
-    if tiling.is_exact() {
-        return format!("{rows} strips of up to {size} pixels, with the same answer,");
-    }
-    format!("{columns}x{rows} tiles of up to {size} pixels, with nearly the same answer (docs/big-images.md),")
+    let ((columns, rows), size, answer) = (tiling.counts(), tiling.tile_size(), tiling.likeness().name());
+    format!("{columns}x{rows} tiles of up to {size} pixels, which give {answer} (docs/big-images.md),")
 }
 
 /// How many bytes the program may hold.
