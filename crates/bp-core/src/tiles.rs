@@ -9,7 +9,7 @@ use std::{
 
 pub use tiling::{HALO, Likeness, Needed, Span, Tile, Tiling};
 
-use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
+use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, Stage, StereoPair, Times, memory};
 
 /// A tiled plan prepared on a device, ready to match pairs of its size one after another. A single tile is matched as
 /// [`Matcher`] does it, without a copy of the pair.
@@ -76,10 +76,10 @@ impl Tiled {
         for tile in self.tiling.tiles() {
             let mut matcher = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
-            let added = self.solve_tile(&mut matcher, pair, &tile, observe)?;
-            times = sum(&times, &added);
+            let solved = self.solve_tile(&mut matcher, pair, &tile, observe);
             done += matcher.plan().message_updates();
             self.matcher = Some(matcher);
+            times = sum(&times, &solved?);
         }
         times.total = start.elapsed();
         Ok(times)
@@ -156,9 +156,11 @@ impl Tiled {
     }
 }
 
+type Stages = [Duration; Stage::ALL.len()];
+
 /// Sums of the stages of two solves.
 fn sum(a: &Times, b: &Times) -> Times {
-    let both = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
+    let both = |a: Stages, b: Stages| std::array::from_fn(|stage| a[stage] + b[stage]);
     let device = match (a.device, b.device) {
         (Some(a), Some(b)) => Some(both(a, b)),
         (one, other) => one.or(other),
