@@ -2,14 +2,11 @@
 
 mod tiling;
 
-use std::{
-    ops::ControlFlow,
-    time::{Duration, Instant},
-};
+use std::{ops::ControlFlow, time::Instant};
 
 pub use tiling::{HALO, Likeness, Needed, Span, Tile, Tiling};
 
-use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, Stage, StereoPair, Times, memory};
+use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 
 /// A tiled plan prepared on a device, ready to match pairs of its size one after another. A single tile is matched as
 /// [`Matcher`] does it, without a copy of the pair.
@@ -79,7 +76,7 @@ impl Tiled {
             let solved = self.solve_tile(&mut matcher, pair, &tile, observe);
             done += matcher.plan().message_updates();
             self.matcher = Some(matcher);
-            times = sum(&times, &solved?);
+            times += solved?;
         }
         times.total = start.elapsed();
         Ok(times)
@@ -154,16 +151,4 @@ impl Tiled {
             None => Err(Error::Plan("messages are kept of images that are matched as a whole only")),
         }
     }
-}
-
-type Stages = [Duration; Stage::ALL.len()];
-
-/// Sums of the stages of two solves.
-fn sum(a: &Times, b: &Times) -> Times {
-    let both = |a: Stages, b: Stages| std::array::from_fn(|stage| a[stage] + b[stage]);
-    let device = match (a.device, b.device) {
-        (Some(a), Some(b)) => Some(both(a, b)),
-        (one, other) => one.or(other),
-    };
-    Times { wall: both(a.wall, b.wall), device, total: a.total + b.total }
 }

@@ -30,7 +30,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let (low, high) = map.range().unwrap_or((0.0, 0.0));
     outputs.check_range(low, high)?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;
-    outputs.write(&making, &Content { map: &map, image: image.as_ref(), plan: None, inputs: &inputs })
+    outputs.write(&making, &Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs })
 }
 
 /// Reads the left image of a map.

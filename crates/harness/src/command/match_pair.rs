@@ -26,7 +26,8 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let outputs = Outputs::of(Some(&args.output), &args.outputs);
+    let confidence = args.finish.confidence.clone();
+    let outputs = Outputs { confidence, ..Outputs::of(Some(&args.output), &args.outputs) };
     let making = Making::of(&args.outputs.making)?;
     let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
@@ -59,7 +60,8 @@ fn run(
     let errors: Option<Errors> = truth.map(|truth| truth.errors(&answer.map)).transpose()?;
     let inputs: Vec<&Path> = sources(args).collect();
     let (image, plan) = (Some(pair.left()), Some(&answer.settings));
-    outputs.write(making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+    let confidence = answer.confidence.as_deref();
+    outputs.write(making, &Content { map: &answer.map, confidence, image, plan, inputs: &inputs })?;
     Ok(Report::new(pair, session.opened(), answer, errors, warnings, outputs.paths(making)))
 }
 

@@ -25,6 +25,8 @@ pub(crate) struct Outputs {
     pub(crate) depth: Option<PathBuf>,
     /// A point cloud.
     pub(crate) points: Option<PathBuf>,
+    /// How far the map can be trusted.
+    pub(crate) confidence: Option<PathBuf>,
 }
 
 /// How files are made, the same for every pair.
@@ -40,6 +42,8 @@ pub(crate) struct Making {
 pub(crate) struct Content<'a> {
     /// The map.
     pub(crate) map: &'a DisparityMap,
+    /// How far it can be trusted, `[height][width]`.
+    pub(crate) confidence: Option<&'a [f32]>,
     /// The left image, where points take its colours.
     pub(crate) image: Option<&'a Image>,
     /// What was matched, where it was.
@@ -73,7 +77,8 @@ impl Outputs {
     /// What the options ask for, beside a map.
     pub(crate) fn of(map: Option<&Path>, args: &OutputArgs) -> Self {
         let OutputArgs { picture, depth, points, .. } = args;
-        Self { map: map.map(Into::into), picture: picture.clone(), depth: depth.clone(), points: points.clone() }
+        let [picture, depth, points] = [picture, depth, points].map(Clone::clone);
+        Self { map: map.map(Into::into), picture, depth, points, confidence: None }
     }
 
     /// Fails where a file could not be written, would overwrite an input or another output, or lacks what it is made of;
@@ -117,6 +122,10 @@ impl Outputs {
         let disparities = Raster::disparities(content.map);
         self.map.as_deref().map_or(Ok(()), |path| write_map(path, &disparities, making, content, None))?;
         self.picture.as_deref().map_or(Ok(()), |path| making.picture.write(path, content.map))?;
+        if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
+            let raster = Raster { size: content.map.size(), values, quantity: Quantity::Confidence };
+            write_map(path, &raster, making, content, None)?;
+        }
         let Some(calibration) = making.calibration(content.map.size())? else { return Ok(()) };
         self.depth.as_deref().map_or(Ok(()), |path| write_depth(path, making, content, &calibration))?;
         match (&self.points, content.image) {
@@ -128,13 +137,13 @@ impl Outputs {
     /// All files that are written.
     pub(crate) fn paths(&self, making: &Making) -> Vec<PathBuf> {
         let sidecars = self.maps().filter(|_| making.sidecar).map(sidecar_of);
-        let files = [&self.map, &self.picture, &self.depth, &self.points].into_iter().flatten();
+        let files = [&self.map, &self.picture, &self.depth, &self.points, &self.confidence].into_iter().flatten();
         files.cloned().chain(sidecars).collect()
     }
 
     /// The files that hold a value a pixel.
     fn maps(&self) -> impl Iterator<Item = &Path> {
-        [&self.map, &self.depth].into_iter().flatten().map(PathBuf::as_path)
+        [&self.map, &self.depth, &self.confidence].into_iter().flatten().map(PathBuf::as_path)
     }
 }
 
