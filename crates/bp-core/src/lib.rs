@@ -63,4 +63,4 @@ pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
 pub use plan::{Buffer, MAX_GRIDS, Plan};
 pub use settings::{Algorithm, BAND_ROWS, Cut, MessageStart, Schedule, Settings};
-pub use tiles::{HALO, Needed, Span, Tile, Tiled, Tiling};
+pub use tiles::{HALO, Likeness, Needed, Span, Tile, Tiled, Tiling};

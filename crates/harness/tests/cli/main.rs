@@ -218,10 +218,11 @@ fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
 }
 
 #[test]
-fn more_memory_than_there_is_is_refused_before_it_is_taken() {
+fn more_memory_than_is_allowed_is_refused_before_it_is_taken() {
     let folder = Folder::new();
     fs::write(folder.path("big.pgm"), [b"P5\n20000 4000\n255\n".as_slice(), &vec![0; 80_000_000]].concat()).unwrap();
-    folder.fails("match big.pgm big.pgm -o a.pfm --labels 1024", 6, &["bytes are needed", "--labels"]);
+    let words = ["bytes are needed", "--max-memory", "--labels"];
+    folder.fails("match big.pgm big.pgm -o a.pfm --labels 1024 --max-memory 1GiB", 6, &words);
 }
 
 #[test]
