@@ -221,7 +221,7 @@ impl Composer<'_> {
             colour: nodes.colour as u32,
             slope: model.slope().into(),
             truncation: model.truncation().into(),
-            step: model.step().into(),
+            step: model.smoothness().step().into(),
             clip: self.plan.clip(nodes.grid).into(),
             min_disparity: model.min_disparity(),
             padding_cost: model.clip().into(),

@@ -43,6 +43,7 @@ mod metrics;
 mod model;
 mod plan;
 mod settings;
+mod smoothness;
 pub mod synthetic;
 pub mod worked_example;
 
@@ -57,3 +58,4 @@ pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{MAX_LABELS, MAX_TRUNCATION, Model, Profile};
 pub use plan::{Buffer, MAX_GRIDS, Plan};
 pub use settings::{Algorithm, BAND_ROWS, Cut, MessageStart, Schedule, Settings};
+pub use smoothness::Smoothness;

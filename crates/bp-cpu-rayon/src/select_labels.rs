@@ -236,7 +236,7 @@ fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
 /// The smoothness cost of distances between labels; the product fits, since distances beyond K div s count as that plus 1.
 #[inline(always)]
 fn smoothness<S: Simd>(simd: S, model: &Model, distance: S::u8s) -> S::u8s {
-    let (step, truncation) = (model.step(), model.truncation());
+    let (step, truncation) = (model.smoothness().step(), model.truncation());
     let far = truncation.checked_div(step).map_or(0, |far| far + 1);
     (distance.min(S::u8s::splat(simd, far)) * S::u8s::splat(simd, step)).min(S::u8s::splat(simd, truncation))
 }

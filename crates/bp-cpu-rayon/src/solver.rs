@@ -189,7 +189,7 @@ impl Grid<'_> {
             masks: layout.masks(plane),
             nodes: layout.nodes(plane),
             lanes: layout.lanes,
-            step: model.step(),
+            step: model.smoothness().step(),
             truncation: model.truncation(),
         }
     }

@@ -141,8 +141,10 @@ impl Composer<'_> {
     }
 
     pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
-        let constants =
-            vec![("SATURATING", self.saturates(3, self.plan.model().step())), ("SELECTIVE", selective.into())];
+        let constants = vec![
+            ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
+            ("SELECTIVE", selective.into()),
+        ];
         Pipeline { kernel: Kernel::UpdateMessages, constants }
     }
 

@@ -29,6 +29,7 @@ pub(crate) fn plan(args: &PlanArgs, size: Size) -> Result<Plan, Failure> {
     let model = Model::new(args.profile, labels)?.with_min_disparity(args.min_disparity)?;
     let slope = args.slope.unwrap_or(model.slope());
     let model = model.with_smoothness(slope, args.truncation.unwrap_or(model.truncation()))?;
+    let model = model.with_weak_edges(args.edge_threshold);
     Ok(Plan::new(size, model, settings(args, size, labels))?)
 }
 
