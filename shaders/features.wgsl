@@ -1,4 +1,5 @@
-// What the profile compares, of every pixel of one image: its grey value, its census code, or its colour.
+// What the profile compares, of every pixel of one image: its grey value, its census code, its colour, or its grey value
+// with what lies beside it.
 
 // Red, green and blue bytes of all pixels, without gaps, and of those of so many rows above and below the image.
 @group(0) @binding(1) var<storage, read> image: array<u32>;
@@ -27,12 +28,13 @@ fn grey_aside(x: u32, dx: i32, row: u32) -> u32 {
     return grey(u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1)), row);
 }
 
-// A bit for each neighbour in row order, from the highest bit: whether it is lighter (Zabih and Woodfill 1994).
-fn census(x: u32, row: u32) -> u32 {
+// A bit for each neighbour up to so many columns and rows away, in row order, from the highest bit: whether it is lighter
+// (Zabih and Woodfill 1994).
+fn census(x: u32, row: u32, reach: i32) -> u32 {
     let centre = grey(x, row);
     var code = 0u;
-    for (var dy = -1; dy <= 1; dy++) {
-        for (var dx = -1; dx <= 1; dx++) {
+    for (var dy = -reach; dy <= reach; dy++) {
+        for (var dx = -reach; dx <= reach; dx++) {
             if dx != 0 || dy != 0 {
                 code = 2 * code + u32(grey_aside(x, dx, u32(i32(row) + dy)) > centre);
             }
@@ -41,13 +43,36 @@ fn census(x: u32, row: u32) -> u32 {
     return code;
 }
 
+// Grey value and horizontal gradient.
+fn gradient(x: u32, row: u32) -> u32 {
+    let gradient = (256 + grey_aside(x, 1, row) - grey_aside(x, -1, row)) / 2;
+    return grey(x, row) | (gradient << 8);
+}
+
+// Grey value, the least and the greatest one up to half a pixel away.
+fn half_samples(x: u32, row: u32) -> u32 {
+    let centre = grey(x, row);
+    let left = (centre + grey_aside(x, -1, row) + 1) / 2;
+    let right = (centre + grey_aside(x, 1, row) + 1) / 2;
+    return centre | (min(centre, min(left, right)) << 8) | (max(centre, max(left, right)) << 16);
+}
+
 fn value(x: u32, row: u32) -> u32 {
     switch PROFILE {
         case THESIS: {
             return grey(x, row);
         }
         case CENSUS: {
-            return census(x, row);
+            return census(x, row, 1);
+        }
+        case CENSUS_5X5: {
+            return census(x, row, 2);
+        }
+        case GRADIENT: {
+            return gradient(x, row);
+        }
+        case BIRCHFIELD_TOMASI: {
+            return half_samples(x, row);
         }
         default: {
             let rgb = colour(x, row);

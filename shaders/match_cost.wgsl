@@ -13,16 +13,36 @@ struct Seed {
 @group(0) @binding(4) var<storage, read> right: array<u32>;
 @group(0) @binding(5) var<storage, read> seed: Seed;
 
-fn largest_cost() -> u32 {
-    return select(select(765u, 6u, PROFILE == CENSUS), 11u, PROFILE == THESIS);
-}
-
-fn out_of_range_cost() -> u32 {
-    return select(largest_cost(), 3u, PROFILE == CENSUS);
-}
+// Of the profile.
+override LARGEST_COST: u32 = 0;
+override OUT_OF_RANGE_COST: u32 = 0;
 
 fn difference(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
     return max(a, b) - min(a, b);
+}
+
+// One of three bytes.
+fn channel(values: vec4<u32>, index: u32) -> vec4<u32> {
+    return (values >> vec4(8 * index)) & vec4(0xffu);
+}
+
+fn sum_of_differences(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    let green = difference(channel(a, 1), channel(b, 1));
+    return difference(channel(a, 0), channel(b, 0)) + green + difference(channel(a, 2), channel(b, 2));
+}
+
+fn gradient_difference(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    let grey = min(difference(channel(a, 0), channel(b, 0)), vec4(20u));
+    let gradient = min(difference(channel(a, 1), channel(b, 1)), vec4(4u));
+    return (3 * grey + 35 * gradient + 5) / 10;
+}
+
+// How far the grey value of a lies outside the range around b.
+fn outside(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    let value = channel(a, 0);
+    let least = channel(b, 1);
+    let greatest = channel(b, 2);
+    return max(max(value, greatest) - greatest, max(least, value) - value);
 }
 
 // The cost of matching two pixels, for four pairs.
@@ -34,10 +54,17 @@ fn compare(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
         case CENSUS: {
             return min(countOneBits(a ^ b), vec4(6u));
         }
+        case CENSUS_5X5: {
+            return min(countOneBits(a ^ b), vec4(20u));
+        }
+        case GRADIENT: {
+            return gradient_difference(a, b);
+        }
+        case BIRCHFIELD_TOMASI: {
+            return (15 * min(min(outside(a, b), outside(b, a)), vec4(20u)) + 5) / 10;
+        }
         default: {
-            let byte = vec4(0xffu);
-            let green = difference((a >> vec4(8u)) & byte, (b >> vec4(8u)) & byte);
-            return difference(a & byte, b & byte) + green + difference(a >> vec4(16u), b >> vec4(16u));
+            return sum_of_differences(a, b);
         }
     }
 }
@@ -56,8 +83,8 @@ fn costs(nodes: Nodes, at_left: vec4<u32>, seeded: vec4<bool>, label: u32) -> ve
     let inside = (match_x >= vec4(0)) & (match_x < vec4(i32(parameters.width)));
     let safe = select(vec4(0u), vec4<u32>(match_x), inside) + nodes.y * parameters.width;
     let at_right = vec4(right[safe.x], right[safe.y], right[safe.z], right[safe.w]);
-    var cost = select(vec4(out_of_range_cost()), compare(at_left, at_right), inside);
-    let seed_cost = select(largest_cost(), 0u, max(label, seed.label) - min(label, seed.label) <= 1);
+    var cost = select(vec4(OUT_OF_RANGE_COST), compare(at_left, at_right), inside);
+    let seed_cost = select(LARGEST_COST, 0u, max(label, seed.label) - min(label, seed.label) <= 1);
     cost = select(cost, vec4(seed_cost), seeded);
     return select(vec4(0u), cost, x < vec4(parameters.width));
 }

@@ -53,6 +53,10 @@ struct Parameters {
 // What the data cost compares.
 const THESIS: u32 = 0;
 const CENSUS: u32 = 1;
+const MRF: u32 = 2;
+const CENSUS_5X5: u32 = 3;
+const GRADIENT: u32 = 4;
+const BIRCHFIELD_TOMASI: u32 = 5;
 override PROFILE: u32 = THESIS;
 
 const LEFT: u32 = 0;

@@ -1,4 +1,4 @@
-//! The 3x3 census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
+//! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
 use crate::{Image, Model, Seed, StereoPair};
 
@@ -12,11 +12,25 @@ const HALF_LENGTH: usize = 10;
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
+    compare_window(image, (x, y), 1) as u8
+}
+
+/// The same with the 24 neighbours in a window of 5x5 pixels, in as many bits.
+///
+/// # Panics
+/// Where (x, y) lies outside.
+#[must_use]
+pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
+    compare_window(image, (x, y), 2)
+}
+
+/// A bit for each neighbour at most `reach` columns and rows away.
+fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize) -> u32 {
     let centre = image.grey(x, y);
     let (x, y) = (x as isize, y as isize);
-    let window = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    let window = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
     let neighbours = window.filter(|&offset| offset != (0, 0));
-    neighbours.fold(0, |code, (dx, dy)| code << 1 | u8::from(image.grey_near(x + dx, y + dy) > centre))
+    neighbours.fold(0, |code, (dx, dy)| code << 1 | u32::from(image.grey_near(x + dx, y + dy) > centre))
 }
 
 /// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the
@@ -66,6 +80,16 @@ mod tests {
         assert_eq!(code(&image, 1, 1), 0b1000_1010);
         let flat = Image::from_grey(1, 1, &[5]).unwrap();
         assert_eq!(code(&flat, 0, 0), 0);
+    }
+
+    #[test]
+    fn a_window_of_5x5_is_compared_as_far_as_its_corners() {
+        let mut pixels = [7; 25];
+        (pixels[0], pixels[13], pixels[24]) = (8, 9, 10);
+        let image = Image::from_grey(5, 5, &pixels).unwrap();
+        assert_eq!(code_5x5(&image, 2, 2), 1 << 23 | 1 << 11 | 1);
+        // The corner is repeated outward.
+        assert_eq!(code_5x5(&image, 1, 1), 0b1100_0110_0000_0000_0010_0000);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Data costs D(p, d) of the profiles, before any normalising or clipping.
 
-use crate::{Error, Image, Model, Profile, Size, StereoPair, census, memory};
+use crate::{Error, Image, Model, Profile, Size, StereoPair, census, features, memory};
 
 /// A known match that CTBP and CTCSBP start from: the image is cut at (x, y), and `label` is what the census
 /// transform found for that pixel.
@@ -22,12 +22,15 @@ impl Seed {
     }
 }
 
-/// What a profile compares: one value a pixel of each image, `[height][width]`.
+/// What a profile compares of every pixel, `[height][width]`, of both images.
 #[derive(Clone, Debug)]
 enum Planes {
     Thesis([Vec<u8>; 2]),
     Census([Vec<u8>; 2]),
     Mrf([Vec<[u8; 3]>; 2]),
+    Census5x5([Vec<[u8; 3]>; 2]),
+    Gradient([Vec<[u8; 2]>; 2]),
+    BirchfieldTomasi([Vec<[u8; 3]>; 2]),
 }
 
 /// The data cost of every pixel and label of a pair; allocated once, loaded with pair after pair.
@@ -45,14 +48,13 @@ impl DataCost {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn new(size: Size, model: Model) -> Result<Self, Error> {
-        let bytes = || memory::filled("images", size.pixels(), 0u8);
         let planes = match model.profile() {
-            Profile::Thesis => Planes::Thesis([bytes()?, bytes()?]),
-            Profile::Census => Planes::Census([bytes()?, bytes()?]),
-            Profile::Mrf => Planes::Mrf([
-                memory::filled("images", size.pixels(), [0; 3])?,
-                memory::filled("images", size.pixels(), [0; 3])?,
-            ]),
+            Profile::Thesis => Planes::Thesis(planes(size)?),
+            Profile::Census => Planes::Census(planes(size)?),
+            Profile::Mrf => Planes::Mrf(planes(size)?),
+            Profile::Census5x5 => Planes::Census5x5(planes(size)?),
+            Profile::Gradient => Planes::Gradient(planes(size)?),
+            Profile::BirchfieldTomasi => Planes::BirchfieldTomasi(planes(size)?),
         };
         Ok(Self { size, model, planes, seed: None })
     }
@@ -81,6 +83,9 @@ impl DataCost {
                 Planes::Thesis(planes) => fill(&mut planes[side], view, |image, x, y| image.grey(x, y)),
                 Planes::Census(planes) => fill(&mut planes[side], view, census::code),
                 Planes::Mrf(planes) => planes[side].copy_from_slice(view.pixels()),
+                Planes::Census5x5(planes) => fill(&mut planes[side], view, features::census_5x5),
+                Planes::Gradient(planes) => fill(&mut planes[side], view, features::gradient),
+                Planes::BirchfieldTomasi(planes) => fill(&mut planes[side], view, features::half_samples),
             }
         }
         Ok(())
@@ -106,24 +111,32 @@ impl DataCost {
     pub fn bytes(&self) -> u64 {
         match &self.planes {
             Planes::Thesis(planes) | Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Mrf(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Gradient(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Mrf(planes) | Planes::Census5x5(planes) | Planes::BirchfieldTomasi(planes) => {
+                planes.iter().map(memory::bytes).sum()
+            }
         }
     }
 
     /// The cost of matching the left pixel at index `l` with the right one at index `r`.
     fn compare(&self, l: usize, r: usize) -> u16 {
         match &self.planes {
-            Planes::Thesis([left, right]) => {
-                let difference = u16::from(left[l].abs_diff(right[r]));
-                (7 * difference.min(15) + 5) / 10
-            }
-            Planes::Census([left, right]) => ((left[l] ^ right[r]).count_ones() as u16).min(6),
-            Planes::Mrf([left, right]) => left[l].iter().zip(&right[r]).map(|(&a, &b)| u16::from(a.abs_diff(b))).sum(),
+            Planes::Thesis([left, right]) => features::truncated_difference(left[l], right[r]),
+            Planes::Census([left, right]) => features::hamming_distance(&[left[l]], &[right[r]]).min(6),
+            Planes::Mrf([left, right]) => features::sum_of_differences(left[l], right[r]),
+            Planes::Census5x5([left, right]) => features::hamming_distance(&left[l], &right[r]).min(20),
+            Planes::Gradient([left, right]) => features::gradient_difference(left[l], right[r]),
+            Planes::BirchfieldTomasi([left, right]) => features::sampling_insensitive_difference(left[l], right[r]),
         }
     }
 }
 
-fn fill(plane: &mut [u8], view: &Image, value: fn(&Image, usize, usize) -> u8) {
+fn planes<T: Copy + Default>(size: Size) -> Result<[Vec<T>; 2], Error> {
+    let plane = || memory::filled("images", size.pixels(), T::default());
+    Ok([plane()?, plane()?])
+}
+
+fn fill<T>(plane: &mut [T], view: &Image, value: impl Fn(&Image, usize, usize) -> T) {
     for (y, row) in plane.chunks_exact_mut(view.size().width).enumerate() {
         for (x, out) in row.iter_mut().enumerate() {
             *out = value(view, x, y);
@@ -151,7 +164,9 @@ mod tests {
 
     #[test]
     fn costs_outside_the_right_image_are_the_profiles() {
-        for (profile, expected) in [(Profile::Thesis, 11), (Profile::Census, 3), (Profile::Mrf, 765)] {
+        let halves = [(Profile::Census5x5, 10), (Profile::Gradient, 10), (Profile::BirchfieldTomasi, 15)];
+        let wholes = [(Profile::Thesis, 11), (Profile::Census, 3), (Profile::Mrf, 765)];
+        for (profile, expected) in wholes.into_iter().chain(halves) {
             let cost = cost(profile, &[9, 9], &[9, 9], None);
             assert_eq!([cost.at(0, 0, 1), cost.at(1, 0, 2)], [expected; 2], "{}", profile.name());
             assert_eq!(cost.at(1, 0, 1), 0);

@@ -36,6 +36,7 @@ mod driver;
 mod energy;
 mod error;
 pub mod exactness;
+mod features;
 pub mod image;
 mod map;
 pub mod memory;

@@ -19,11 +19,22 @@ pub enum Profile {
     /// Sum of absolute differences over R, G, B, untruncated: the default energy of the Middlebury MRF code
     /// (Szeliski et al. 2008).
     Mrf,
+    /// `min(Hamming distance of 5x5 census codes, 20)`, see [`Profile::Census`].
+    Census5x5,
+    /// Truncated absolute differences of grey values and of their horizontal gradients,
+    /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`. Gradients
+    /// as evidence are Scharstein's (1994), this sum with its weights Bleyer, Rhemann and Rother's (2011).
+    Gradient,
+    /// Grey difference insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`, where d is the
+    /// distance of one image's grey value from the range of the other's around the match: from the least to the greatest
+    /// of I(x) and the halves `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`; the smaller of both ways.
+    BirchfieldTomasi,
 }
 
 impl Profile {
     /// All profiles.
-    pub const ALL: [Self; 3] = [Self::Thesis, Self::Census, Self::Mrf];
+    pub const ALL: [Self; 6] =
+        [Self::Thesis, Self::Census, Self::Mrf, Self::Census5x5, Self::Gradient, Self::BirchfieldTomasi];
 
     /// The name used in options and records.
     #[must_use]
@@ -32,6 +43,19 @@ impl Profile {
             Self::Thesis => "thesis",
             Self::Census => "census",
             Self::Mrf => "mrf",
+            Self::Census5x5 => "census5x5",
+            Self::Gradient => "gradient",
+            Self::BirchfieldTomasi => "birchfield-tomasi",
+        }
+    }
+
+    /// Bytes that are compared of a pixel.
+    #[must_use]
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Thesis | Self::Census => 1,
+            Self::Gradient => 2,
+            Self::Mrf | Self::Census5x5 | Self::BirchfieldTomasi => 3,
         }
     }
 
@@ -42,6 +66,8 @@ impl Profile {
             Self::Thesis => 11,
             Self::Census => 6,
             Self::Mrf => 765,
+            Self::Census5x5 | Self::Gradient => 20,
+            Self::BirchfieldTomasi => 30,
         }
     }
 
@@ -49,8 +75,8 @@ impl Profile {
     #[must_use]
     pub fn out_of_range_cost(self) -> u16 {
         match self {
-            Self::Census => 3,
             Self::Thesis | Self::Mrf => self.max_cost(),
+            Self::Census | Self::Census5x5 | Self::Gradient | Self::BirchfieldTomasi => self.max_cost() / 2,
         }
     }
 
@@ -60,6 +86,9 @@ impl Profile {
             Self::Thesis => (10, 17),
             Self::Census => (2, 10),
             Self::Mrf => (20, 40),
+            Self::Census5x5 => (4, 16),
+            Self::Gradient => (10, 40),
+            Self::BirchfieldTomasi => (10, 60),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod traffic;
 
-use crate::{BAND_ROWS, Error, MessageStart, Model, Profile, Schedule, Settings, Side, Size};
+use crate::{BAND_ROWS, Error, MessageStart, Model, Schedule, Settings, Side, Size};
 
 /// Most grids of a plan: the longest side allowed, [`crate::image::MAX_SIDE`], halves to 1 in as many.
 pub const MAX_GRIDS: usize = 25;
@@ -181,9 +181,9 @@ impl Plan {
     #[must_use]
     pub fn buffers(&self) -> Vec<Buffer> {
         let pixels = self.image_size().pixels() as u64;
-        let bytes_per_pixel = if self.model.profile() == Profile::Mrf { 6 } else { 2 };
+        let channels = self.model.profile().channels() as u64;
         let mut buffers = vec![
-            Buffer { name: "images", grid: 0, bytes: bytes_per_pixel * pixels },
+            Buffer { name: "images", grid: 0, bytes: 2 * channels * pixels },
             Buffer { name: "labels", grid: 0, bytes: 2 * pixels },
         ];
         for grid in 0..self.grids() {
@@ -238,7 +238,7 @@ pub struct Buffer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Cut};
+    use crate::{Algorithm, Cut, Profile};
 
     const BABY: Size = Size { width: 620, height: 555 };
 

@@ -21,7 +21,7 @@ pub(crate) struct Features {
     /// 255 where the right image has a column, else 0: `[parity][lane]`, padded alike.
     inside: [Vec<u8>; 2],
     /// Grey values of both images and of what lies around, see [`Image::grey_near`], `[height][width]` with [`APRON`] more
-    /// rows and columns on every side; for `census` only.
+    /// rows and columns on every side; for the profiles that look at neighbours.
     grey: [Vec<u8>; 2],
 }
 
@@ -30,7 +30,7 @@ impl Features {
     pub(crate) fn new(size: Size, model: &Model) -> Result<Self, Error> {
         let profile = model.profile();
         let lanes = layout::lanes(size);
-        let rows = 2 * channels(profile) * size.height;
+        let rows = 2 * profile.channels() * size.height;
         let grey = || memory::filled("grey values", grey_bytes(size, profile), 0);
         let inside = |parity: usize| {
             let nodes = (size.width + 1 - parity) / 2;
@@ -57,7 +57,7 @@ impl Features {
         for (image, grey, (out, lanes, offset)) in views {
             let rows = grey.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
             rows.for_each(|(y, row)| dispatch!(level, simd => grey_row(simd, image, y, row)));
-            let rows = out.par_chunks_mut(2 * lanes * channels(*profile)).with_min_len(MIN_ROWS).enumerate();
+            let rows = out.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
             let view = View { profile: *profile, image, grey };
             rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows, (lanes, offset))));
         }
@@ -65,13 +65,13 @@ impl Features {
 
     /// Features of the left pixels of a row, `[lane]`.
     pub(crate) fn left(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
-        &self.left[((y * channels(self.profile) + channel) * 2 + parity) * self.lanes..][..self.lanes]
+        &self.left[((y * self.profile.channels() + channel) * 2 + parity) * self.lanes..][..self.lanes]
     }
 
     /// Features of the right pixels of a row, from one block before lane 0 on.
     pub(crate) fn right(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
         let lanes = self.lanes + 2 * BLOCK;
-        &self.right[((y * channels(self.profile) + channel) * 2 + parity) * lanes..][..lanes]
+        &self.right[((y * self.profile.channels() + channel) * 2 + parity) * lanes..][..lanes]
     }
 
     /// 255 where [`Features::right`] has a pixel.
@@ -91,17 +91,17 @@ const MIN_ROWS: usize = 32;
 /// Bytes that [`Features`] hold, predicted.
 pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
     let (lanes, profile) = (layout::lanes(size), model.profile());
-    let rows = 2 * channels(profile) * size.height;
+    let rows = 2 * profile.channels() * size.height;
     (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * grey_bytes(size, profile)) as u64
 }
 
-/// Bytes a pixel.
-fn channels(profile: Profile) -> usize {
-    if profile == Profile::Mrf { 3 } else { 1 }
-}
-
 fn grey_bytes(size: Size, profile: Profile) -> usize {
-    if profile == Profile::Census { (size.height + 2 * APRON) * (size.width + 2 * APRON) } else { 0 }
+    match profile {
+        Profile::Thesis | Profile::Mrf => 0,
+        Profile::Census | Profile::Census5x5 | Profile::Gradient | Profile::BirchfieldTomasi => {
+            (size.height + 2 * APRON) * (size.width + 2 * APRON)
+        }
+    }
 }
 
 /// Fills the given row of [`Features::grey`].
@@ -119,8 +119,18 @@ fn grey_row<S: Simd>(simd: S, image: &Image, index: usize, row: &mut [u8]) {
     after.fill(own[width - 1]);
 }
 
-/// Columns and rows of the neighbours that a census code compares, in order, counted from [`APRON`] before the pixel.
-const CENSUS_NEIGHBOURS: [(usize, usize); 8] = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
+/// Columns and rows of eight neighbours, counted from [`APRON`] before the pixel.
+type Neighbours = [(usize, usize); 8];
+
+/// Those that a census code compares, in order.
+const CENSUS: Neighbours = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
+
+/// Those that each byte of the larger one compares.
+const CENSUS_5X5: [Neighbours; 3] = [
+    [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (0, 1), (1, 1), (2, 1)],
+    [(3, 1), (4, 1), (0, 2), (1, 2), (3, 2), (4, 2), (0, 3), (1, 3)],
+    [(2, 3), (3, 3), (4, 3), (0, 4), (1, 4), (2, 4), (3, 4), (4, 4)],
+];
 
 /// An image to be taken in.
 struct View<'a> {
@@ -142,7 +152,6 @@ impl View<'_> {
             simd.vectorize(
                 #[inline(always)]
                 || match self.profile {
-                    Profile::Census => self.census(y, even, odd),
                     Profile::Thesis => {
                         every_second(even, pixels, |&pixel| grey(pixel));
                         every_second(odd, &pixels[1..], |&pixel| grey(pixel));
@@ -151,39 +160,90 @@ impl View<'_> {
                         every_second(even, pixels, |pixel| pixel[channel]);
                         every_second(odd, &pixels[1..], |pixel| pixel[channel]);
                     }
+                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, (x, y), out)),
+                    Profile::Census5x5 => deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], (x, y), out)),
+                    Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, (x, y), out)),
+                    Profile::BirchfieldTomasi => deal(even, odd, |x, out| self.half_samples(channel, (x, y), out)),
                 },
             );
         }
     }
 
-    /// Grey values of the row that lies `APRON - dy` rows above row `y`.
+    /// Grey values around consecutive pixels from (x, y) on, so many columns and rows after the first of
+    /// [`Features::grey`] that lies [`APRON`] before.
     #[inline(always)]
-    fn grey_row(&self, y: usize, dy: usize) -> &[u8] {
-        let columns = self.image.size().width + 2 * APRON;
-        &self.grey[(y + dy) * columns..][..columns]
+    fn near(&self, (x, y): (usize, usize), (dx, dy): (usize, usize), columns: usize) -> &[u8] {
+        let row = self.image.size().width + 2 * APRON;
+        &self.grey[(y + dy) * row + x + dx..][..columns]
     }
 
-    /// The census codes of a row, as [`bp_core::census::code`] gives them, dealt to even and odd columns.
+    /// A byte of the census codes of pixels from (x, y) on, see [`bp_core::census`].
     #[inline(always)]
-    fn census(&self, y: usize, even: &mut [u8], odd: &mut [u8]) {
-        let mut codes = [0; 2 * BLOCK];
-        for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
-            let (x, columns) = (2 * BLOCK * index, even.len() + odd.len());
-            let middle = &self.grey_row(y, APRON)[x + APRON..][..columns];
-            for (dx, dy) in CENSUS_NEIGHBOURS {
-                let neighbours = &self.grey_row(y, dy)[x + dx..][..columns];
-                for ((code, neighbour), middle) in codes[..columns].iter_mut().zip(neighbours).zip(middle) {
-                    // Older bits leave at the top: what an earlier block left behind is gone after eight.
-                    *code = *code << 1 | u8::from(neighbour > middle);
-                }
+    fn census(&self, neighbours: &Neighbours, at: (usize, usize), codes: &mut [u8]) {
+        let middle = self.near(at, (APRON, APRON), codes.len());
+        for &offset in neighbours {
+            let neighbours = self.near(at, offset, codes.len());
+            for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
+                // Older bits leave at the top: what was there before is gone after eight.
+                *code = *code << 1 | u8::from(neighbour > middle);
             }
-            even.iter_mut().zip(codes.iter().step_by(2)).for_each(|(out, &code)| *out = code);
-            odd.iter_mut().zip(codes[1..].iter().step_by(2)).for_each(|(out, &code)| *out = code);
         }
     }
+
+    /// What [`Profile::Gradient`] compares: the grey value, then the gradient.
+    #[inline(always)]
+    fn gradient(&self, channel: usize, at: (usize, usize), out: &mut [u8]) {
+        let [before, middle, after] = self.row_near(at, out.len());
+        if channel == 0 {
+            out.copy_from_slice(middle);
+            return;
+        }
+        for ((out, &before), &after) in out.iter_mut().zip(before).zip(after) {
+            // The same as (256 + after - before) div 2.
+            *out = mean(after, !before);
+        }
+    }
+
+    /// What [`Profile::BirchfieldTomasi`] compares: the grey value, then the least and the greatest around.
+    #[inline(always)]
+    fn half_samples(&self, channel: usize, at: (usize, usize), out: &mut [u8]) {
+        let [before, middle, after] = self.row_near(at, out.len());
+        for (((out, &before), &middle), &after) in out.iter_mut().zip(before).zip(middle).zip(after) {
+            let (left, right) = (mean(before, middle), mean(middle, after));
+            *out = match channel {
+                0 => middle,
+                1 => middle.min(left).min(right),
+                _ => middle.max(left).max(right),
+            };
+        }
+    }
+
+    /// Grey values of the left neighbours of pixels from `at` on, of those, and of the right neighbours.
+    #[inline(always)]
+    fn row_near(&self, at: (usize, usize), columns: usize) -> [&[u8]; 3] {
+        [APRON - 1, APRON, APRON + 1].map(|dx| self.near(at, (dx, APRON), columns))
+    }
+}
+
+/// Half the sum, rounded up.
+#[inline(always)]
+fn mean(a: u8, b: u8) -> u8 {
+    (u16::from(a) + u16::from(b)).div_ceil(2) as u8
 }
 
 #[inline(always)]
 fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
+}
+
+/// Writes a row block by block: `values(x, out)` gives those of consecutive columns from x on, which are dealt to even and
+/// odd ones.
+#[inline(always)]
+fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {
+    let mut block = [0; 2 * BLOCK];
+    for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
+        values(2 * BLOCK * index, &mut block[..even.len() + odd.len()]);
+        even.iter_mut().zip(block.iter().step_by(2)).for_each(|(out, &value)| *out = value);
+        odd.iter_mut().zip(block[1..].iter().step_by(2)).for_each(|(out, &value)| *out = value);
+    }
 }

@@ -1,5 +1,7 @@
 //! Data costs of the image.
 
+use std::array;
+
 use bp_core::{Plan, Profile, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
@@ -135,37 +137,42 @@ impl Row<'_> {
 
     #[inline(always)]
     fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
-        if self.matching.plan.model().profile() == Profile::Census {
-            self.strip(simd, plane, strip, raw, hamming_distance::<S>)
-        } else {
-            self.strip(simd, plane, strip, raw, truncated_difference::<S>)
+        match self.matching.plan.model().profile() {
+            Profile::Census => self.strip(simd, plane, strip, raw, hamming_distance::<S>),
+            Profile::Census5x5 => self.strip(simd, plane, strip, raw, hamming_distance_5x5::<S>),
+            Profile::Gradient => self.strip(simd, plane, strip, raw, gradient_difference::<S>),
+            Profile::BirchfieldTomasi => self.strip(simd, plane, strip, raw, sampling_insensitive_difference::<S>),
+            // The costs of mrf are wide.
+            Profile::Thesis | Profile::Mrf => self.strip(simd, plane, strip, raw, truncated_difference::<S>),
         }
     }
 
-    /// Computes the costs of a strip of nodes and returns the least of each.
+    /// Computes the costs of a strip of nodes, of which so many channels are compared, and returns the least of each.
     #[inline(always)]
-    fn strip<S: Simd>(
+    fn strip<S: Simd, const CHANNELS: usize>(
         &self,
         simd: S,
         plane: usize,
         (at, lanes): (usize, usize),
         raw: &mut [u8],
-        cost: impl Fn(S, S::u8s, S::u8s) -> S::u8s,
+        cost: impl Fn(S, [S::u8s; CHANNELS], [S::u8s; CHANNELS]) -> S::u8s,
     ) -> [u8; STRIP] {
-        let outside = S::u8s::splat(simd, self.matching.plan.model().profile().out_of_range_cost() as u8);
-        let left = &self.matching.features.left(self.y, 0, plane)[at..at + lanes];
-        let node = &self.matching.features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
-        let right = [0, 1]
-            .map(|parity| (self.matching.features.right(self.y, 0, parity), self.matching.features.inside(parity)));
+        let Matching { features, layout, plan, .. } = self.matching;
+        let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
+        let left: [_; CHANNELS] = array::from_fn(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
+        let right: [[_; CHANNELS]; 2] =
+            [0, 1].map(|parity| array::from_fn(|channel| features.right(self.y, channel, parity)));
+        let (node, inside) =
+            (&features.inside(plane)[BLOCK + at..BLOCK + at + lanes], [0, 1].map(|p| features.inside(p)));
         let mut least = [u8::MAX; STRIP];
-        for label in 0..self.matching.layout.labels {
-            let raw = &mut raw[label * self.matching.layout.lanes + at..][..lanes];
+        for label in 0..layout.labels {
+            let raw = &mut raw[label * layout.lanes + at..][..lanes];
             for lane in (0..lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
                 let (parity, start) = self.lanes(plane, at + lane, label);
-                let (right, inside) = (load(right[parity].0, start), load(right[parity].1, start));
-                let cost = cost(simd, load(left, lane), right) & inside | outside & !inside;
-                let cost = cost & load(node, lane);
+                let inside = load(inside[parity], start);
+                let cost = cost(simd, left.map(|left| load(left, lane)), right[parity].map(|right| load(right, start)));
+                let cost = (cost & inside | outside & !inside) & load(node, lane);
                 cost.store_slice(&mut raw[lane..lane + S::u8s::LEN]);
                 cost.min(load(&least, lane)).store_slice(&mut least[lane..lane + S::u8s::LEN]);
             }
@@ -216,18 +223,62 @@ impl Row<'_> {
     }
 }
 
-/// `min(Hamming distance of census codes, 6)`.
+/// [`Profile::Census`].
 #[inline(always)]
-fn hamming_distance<S: Simd>(simd: S, left: S::u8s, right: S::u8s) -> S::u8s {
+fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
     (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
 }
 
-/// `(7 min(difference of grey values, 15) + 5) div 10`, from a table.
+/// [`Profile::Census5x5`].
 #[inline(always)]
-fn truncated_difference<S: Simd>(simd: S, left: S::u8s, right: S::u8s) -> S::u8s {
-    let difference = left.saturating_sub(right) | right.saturating_sub(left);
-    let table = u8x16::from_fn(simd, |difference| (7 * difference as u8 + 5) / 10);
-    S::u8s::block_splat(table).swizzle_dyn_within_blocks(difference.min(S::u8s::splat(simd, 15)))
+fn hamming_distance_5x5<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
+    let [a, b, c] = array::from_fn(|channel| left[channel] ^ right[channel]);
+    // Added bit by bit first, to a sum and a carry that counts twice: that leaves two vectors of bits to count.
+    let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
+    let twice = carry.count_ones();
+    (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, 20))
+}
+
+/// [`Profile::Thesis`], from a table.
+#[inline(always)]
+fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
+    let table = |difference| (7 * difference + 5) / 10;
+    look_up(simd, table, difference::<S>(left, right).min(S::u8s::splat(simd, 15)))
+}
+
+/// [`Profile::Gradient`]: `(3 a + 35 b + 5) div 10`, which is `(3 a div 5 + 7 b + 1) div 2`.
+#[inline(always)]
+fn gradient_difference<S: Simd>(simd: S, left: [S::u8s; 2], right: [S::u8s; 2]) -> S::u8s {
+    let [grey, gradient] = array::from_fn(|channel| difference::<S>(left[channel], right[channel]));
+    let most = |most| S::u8s::splat(simd, most);
+    // A table has 16 entries, and a takes 21 values; but 15 more of it are 9 more of 3 a div 5.
+    let table = |difference| 3 * difference / 5;
+    let upper = grey.saturating_sub(most(15)).min(most(5));
+    let greys = look_up(simd, table, grey.min(most(15))) + look_up(simd, table, upper);
+    let gradients = look_up(simd, |difference| 7 * difference + 1, gradient.min(most(4)));
+    (greys + gradients) >> 1
+}
+
+/// [`Profile::BirchfieldTomasi`]: `(15 d + 5) div 10`, which is `d + (d + 1) div 2`.
+#[inline(always)]
+fn sampling_insensitive_difference<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
+    let outside = |[value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]| {
+        value.saturating_sub(greatest) | least.saturating_sub(value)
+    };
+    let outside = outside(left, right).min(outside(right, left)).min(S::u8s::splat(simd, 20));
+    outside + ((outside + S::u8s::splat(simd, 1)) >> 1)
+}
+
+#[inline(always)]
+fn difference<S: Simd>(left: S::u8s, right: S::u8s) -> S::u8s {
+    left.saturating_sub(right) | right.saturating_sub(left)
+}
+
+/// `table` of indices from 0 to 15.
+#[inline(always)]
+fn look_up<S: Simd>(simd: S, table: impl Fn(u8) -> u8, indices: S::u8s) -> S::u8s {
+    let table = u8x16::from_fn(simd, |index| table(index as u8));
+    S::u8s::block_splat(table).swizzle_dyn_within_blocks(indices)
 }
 
 struct Block<'a> {

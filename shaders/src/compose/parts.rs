@@ -19,7 +19,8 @@ impl Composer<'_> {
         part.push_short(upload(buffers.images[1], image, image));
         part.push_short(upload(buffers.seed, 2 * image, SEED_BYTES));
         part.push_short(Command::Barrier);
-        let profile = ("PROFILE", self.plan.model().profile() as u32);
+        let compared = self.plan.model().profile();
+        let profile = ("PROFILE", compared as u32);
         for side in 0..2 {
             let parameters =
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
@@ -31,7 +32,12 @@ impl Composer<'_> {
         }
         part.push_short(Command::Barrier);
         for nodes in self.nodes(0) {
-            let constants = vec![profile, ("SUM_BYTES", self.grids[0].sum_bytes as u32)];
+            let constants = vec![
+                profile,
+                ("LARGEST_COST", compared.max_cost().into()),
+                ("OUT_OF_RANGE_COST", compared.out_of_range_cost().into()),
+                ("SUM_BYTES", self.grids[0].sum_bytes as u32),
+            ];
             let pipeline = Pipeline { kernel: Kernel::MatchCost, constants };
             let [left, right] = buffers.features;
             let bound = [self.costs_written(nodes).as_slice(), &[left, right, buffers.seed]].concat();
