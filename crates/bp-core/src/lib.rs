@@ -32,6 +32,7 @@ pub mod census;
 #[cfg(feature = "conformance")]
 pub mod conformance;
 mod cost;
+mod depth;
 mod driver;
 mod energy;
 mod error;
@@ -46,12 +47,14 @@ mod model;
 mod plan;
 mod settings;
 mod smoothness;
+pub mod survey;
 pub mod synthetic;
 mod tiles;
 pub mod worked_example;
 
 pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Side, Solver};
 pub use cost::{DataCost, Seed};
+pub use depth::{Calibration, Point, depth_map, points};
 pub use driver::{Matcher, Observer, Progress, Stage, Times};
 pub use energy::{Energy, cheapest_labels};
 pub use error::Error;

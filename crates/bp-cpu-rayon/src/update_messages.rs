@@ -166,7 +166,6 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: boo
 
 /// Turns the envelopes from below into messages.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
 fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
     nodes: &Nodes<'_>,
