@@ -79,7 +79,14 @@ fn settings_change_what_they_say() {
     let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
     assert_eq!(hash(""), hash(""));
     let default = hash("--algorithm cfbp --grids 3 --loops 1");
-    for other in ["--message-start sender", "--slope 1", "--truncation 5", "--profile mrf", "--min-disparity -2"] {
+    for other in [
+        "--message-start sender",
+        "--slope 1",
+        "--truncation 5",
+        "--edge-threshold 9",
+        "--profile mrf",
+        "--min-disparity -2",
+    ] {
         assert_ne!(hash(&format!("--algorithm cfbp --grids 3 --loops 1 {other}")), default, "{other}");
     }
     assert_ne!(hash("--algorithm sweep --profile mrf --coarse-clip off"), hash("--algorithm sweep --profile mrf"));
