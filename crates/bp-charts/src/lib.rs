@@ -1,10 +1,12 @@
-//! Charts: markers side by side in categories, and points and lines between two numeric axes.
+//! Charts: markers side by side in categories, and points and lines between two numeric axes; and bars of colours that
+//! stand beside pictures.
 //!
 //! They are drawn as SVG text, which scales with its page, names itself to those who cannot see it, and stands on a
 //! white sheet of its own, so that it can be read on a dark page. [`png()`] makes a picture of such a text that is the
 //! same on every machine.
 
 mod axis;
+mod colour_bar;
 mod dots;
 mod legend;
 mod number;
@@ -14,9 +16,10 @@ mod sheet;
 mod style;
 
 pub use axis::Axis;
+pub use colour_bar::ColourBar;
 pub use dots::DotChart;
 pub use number::number;
-pub use picture::png;
+pub use picture::{Colour, Pixels, png};
 pub use plot::{Plot, Point};
 pub use style::{BLACK, Line, Marker, Style};
 

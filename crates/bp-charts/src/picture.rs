@@ -29,32 +29,50 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
+/// Red, green and blue.
+pub type Colour = [u8; 3];
+
+/// An opaque picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Pixels a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The colours `[height][width]`.
+    pub colours: Vec<Colour>,
+}
+
 /// A chart's SVG text as a PNG file of twice its width and height.
 ///
 /// # Errors
 ///
 /// When the text is none that a chart gives.
 pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
-    let failed = |error: &dyn std::fmt::Display| Error(format!("no picture can be made of the chart: {error}"));
-    let options = Options { fontdb: Arc::clone(&FONTS), font_family: FAMILY.to_owned(), ..Options::default() };
-    let tree = Tree::from_str(svg, &options).map_err(|error| failed(&error))?;
-    let [width, height] = [tree.size().width(), tree.size().height()].map(|side| (SCALE as f32 * side) as u32);
-    let mut pixmap = Pixmap::new(width, height).ok_or_else(|| failed(&"it has no size"))?;
-    render(&tree, Transform::from_scale(SCALE as f32, SCALE as f32), &mut pixmap.as_mut());
     let mut file = Vec::new();
-    encode(&mut file, &pixmap).map_err(|error| failed(&error))?;
+    encode(&mut file, &pixels(svg, SCALE)?).map_err(|error| failed(&error))?;
     Ok(file)
 }
 
-/// Red, green and blue.
-type Colour = [u8; 3];
+/// An SVG text, which must cover all of itself, in so many times its width and height.
+pub(crate) fn pixels(svg: &str, scale: u32) -> Result<Pixels, Error> {
+    let options = Options { fontdb: Arc::clone(&FONTS), font_family: FAMILY.to_owned(), ..Options::default() };
+    let tree = Tree::from_str(svg, &options).map_err(|error| failed(&error))?;
+    let [width, height] = [tree.size().width(), tree.size().height()].map(|side| (scale as f32 * side) as u32);
+    let mut pixmap = Pixmap::new(width, height).ok_or_else(|| failed(&"it has no size"))?;
+    render(&tree, Transform::from_scale(scale as f32, scale as f32), &mut pixmap.as_mut());
+    let colours = pixmap.data().chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    Ok(Pixels { width, height, colours })
+}
+
+fn failed(error: &dyn std::fmt::Display) -> Error {
+    Error(format!("no picture can be made of the chart: {error}"))
+}
 
 /// Writes a PNG of 256 colours: a third of the bytes, as charts have few colours and the edges of shapes between them.
-fn encode(file: &mut Vec<u8>, pixmap: &Pixmap) -> Result<(), EncodingError> {
-    // The sheet is white and opaque all over.
-    let pixels: Vec<Colour> = pixmap.data().chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-    let (palette, indices) = palette(&pixels);
-    let mut encoder = Encoder::new(file, pixmap.width(), pixmap.height());
+fn encode(file: &mut Vec<u8>, pixels: &Pixels) -> Result<(), EncodingError> {
+    let (palette, indices) = palette(&pixels.colours);
+    let mut encoder = Encoder::new(file, pixels.width, pixels.height);
     encoder.set_color(ColorType::Indexed);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_palette(palette.concat());
@@ -62,7 +80,7 @@ fn encode(file: &mut Vec<u8>, pixmap: &Pixmap) -> Result<(), EncodingError> {
     encoder.set_filter(Filter::NoFilter);
     let mut writer = encoder.write_header()?;
     let run = |run: &[Colour]| std::iter::repeat_n(indices[&run[0]], run.len());
-    writer.write_image_data(&runs(&pixels).flat_map(run).collect::<Vec<u8>>())?;
+    writer.write_image_data(&runs(&pixels.colours).flat_map(run).collect::<Vec<u8>>())?;
     writer.finish()
 }
 

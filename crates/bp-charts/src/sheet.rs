@@ -179,6 +179,10 @@ fn lawful(text: &str) -> String {
 
 /// The width of the widest text, about, in the widest fonts that a page may take for sans-serif.
 pub(crate) fn widest(texts: impl IntoIterator<Item = impl AsRef<str>>) -> f64 {
-    let letters = texts.into_iter().map(|text| text.as_ref().chars().count()).max().unwrap_or(0);
-    0.62 * TEXT_SIZE * letters as f64
+    0.62 * TEXT_SIZE * letters(texts) as f64
+}
+
+/// The number of letters of the longest text.
+pub(crate) fn letters(texts: impl IntoIterator<Item = impl AsRef<str>>) -> usize {
+    texts.into_iter().map(|text| text.as_ref().chars().count()).max().unwrap_or(0)
 }

@@ -94,6 +94,15 @@ pub trait Device: Send + Sync {
     /// those of the device.
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
 
+    /// Whether the device can run a plan at all, told without allocating anything: it can by default.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] and [`Error::OutOfMemory`] where [`Device::prepare`] would say so.
+    fn check(&self, plan: &Plan) -> Result<(), Error> {
+        let _ = plan;
+        Ok(())
+    }
+
     /// Bytes that [`Device::prepare`] will allocate: by default [`Plan::bytes`]. A device may pad
     /// buffers, or do without some of them.
     fn planned_bytes(&self, plan: &Plan) -> u64 {

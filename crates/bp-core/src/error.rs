@@ -62,6 +62,9 @@ pub enum Error {
         /// What was asked for.
         truncation: u8,
     },
+    /// A geometry that no pair of cameras has.
+    #[error("{0}")]
+    Calibration(&'static str),
     /// A plan setting that no run can follow.
     #[error("{0}")]
     Plan(&'static str),

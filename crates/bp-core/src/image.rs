@@ -89,6 +89,14 @@ impl Image {
         Self::from_rgb(width, height, pixels.iter().map(|&v| [v; 3]).collect())
     }
 
+    /// The same turned left to right.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mut pixels = self.pixels.clone();
+        pixels.chunks_exact_mut(self.size.width).for_each(<[_]>::reverse);
+        Self { pixels, ..*self }
+    }
+
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {
@@ -131,6 +139,18 @@ impl Image {
         let known = rows.start + self.above - above..rows.end + self.above + below;
         let pixels = self.pixels[known.start * width..known.end * width].to_vec();
         Self { size: Size { width, height: rows.len() }, above, below, pixels }
+    }
+
+    /// A copy of some columns as an image of its own, with the apron's. Nothing is known of the columns beside them.
+    ///
+    /// # Panics
+    /// Where `columns` are none, or lie outside.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        let Self { size: Size { width, height }, above, below, ref pixels } = *self;
+        assert!(!columns.is_empty() && columns.end <= width, "columns {columns:?} of an image of {}", self.size);
+        let pixels = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
+        Self { size: Size { width: columns.len(), height }, above, below, pixels }
     }
 
     /// The colour at column `x`, row `y`.
@@ -190,6 +210,14 @@ impl StereoPair {
         Ok(Self { left, right })
     }
 
+    /// The pair in a mirror: the right image, turned left to right, is its left one and the other way round. What is its
+    /// disparity map in the mirror is the right image's: right pixel (x, y) with disparity d shows what left pixel
+    /// (x + d, y) shows.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self { left: self.right.mirrored(), right: self.left.mirrored() }
+    }
+
     /// The size of both images.
     #[must_use]
     pub fn size(&self) -> Size {
@@ -215,6 +243,15 @@ impl StereoPair {
     #[must_use]
     pub fn strip(&self, rows: Range<usize>) -> Self {
         Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
+    }
+
+    /// Some columns of both images, the same of each, see [`Image::columns`].
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn columns(&self, columns: Range<usize>) -> Self {
+        Self { left: self.left.columns(columns.clone()), right: self.right.columns(columns) }
     }
 }
 

@@ -40,6 +40,20 @@ impl DisparityMap {
         Self { size, values: labels.iter().map(|&label| model.disparity(label) as f32).collect() }
     }
 
+    /// The same turned left to right.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        let width = self.size.width;
+        self.replaced(|values| values.chunks_exact_mut(width).for_each(<[f32]>::reverse))
+    }
+
+    /// The same after `change` did something to its values; whatever is not finite then has to be
+    /// [`DisparityMap::UNKNOWN`].
+    pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
+        change(&mut self.values);
+        self
+    }
+
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {

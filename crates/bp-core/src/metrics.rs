@@ -81,7 +81,8 @@ impl GroundTruth {
     }
 }
 
-fn check_size(what: &'static str, found: Size, expected: Size) -> Result<(), Error> {
+/// Refuses a map of another size.
+pub(crate) fn check_size(what: &'static str, found: Size, expected: Size) -> Result<(), Error> {
     if found == expected { Ok(()) } else { Err(Error::WrongSize { what, found, expected }) }
 }
 

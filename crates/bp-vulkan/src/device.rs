@@ -53,6 +53,10 @@ impl Device for VulkanDevice {
         Ok(Box::new(GpuSolver::new(plan, program, Box::new(queue))?))
     }
 
+    fn check(&self, plan: &Plan) -> Result<(), Error> {
+        Program::new(plan, &self.limits()).map(drop)
+    }
+
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         Program::planned_bytes(plan, &self.limits)
     }

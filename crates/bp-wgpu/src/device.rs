@@ -64,6 +64,10 @@ impl Device for WgpuDevice {
         Ok(Box::new(GpuSolver::new(plan, program, Box::new(queue))?))
     }
 
+    fn check(&self, plan: &Plan) -> Result<(), Error> {
+        Program::new(plan, &self.limits()).map(drop)
+    }
+
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         // What is uploaded lies in host memory once more, see `WgpuQueue`.
         let upload = Program::new(plan, &self.limits).map_or(0, |program| program.buffers[Program::UPLOAD].bytes);

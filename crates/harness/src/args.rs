@@ -2,6 +2,7 @@
 
 mod matching;
 mod measuring;
+mod outputs;
 mod records;
 
 use std::path::PathBuf;
@@ -11,8 +12,9 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
+pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
+pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
@@ -27,7 +29,9 @@ pub(crate) struct Cli {
 const AFTER_HELP: &str = "\
 Examples:
   bp match left.png right.png --output map.pfm --picture map.png
+  bp match left.png right.png --output map.pfm --labels auto
   bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
+  bp convert map.pfm --image left.png --points cloud.ply --calib calib.txt
   bp evaluate map.png truth.png --scale 2
   bp reproduce --quick
   bp doctor
@@ -40,6 +44,8 @@ unavailable or unable to run the plan, 6 out of memory, 130 interrupted.";
 pub(crate) enum Command {
     /// Compute the disparity map of a rectified pair.
     Match(Box<MatchArgs>),
+    /// Make depth, points, a picture or another format of a disparity map that is there.
+    Convert(Box<ConvertArgs>),
     /// Measure the errors of a disparity map against ground truth.
     Evaluate(EvaluateArgs),
     /// Run all algorithms on six scenes and write every table, chart and figure of the thesis beside its numbers.

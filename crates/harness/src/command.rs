@@ -2,6 +2,7 @@
 
 mod compare;
 mod conform;
+mod convert;
 mod devices;
 mod doctor;
 pub(crate) mod evaluate;
@@ -15,6 +16,7 @@ use std::io::Write;
 
 pub(crate) use compare::compare;
 pub(crate) use conform::conform;
+pub(crate) use convert::convert;
 pub(crate) use devices::devices;
 pub(crate) use doctor::doctor;
 pub(crate) use evaluate::evaluate;

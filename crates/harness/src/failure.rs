@@ -119,6 +119,7 @@ impl From<bp_core::Error> for Failure {
             bp_core::Error::Unavailable { .. } => Kind::Unavailable,
             bp_core::Error::DeviceLost { .. } | bp_core::Error::Timeout { .. } => Kind::DeviceLost,
             bp_core::Error::Plan(_)
+            | bp_core::Error::Calibration(_)
             | bp_core::Error::Labels { .. }
             | bp_core::Error::Truncation { .. }
             | bp_core::Error::MinDisparity { .. } => Kind::Usage,

@@ -1,8 +1,16 @@
 //! Reading and writing files: whole or not at all.
 
+mod calibration;
+mod colours;
+mod format;
 mod images;
 mod maps;
+mod npy;
+mod pfm;
 mod picture;
+mod ply;
+mod sidecar;
+mod tiff;
 
 use std::{
     fs,
@@ -10,9 +18,14 @@ use std::{
     path::Path,
 };
 
+pub(crate) use calibration::Geometry;
+pub(crate) use colours::Colours;
+pub(crate) use format::{MapFormat, Quantity, Raster, check_ending, check_range};
 pub(crate) use images::{PixelLimit, hex, pixels_sha256, read_image, read_stored_grey};
-pub(crate) use maps::{check_png, check_range, read_map, read_mask, write_map};
-pub(crate) use picture::{colour, encode_picture, write_picture};
+pub(crate) use maps::{read_map, read_mask};
+pub(crate) use picture::{Picture, encode_picture};
+pub(crate) use ply::write_points;
+pub(crate) use sidecar::{Origin, sidecar_of, write_sidecar};
 
 use crate::failure::Failure;
 

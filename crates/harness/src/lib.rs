@@ -49,6 +49,7 @@ pub fn main() -> ExitCode {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Match(args) => command::match_pair(args),
+        Command::Convert(args) => command::convert(args),
         Command::Evaluate(args) => command::evaluate(args),
         Command::Reproduce(args) => reproduce::reproduce(args),
         Command::Report(args) => report::command(args),

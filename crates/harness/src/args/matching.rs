@@ -6,23 +6,21 @@ use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Sche
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{named, positive, switch, threads};
+use super::{OutputArgs, named, positive, switch, threads};
 use crate::{backends, files::PixelLimit};
 
 /// `bp match`.
 #[derive(Debug, Args)]
 pub(crate) struct MatchArgs {
-    /// The left image: PNG, PGM or PPM of 8 or 16 bits, grey or colour.
+    /// The left image: PNG, PGM, PPM or TIFF of 8 or 16 bits, JPEG, or PFM (0 to 1 or to 255), grey or colour; a noted
+    /// orientation (EXIF) is ignored.
     pub(crate) left: PathBuf,
     /// The right image, of the same size; rows must correspond (a rectified pair).
     pub(crate) right: PathBuf,
-    /// The disparity map to write: .pfm holds disparities in pixels, .png 256 times them in 16 bits (a disparity of
-    /// 0 as 1, since 0 is unknown).
+    /// The disparity map to write: .pfm, .tif and .npy hold disparities in pixels as 32-bit floats, .png 256 times them
+    /// in 16 bits (a disparity of 0 as 1, since 0 is unknown).
     #[arg(long, short, value_name = "MAP")]
     pub(crate) output: PathBuf,
-    /// Also write the map as a coloured picture.
-    #[arg(long, value_name = "FILE.png")]
-    pub(crate) picture: Option<PathBuf>,
     /// Print everything as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -32,8 +30,8 @@ pub(crate) struct MatchArgs {
     /// Refuse images of more megapixels.
     #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
-    /// Refuse plans that need more memory, or run a smaller one where no option of the plan's shape was given:
-    /// bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024).
+    /// Keep within so much memory, images and answer included: larger pairs are matched strip by strip or tile by tile.
+    /// Bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024). [default: what is free]
     #[arg(long, value_name = "SIZE")]
     pub(crate) max_memory: Option<ByteSize>,
     /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
@@ -43,6 +41,9 @@ pub(crate) struct MatchArgs {
     /// Ground truth of the left image: errors are measured where it is given.
     #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
     pub(crate) ground_truth: Option<PathBuf>,
+    /// What else is written, and how.
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
     /// What to run.
     #[command(flatten)]
     pub(crate) plan: PlanArgs,
@@ -71,14 +72,14 @@ pub(crate) struct PlanArgs {
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
-    /// Number of labels; the largest disparity is the least plus labels - 1. [default: a quarter of the width, rounded
-    /// up to a multiple of 16]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MAX_LABELS as i64))]
-    pub(crate) labels: Option<u16>,
-    /// Disparity of the first label in pixels; may be negative.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true,
+    /// Number of labels; the largest disparity is the least plus labels - 1. auto takes labels and least disparity from
+    /// a coarse look at the images. [default: a quarter of the width, rounded up to a multiple of 16]
+    #[arg(long, value_name = "N|auto", value_parser = labels)]
+    pub(crate) labels: Option<Labels>,
+    /// Disparity of the first label in pixels; may be negative. [default: 0; with --labels auto what the images need]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
-    pub(crate) min_disparity: i32,
+    pub(crate) min_disparity: Option<i32>,
     /// Loops (k) that the algorithm derives its own from; with --grids or sweep, loops on each grid. [default: labels;
     /// 1 for sweep]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -113,6 +114,21 @@ pub(crate) struct PlanArgs {
     pub(crate) truncation: Option<u8>,
 }
 
+/// Labels as they are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Labels {
+    /// As many as the images need.
+    Auto,
+    /// So many.
+    Count(u16),
+}
+
+fn labels(text: &str) -> Result<Labels, String> {
+    let count = || text.parse().ok().filter(|count| (1..=MAX_LABELS).contains(&usize::from(*count)));
+    let labels = if text == "auto" { Some(Labels::Auto) } else { count().map(Labels::Count) };
+    labels.ok_or_else(|| format!("must be auto or a number from 1 to {MAX_LABELS}"))
+}
+
 impl PlanArgs {
     /// The algorithm.
     pub(crate) fn algorithm(&self) -> Algorithm {
@@ -130,7 +146,7 @@ pub(crate) struct TruthArgs {
     /// Pixels that both cameras see: an 8-bit image, 255 where they do.
     #[arg(long, value_name = "MAP")]
     pub(crate) mask: Option<PathBuf>,
-    /// What stored ground truth is divided by to give pixels; 0 is unknown. [default: PFM 1, 8 bits 1, 16 bits 256]
+    /// What stored ground truth is divided by to give pixels; 0 is unknown. [default: floats 1, 8 bits 1, 16 bits 256]
     #[arg(long, value_name = "N", value_parser = positive)]
     pub(crate) scale: Option<f32>,
 }
@@ -138,9 +154,9 @@ pub(crate) struct TruthArgs {
 /// `bp evaluate`.
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
-    /// The disparity map.
+    /// The disparity map: PFM, NPY or TIFF floats, or PNG, PGM or TIFF of 8 or 16 bits.
     pub(crate) map: PathBuf,
-    /// Ground truth.
+    /// Ground truth, in the same formats.
     pub(crate) truth: PathBuf,
     /// What the map's stored values are divided by to give pixels; 0 is unanswered. [default: as for --scale]
     #[arg(long, value_name = "N", value_parser = positive)]

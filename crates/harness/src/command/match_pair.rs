@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair};
+use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair, survey::Survey};
 
 use super::{evaluate, print_json};
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
-    matching::{self, Outputs, Report, Session, plan},
+    matching::{self, Content, Making, Outputs, Report, Session, labels, plan, warnings},
     tell, threads,
 };
 
@@ -26,17 +26,22 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let outputs = Outputs::of(args);
-    let inputs: Vec<&Path> = [&args.left, &args.right].into_iter().chain(truths).map(PathBuf::as_path).collect();
-    outputs.check(&inputs)?;
+    let outputs = Outputs::of(Some(&args.output), &args.outputs);
+    let making = Making::of(&args.outputs.making)?;
+    let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
+    outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
     let pair = read_pair(&args.left, &args.right, limit)?;
-    let plan = plan::plan(&args.plan, pair.size())?;
-    outputs.check_range(plan.model())?;
-    warn_of_labels(&plan);
+    let survey = Survey::of(&pair)?;
+    let range = labels::range(&args.plan, pair.size(), &survey, &outputs);
+    let plan = plan::plan(&args.plan, pair.size(), range.unwrap_or_else(|| labels::default(&args.plan, pair.size())))?;
+    outputs.check_model(&making, plan.model(), pair.size())?;
+    let warnings = warnings::of(&survey, &plan, [&args.left, &args.right], range.is_none());
+    warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
-    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), &outputs))?;
+    let outputs = (&outputs, &making);
+    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), warnings, outputs))?;
     if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
 }
 
@@ -46,26 +51,21 @@ fn run(
     pair: &StereoPair,
     plan: Plan,
     truth: Option<&GroundTruth>,
-    outputs: &Outputs,
+    warnings: Vec<String>,
+    (outputs, making): (&Outputs, &Making),
 ) -> Result<Report, Failure> {
     let mut session = Session::open(args)?;
     let answer = session.solve(pair, plan)?;
     let errors: Option<Errors> = truth.map(|truth| truth.errors(&answer.map)).transpose()?;
-    outputs.write(&answer)?;
-    Ok(Report::new(pair, session.opened(), answer, errors, outputs))
+    let inputs: Vec<&Path> = sources(args).collect();
+    let (image, plan) = (Some(pair.left()), Some(&answer.settings));
+    outputs.write(making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+    Ok(Report::new(pair, session.opened(), answer, errors, warnings, outputs.paths(making)))
 }
 
-/// Warns of labels that match nothing inside the right image.
-fn warn_of_labels(plan: &Plan) {
-    let (model, width) = (plan.model(), plan.image_size().width);
-    if model.labels() > width {
-        let labels = model.labels();
-        tell(&format!("warning: {labels} labels for images {width} pixels wide: the last ones match nowhere"));
-    }
-    let matches_any = |label| (model.disparity(label).unsigned_abs() as usize) < width;
-    if !(0..model.labels() as u16).any(matches_any) {
-        tell("warning: with this --min-disparity no label matches anything inside the right image");
-    }
+/// The files that the outputs are made of.
+fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
+    [&args.left, &args.right].into_iter().chain(&args.outputs.making.calib).map(PathBuf::as_path)
 }
 
 fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {

@@ -8,11 +8,12 @@ use std::{
 
 use bp_core::{DeviceKind, Image, Size, image::narrow};
 use image::{
-    DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader,
-    codecs::{png::PngDecoder, pnm::PnmDecoder},
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits,
+    codecs::{png::PngDecoder, pnm::PnmDecoder, tiff::TiffDecoder},
 };
 use sha2::{Digest, Sha256};
 
+use super::pfm;
 use crate::{failure::Failure, machine};
 
 /// The most pixels that a file may hold.
@@ -31,6 +32,17 @@ impl PixelLimit {
         Self { pixels: u64::from(megapixels) * 1_000_000 }
     }
 
+    /// The most bytes that a file of so many pixels may take, and its decoder at a time.
+    fn bytes(self) -> u64 {
+        self.pixels.saturating_mul(16).saturating_add(1 << 20)
+    }
+
+    fn decoding(self) -> Limits {
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(self.bytes());
+        limits
+    }
+
     /// Refuses a size beyond the limit.
     pub(crate) fn check(self, path: &Path, width: u64, height: u64) -> Result<(), Failure> {
         if width.saturating_mul(height) <= self.pixels {
@@ -44,16 +56,31 @@ impl PixelLimit {
     }
 }
 
-/// Reads an image of 8 or 16 bits, grey or colour; transparency is ignored.
+/// Reads an image of 8 or 16 bits, or a PFM, grey or colour; transparency is ignored, and so is the orientation that a
+/// camera noted.
 pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
-    let decoded = decode(path, &read_limited(path, limit)?, limit)?;
-    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let pixels = if has_16_bits(&decoded) {
-        decoded.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
+    let bytes = read_limited(path, limit)?;
+    let (size, pixels) = if pfm::is_pfm(&bytes) {
+        let file = pfm::parse(path, &bytes, limit)?;
+        (file.size, file.into_pixels(path)?)
     } else {
-        decoded.into_rgb8().pixels().map(|pixel| pixel.0).collect()
+        let decoded = decode(path, &bytes, limit)?;
+        (size(&decoded), colours(decoded))
     };
-    Image::from_rgb(width, height, pixels).map_err(|error| Failure::reading(path, &error))
+    Image::from_rgb(size.width, size.height, pixels).map_err(|error| Failure::reading(path, &error))
+}
+
+/// The colours in 8 bits.
+fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
+    if has_16_bits(&image) {
+        image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
+    } else {
+        image.into_rgb8().pixels().map(|pixel| pixel.0).collect()
+    }
+}
+
+fn size(image: &DynamicImage) -> Size {
+    Size { width: image.width() as usize, height: image.height() as usize }
 }
 
 fn has_16_bits(image: &DynamicImage) -> bool {
@@ -62,10 +89,14 @@ fn has_16_bits(image: &DynamicImage) -> bool {
 
 /// Reads the grey values of an image as they are stored, and whether they have 16 bits. Colours must be grey.
 pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
-    let bytes = read_limited(path, limit)?;
-    check_unscaled(path, &bytes)?;
-    let decoded = decode(path, &bytes, limit)?;
-    let size = Size { width: decoded.width() as usize, height: decoded.height() as usize };
+    stored_grey(path, &read_limited(path, limit)?, limit)
+}
+
+/// The same of a file that is in memory.
+pub(super) fn stored_grey(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
+    check_unscaled(path, bytes)?;
+    let decoded = decode(path, bytes, limit)?;
+    let size = size(&decoded);
     let sixteen = has_16_bits(&decoded);
     let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
     let values: Option<Vec<u16>> = if sixteen {
@@ -77,7 +108,8 @@ pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, 
     Ok((size, values.ok_or_else(coloured)?, sixteen))
 }
 
-/// Refuses files whose values a decoder stretches to fill 8 or 16 bits: what was stored would be lost.
+/// Refuses files whose values are not those that were stored: a JPEG's are about them, and decoders stretch others to
+/// fill 8 or 16 bits.
 fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
     let stretched = match image::guess_format(bytes) {
@@ -90,6 +122,11 @@ fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
             let narrow = [ExtendedColorType::L1, ExtendedColorType::L2, ExtendedColorType::L4];
             narrow.contains(&decoder.original_color_type())
         }
+        Ok(ImageFormat::Tiff) => {
+            let decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
+            decoder.original_color_type() == ExtendedColorType::L1
+        }
+        Ok(ImageFormat::Jpeg) => return Err(failed(&"a JPEG keeps about what was stored, and a map needs all of it")),
         _ => false,
     };
     if stretched {
@@ -116,7 +153,7 @@ pub(super) fn read_limited(path: &Path, limit: PixelLimit) -> Result<Vec<u8>, Fa
     if file.metadata().is_ok_and(|data| data.is_dir()) {
         return Err(failed(&"is a folder, not an image"));
     }
-    let most = limit.pixels.saturating_mul(16).saturating_add(1 << 20);
+    let most = limit.bytes();
     let mut bytes = Vec::new();
     file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| match error.kind() {
         ErrorKind::OutOfMemory => Failure::out_of_memory(format!("{}: {error}", path.display())),
@@ -130,26 +167,54 @@ pub(super) fn read_limited(path: &Path, limit: PixelLimit) -> Result<Vec<u8>, Fa
 
 fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
-    let Ok(format @ (ImageFormat::Png | ImageFormat::Pnm)) = image::guess_format(bytes) else {
-        return Err(failed(&"not an image in a known format (PNG, PGM, PPM)"));
-    };
-    let reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let decoder = reader.into_decoder().map_err(|error| match error {
-        ImageError::Limits(_) => failed(&"too large an image; --max-megapixels raises the limit"),
-        ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
-        error => failed(&error),
-    })?;
+    let format = image::guess_format(bytes).ok().filter(|format| FORMATS.contains(format));
+    let format = format.ok_or_else(|| failed(&"not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM)"))?;
+    if format == ImageFormat::Jpeg && !has_jpeg_end(bytes) {
+        return Err(failed(&ENDS_EARLY));
+    }
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(limit.decoding());
+    let decoder = reader.into_decoder().map_err(|error| undecoded(path, format, error))?;
     let (width, height) = decoder.dimensions();
     limit.check(path, width.into(), height.into())?;
-    // The decoded image, and two copies as colours of 8 bits while it is converted.
-    let needed = decoder.total_bytes().saturating_add(6 * u64::from(width) * u64::from(height));
+    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
+        return Err(failed(&OTHER_TIFF));
+    }
+    let pixels = u64::from(width) * u64::from(height);
+    // The decoded image, two copies as colours of 8 bits while it is converted, and what its decoder holds meanwhile.
+    let meanwhile = match format {
+        ImageFormat::Tiff => decoder.total_bytes(),
+        ImageFormat::Jpeg => 8 * pixels,
+        _ => 0,
+    };
+    let needed = decoder.total_bytes().saturating_add(6 * pixels + meanwhile);
     machine::check_memory(DeviceKind::Processor, needed, None, &format!("{} is too large", path.display()))?;
     // A decoder that gets no memory, below `ulimit -v` say, ends the program.
     if Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX)).is_err() {
         return Err(Failure::out_of_memory(format!("{}: {needed} bytes are needed to read it", path.display())));
     }
-    DynamicImage::from_decoder(decoder).map_err(|error| match error {
-        ImageError::IoError(error) => failed(&format!("the file ends too early or is broken ({error})")),
-        error => failed(&error),
-    })
+    DynamicImage::from_decoder(decoder).map_err(|error| undecoded(path, format, error))
+}
+
+/// The formats that images are read in, PFM apart.
+const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
+
+const ENDS_EARLY: &str = "the file ends too early or is broken";
+
+const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; save others so, or floats as PFM";
+
+/// Why a file could not be decoded.
+fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Failure {
+    match error {
+        ImageError::Limits(_) => Failure::reading(path, &"too large an image; --max-megapixels raises the limit"),
+        ImageError::IoError(error) => Failure::reading(path, &format!("{ENDS_EARLY} ({error})")),
+        ImageError::Unsupported(_) if format == ImageFormat::Tiff => Failure::reading(path, &OTHER_TIFF),
+        error => Failure::reading(path, &error),
+    }
+}
+
+/// Whether the end is marked after the last begin of coded pixels; the decoder makes up what a cut file lacks.
+fn has_jpeg_end(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    last([0xff, 0xd9]) > last([0xff, 0xda])
 }

@@ -2,18 +2,38 @@
 
 use std::{io::Write, ops::RangeInclusive, path::Path};
 
+use bp_charts::{ColourBar, Pixels};
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, ImageError, codecs::png::PngEncoder};
-use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 
-use super::write_whole;
+use super::{Colours, write_whole};
 use crate::failure::Failure;
 
-/// The colour of a value at `place` in 0..=1 of the range: viridis, which colour-blind readers and grey printers keep
-/// in order.
-pub(crate) fn colour(place: f32) -> [u8; 3] {
-    let colour = ViridisRGB.get_color(place.clamp(0.0, 1.0));
-    [colour.0, colour.1, colour.2]
+/// The colour of unknown pixels.
+const UNKNOWN: [u8; 3] = [0; 3];
+
+/// How a picture of a map looks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Picture {
+    /// The colours of known pixels.
+    pub(crate) colours: Colours,
+    /// Whether a bar beside it tells which disparities they stand for.
+    pub(crate) bar: bool,
+}
+
+impl Picture {
+    /// Writes a map as a coloured PNG over its own range; a map without known pixels has no bar.
+    pub(crate) fn write(self, path: &Path, map: &DisparityMap) -> Result<(), Failure> {
+        let range = map.range();
+        let (low, high) = range.unwrap_or((0.0, 1.0));
+        let mut picture = coloured(map, low..=high, self.colours);
+        if self.bar && range.is_some() {
+            let bar = ColourBar { low: low.into(), high: high.into(), unit: "px", height: picture.height };
+            let bar = bar.draw(|place| self.colours.at(place)).map_err(|error| Failure::writing(path, &error))?;
+            picture = beside(&picture, &bar);
+        }
+        write_whole(path, |file| encode(file, &picture))
+    }
 }
 
 /// Encodes a map as a coloured PNG: the near end of `range` bright, the far end dark, unknown black.
@@ -22,15 +42,32 @@ pub(crate) fn encode_picture(
     map: &DisparityMap,
     range: RangeInclusive<f32>,
 ) -> Result<(), ImageError> {
-    let width = (range.end() - range.start()).max(f32::MIN_POSITIVE);
-    let pixel = |&value: &f32| if value.is_finite() { colour((value - range.start()) / width) } else { [0; 3] };
-    let bytes: Vec<u8> = map.values().iter().flat_map(pixel).collect();
-    let Size { width, height } = map.size();
-    PngEncoder::new(file).write_image(&bytes, width as u32, height as u32, ExtendedColorType::Rgb8)
+    encode(file, &coloured(map, range, Colours::Viridis))
 }
 
-/// Writes a map as a coloured PNG over its own range.
-pub(crate) fn write_picture(path: &Path, map: &DisparityMap) -> Result<(), Failure> {
-    let (low, high) = map.range().unwrap_or((0.0, 1.0));
-    write_whole(path, |file| encode_picture(file, map, low..=high))
+fn coloured(map: &DisparityMap, range: RangeInclusive<f32>, colours: Colours) -> Pixels {
+    let (low, high) = (f64::from(*range.start()), f64::from(*range.end()));
+    let place = |value: f32| if low < high { (f64::from(value) - low) / (high - low) } else { 0.5 };
+    let pixel = |&value: &f32| if value.is_finite() { colours.at(place(value)) } else { UNKNOWN };
+    let Size { width, height } = map.size();
+    Pixels { width: width as u32, height: height as u32, colours: map.values().iter().map(pixel).collect() }
+}
+
+/// Two pictures side by side from the top, on white.
+fn beside(left: &Pixels, right: &Pixels) -> Pixels {
+    let (width, height) = (left.width + right.width, left.height.max(right.height));
+    let row = |picture: &Pixels, y: u32| -> Vec<[u8; 3]> {
+        let begin = y as usize * picture.width as usize;
+        picture
+            .colours
+            .get(begin..begin + picture.width as usize)
+            .map_or_else(|| vec![[255; 3]; picture.width as usize], Vec::from)
+    };
+    let colours = (0..height).flat_map(|y| [row(left, y), row(right, y)]).flatten().collect();
+    Pixels { width, height, colours }
+}
+
+fn encode(file: &mut dyn Write, picture: &Pixels) -> Result<(), ImageError> {
+    let bytes = picture.colours.as_flattened();
+    PngEncoder::new(file).write_image(bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
 }

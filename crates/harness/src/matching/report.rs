@@ -1,11 +1,11 @@
 //! What is told of a match, as text or as JSON.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::PathBuf};
 
-use bp_core::{Errors, Stage, StereoPair, Times};
+use bp_core::{Errors, Stage, StereoPair, Tiling, Times};
 use serde::Serialize;
 
-use super::{Answer, Outputs};
+use super::Answer;
 use crate::{
     backends::Opened,
     command::evaluate::{self, ErrorReport},
@@ -20,7 +20,11 @@ pub(crate) struct Report {
     backend: String,
     device: record::Device,
     settings: record::Settings,
+    /// None where the pair was matched as a whole.
+    tiles: Option<Tiles>,
     allocated_bytes: u64,
+    /// Most that the program was predicted to hold at a time.
+    peak_bytes: u64,
     /// Of every match, in order.
     samples_ms: Vec<f64>,
     /// The median of these, and the stages of that match.
@@ -29,7 +33,33 @@ pub(crate) struct Report {
     energy: record::Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
-    output: String,
+    /// What may be wrong with the images or the labels, as standard error tells it.
+    warnings: Vec<String>,
+    /// The files, the disparity map first.
+    written: Vec<String>,
+}
+
+/// What a pair was cut into.
+#[derive(Serialize)]
+pub(crate) struct Tiles {
+    /// Beside each other.
+    columns: usize,
+    /// Above each other.
+    rows: usize,
+    /// The most that one matches, in pixels.
+    width: usize,
+    height: usize,
+    /// Whether the answer is the one of the whole image.
+    exact: bool,
+}
+
+impl Tiles {
+    /// What is told of a tiling.
+    pub(crate) fn of(tiling: &Tiling) -> Option<Self> {
+        let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
+        let exact = tiling.is_exact();
+        (!tiling.is_whole()).then_some(Self { columns, rows, width: size.width, height: size.height, exact })
+    }
 }
 
 impl Report {
@@ -39,7 +69,8 @@ impl Report {
         opened: &Opened,
         answer: Answer,
         errors: Option<Errors>,
-        outputs: &Outputs,
+        warnings: Vec<String>,
+        written: Vec<PathBuf>,
     ) -> Self {
         let median = median(&answer.samples);
         Self {
@@ -48,14 +79,17 @@ impl Report {
             backend: opened.name.clone(),
             device: (&opened.info).into(),
             settings: answer.settings,
+            tiles: answer.tiles,
             allocated_bytes: answer.allocated_bytes,
+            peak_bytes: answer.peak_bytes,
             samples_ms: answer.samples.iter().map(total_ms).collect(),
             total_ms: total_ms(&median),
             clocks: record::clocks(&median),
             energy: answer.energy.into(),
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
-            output: outputs.map.display().to_string(),
+            warnings,
+            written: written.iter().map(|path| path.display().to_string()).collect(),
         }
     }
 }
@@ -90,6 +124,10 @@ pub(crate) fn text(report: &Report) -> String {
     let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
     let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
     let _ = writeln!(text, "{:<10}{plan}, on {}: {}{software}", "plan", report.backend, report.device.name);
+    if let Some(Tiles { columns, rows, width, height, exact }) = &report.tiles {
+        let answer = if *exact { "the whole image's answer" } else { "nearly the whole image's answer" };
+        let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
+    }
     let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
     for record::Clocked { clock, stages } in &report.clocks {
         let _ = writeln!(text, "{:<12}{clock:?} clock", "");
@@ -99,7 +137,9 @@ pub(crate) fn text(report: &Report) -> String {
     }
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (planned, allocated) = (mebibytes(settings.planned_bytes), mebibytes(report.allocated_bytes));
-    let _ = writeln!(text, "{:<10}{allocated:.1} MiB allocated, {planned:.1} MiB predicted", "memory");
+    let peak = mebibytes(report.peak_bytes);
+    let all = format!("{peak:.1} MiB with images and answer");
+    let _ = writeln!(text, "{:<10}{allocated:.1} MiB allocated, {planned:.1} MiB predicted, {all}", "memory");
     let record::Energy { total, data, smoothness } = report.energy;
     let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
     if let Some(hash) = &report.messages_sha256 {
@@ -108,6 +148,6 @@ pub(crate) fn text(report: &Report) -> String {
     if let Some(errors) = &report.errors {
         text += &evaluate::error_table(errors);
     }
-    let _ = writeln!(text, "{:<10}{}", "written", report.output);
+    let _ = writeln!(text, "{:<10}{}", "written", report.written.join(", "));
     text
 }

@@ -1,9 +1,13 @@
 //! A device that is opened once and prepared anew only where a pair needs another plan than the one before.
 
-use bp_core::{DisparityMap, Energy, Matcher, Plan, Side, StereoPair, Times};
+use bp_core::{Device, DisparityMap, Energy, Plan, Progress, Side, StereoPair, Tiled, Times};
 use sha2::{Digest, Sha256};
 
-use super::plan;
+use super::{
+    memory::{self, Fitted},
+    plan,
+    report::Tiles,
+};
 use crate::{
     args::MatchArgs,
     backends::{self, Opened},
@@ -16,7 +20,8 @@ use crate::{
 pub(crate) struct Session<'a> {
     args: &'a MatchArgs,
     opened: Opened,
-    matcher: Option<Matcher>,
+    /// And how many bytes it was predicted to take.
+    prepared: Option<(Tiled, u64)>,
 }
 
 /// What came out of a pair.
@@ -29,8 +34,12 @@ pub(crate) struct Answer {
     pub(crate) energy: Energy,
     /// The settings as records tell them.
     pub(crate) settings: record::Settings,
+    /// The tiles, where the pair was not matched as a whole.
+    pub(crate) tiles: Option<Tiles>,
     /// Bytes allocated for the plan.
     pub(crate) allocated_bytes: u64,
+    /// Most bytes that the program was predicted to hold at a time.
+    pub(crate) peak_bytes: u64,
     /// SHA-256 of all final messages, where it was asked for.
     pub(crate) messages_sha256: Option<String>,
 }
@@ -40,7 +49,7 @@ impl<'a> Session<'a> {
     pub(crate) fn open(args: &'a MatchArgs) -> Result<Self, Failure> {
         let opened = backends::open(&args.plan.backend, args.plan.device.as_deref())?;
         threads::check(args.plan.threads, &[&opened])?;
-        Ok(Self { args, opened, matcher: None })
+        Ok(Self { args, opened, prepared: None })
     }
 
     /// The device.
@@ -50,44 +59,54 @@ impl<'a> Session<'a> {
 
     /// Matches a pair as often as the options say.
     pub(crate) fn solve(&mut self, pair: &StereoPair, plan: Plan) -> Result<Answer, Failure> {
-        let Self { args, opened, matcher } = self;
-        let plan = plan::fitting(args, plan, opened)?;
-        let mut prepared = match matcher.take() {
-            Some(prepared) if *prepared.plan() == plan => prepared,
-            _ => Matcher::new(opened.device.as_ref(), plan)?,
+        let Self { args, opened, prepared } = self;
+        let device = opened.device.as_ref();
+        // What was prepared for another plan is freed first.
+        let (mut tiled, peak_bytes) = match prepared.take().filter(|(tiled, _)| *tiled.plan() == plan) {
+            Some(prepared) => prepared,
+            None => {
+                let Fitted { tiling, peak_bytes } = memory::fitted(args, &plan, opened)?;
+                (Tiled::new(device, tiling)?, peak_bytes)
+            }
         };
-        let samples = take_samples(&mut prepared, pair, args.repeat)?;
+        let samples = take_samples(&mut tiled, device, pair, args.repeat)?;
+        let messages_sha256 = args.messages_hash.then(|| hash_messages(&mut tiled)).transpose()?;
+        tiled.free_tiles();
         let answer = Answer {
-            map: prepared.disparities(),
+            energy: Energy::of(pair, tiled.plan().model(), tiled.labels())?,
+            map: tiled.disparities(),
             samples,
-            energy: Energy::of(pair, prepared.plan().model(), prepared.labels())?,
-            settings: plan::recorded_settings(&args.plan, prepared.plan(), opened),
-            allocated_bytes: prepared.allocated_bytes(),
-            messages_sha256: args.messages_hash.then(|| hash_messages(&mut prepared)).transpose()?,
+            settings: plan::recorded_settings(&args.plan, tiled.tiling(), opened)?,
+            tiles: Tiles::of(tiled.tiling()),
+            allocated_bytes: tiled.allocated_bytes(),
+            peak_bytes,
+            messages_sha256,
         };
         interrupt::check()?;
-        *matcher = Some(prepared);
+        // The memory of tiles is for writing the answer.
+        *prepared = tiled.tiling().is_whole().then_some((tiled, peak_bytes));
         Ok(answer)
     }
 }
 
 /// Matches the pair so many times.
-fn take_samples(matcher: &mut Matcher, pair: &StereoPair, repeat: u32) -> Result<Vec<Times>, Failure> {
-    let updates = matcher.plan().message_updates();
+fn take_samples(tiled: &mut Tiled, device: &dyn Device, pair: &StereoPair, repeat: u32) -> Result<Vec<Times>, Failure> {
+    let updates = tiled.tiling().message_updates();
     let bar = interrupt::ProgressBar::new(updates.saturating_mul(repeat.into()));
     let mut samples = Vec::new();
     for index in 0..u64::from(repeat) {
         let before = updates.saturating_mul(index);
-        samples.push(matcher.solve_observed(pair, &mut |progress| bar.update(before.saturating_add(progress.done)))?);
+        let observer = &mut |progress: Progress| bar.update(before.saturating_add(progress.done));
+        samples.push(tiled.solve_observed(device, pair, observer)?);
     }
     bar.finish();
     Ok(samples)
 }
 
-fn hash_messages(matcher: &mut Matcher) -> Result<String, Failure> {
+fn hash_messages(tiled: &mut Tiled) -> Result<String, Failure> {
     let mut hash = Sha256::new();
     for side in Side::ALL {
-        hash.update(matcher.messages(side)?);
+        hash.update(tiled.messages(side)?);
     }
     Ok(hex(&hash.finalize()))
 }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    files::{PixelLimit, colour, encode_picture, read_map},
+    files::{Colours, PixelLimit, encode_picture, read_map},
 };
 
 /// Space around and between maps, and for words and the bar, in pixels of the drawing.
@@ -111,7 +111,7 @@ fn colour_bar(title: &str, width: usize, top: usize, last: f32) -> String {
     let id: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     const STOPS: usize = 16;
     let stop = |i: usize| {
-        let [r, g, b] = colour(i as f32 / STOPS as f32);
+        let [r, g, b] = Colours::Viridis.at(i as f64 / STOPS as f64);
         format!("<stop offset=\"{}%\" stop-color=\"rgb({r},{g},{b})\"/>", 100.0 * i as f32 / STOPS as f32)
     };
     let stops: String = (0..=STOPS).map(stop).collect();

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     backends::{Asked, Opened},
     failure::Failure,
-    files::{hex, write_map},
+    files::{Raster, hex},
     interrupt::ProgressBar,
     machine,
     record::{self, Cell, Measurement, Outcome, Record, Sample, Settings},
@@ -227,7 +227,7 @@ fn first_measurement(
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
-    write_map(&storage.folder().join(&map), &disparities)?;
+    Raster::disparities(&disparities).write(&storage.folder().join(&map))?;
     Ok(Measurement {
         samples: Vec::new(),
         allocated_bytes: matcher.allocated_bytes(),

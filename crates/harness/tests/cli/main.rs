@@ -3,6 +3,7 @@
 
 mod devices;
 mod folder;
+mod outputs;
 mod recorded;
 mod running;
 mod speed;

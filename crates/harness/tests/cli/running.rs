@@ -5,31 +5,35 @@ use std::fs;
 use crate::folder::{Folder, MATCH, text};
 
 #[test]
-fn a_memory_limit_is_kept_by_a_smaller_plan_or_refused() {
+fn a_memory_limit_is_kept_by_strips_then_by_tiles_or_refused() {
     let folder = Folder::new();
-    let planned = |options: &str| {
-        let report = folder.json(&format!("{MATCH} a.pfm --json {options}"));
-        (report["settings"]["planned_bytes"].as_u64().unwrap(), report["settings"]["grids"].as_u64().unwrap())
-    };
-    let plans = ["", "--coarse-clip off", "--grids 2", "--grids 1"].map(planned);
-    assert!(plans.is_sorted_by(|a, b| a.0 > b.0), "{plans:?}");
-    let [whole, unclipped, _, one_grid] = plans;
-    let limited = |bytes: u64| planned(&format!("--max-memory {bytes}"));
-    assert_eq!(plans.map(|(bytes, _)| limited(bytes)), plans);
-    assert_eq!(limited(whole.0 - 1), unclipped);
-    assert_eq!(planned("--max-memory 1GiB"), whole);
-    let told = folder.run(&format!("{MATCH} a.pfm --max-memory {}", one_grid.0));
-    assert!(text(&told.stderr).contains("--grids 1"), "{}", text(&told.stderr));
-    let (needed, allowed) = (one_grid.0.to_string(), (one_grid.0 - 1).to_string());
-    let words = [needed.as_str(), &allowed, "--max-memory", "--labels"];
-    folder.fails(&format!("{MATCH} b.pfm --max-memory {allowed}"), 6, &words);
-    let by_hand = |option: &str, word: &str| {
-        let needed = planned(option).0;
-        let words = [&needed.to_string(), "--max-memory", word];
-        folder.fails(&format!("{MATCH} b.pfm {option} --max-memory {}", needed - 1), 6, &words);
-    };
-    by_hand("--loops 1", "--labels");
-    by_hand("--algorithm cfbp", "--algorithm sweep");
+    for (name, shift) in [("high-left.png", 0), ("high-right.png", 5)] {
+        let noise = |x: u32, y: u32| ((x + shift) * (x + shift) * 7 + (x + shift) * y * 13 + y * 31) as u8;
+        image::GrayImage::from_fn(430, 600, |x, y| image::Luma([noise(x, y)])).save(folder.path(name)).unwrap();
+    }
+    let run = |options: &str| folder.json(&format!("match high-left.png high-right.png --labels 8 --json {options}"));
+    let peak = |report: &serde_json::Value| report["peak_bytes"].as_u64().unwrap();
+    let map = |name: &str| fs::read(folder.path(name)).unwrap();
+    let whole = run("--output whole.pfm");
+    assert!(whole["tiles"].is_null());
+    assert_eq!(run(&format!("--output a.pfm --max-memory {}", peak(&whole)))["tiles"], whole["tiles"]);
+    let strips = run(&format!("--output strips.pfm --max-memory {}", peak(&whole) - 1));
+    assert_eq!((&strips["tiles"]["rows"], &strips["tiles"]["exact"]), (&2.into(), &true.into()));
+    let planned = strips["settings"]["planned_bytes"].as_u64().unwrap();
+    assert!(peak(&strips) < peak(&whole) && strips["allocated_bytes"].as_u64().unwrap() <= planned);
+    assert_eq!((&strips["energy"], map("strips.pfm")), (&whole["energy"], map("whole.pfm")));
+    let again = format!("match high-left.png high-right.png --labels 8 -o b.pfm --max-memory {}", peak(&strips) - 1);
+    let output = folder.run(&again);
+    let (told, report) = (text(&output.stderr), text(&output.stdout));
+    assert!(told.contains("tiles of up to") && report.contains("nearly the whole image's answer"), "{told}{report}");
+    folder.fails(&format!("{again} --messages-hash"), 6, &["--messages-hash"]);
+    let words = ["at least", "--max-memory allows 99999", "--labels"];
+    folder.fails("match high-left.png high-right.png --labels 8 -o c.pfm --max-memory 99999", 6, &words);
+    folder.fails(
+        "match high-left.png high-right.png --algorithm cfbp -o c.pfm --max-memory 9M",
+        6,
+        &["--algorithm sweep", "9000000"],
+    );
 }
 
 #[test]

@@ -1,0 +1,167 @@
+//! Pairs of any size in limited memory: matched tile by tile, one tile at a time.
+
+mod tiling;
+
+use std::{
+    ops::ControlFlow,
+    time::{Duration, Instant},
+};
+
+pub use tiling::{HALO, Needed, Span, Tile, Tiling};
+
+use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
+
+/// A tiled plan prepared on a device, ready to match pairs of its size one after another. A single tile is matched as
+/// [`Matcher`] does it, without a copy of the pair.
+pub struct Tiled {
+    tiling: Tiling,
+    /// Prepared for the tile that was matched last.
+    matcher: Option<Matcher>,
+    /// The labels of all tiles; none where there is one tile.
+    labels: Vec<u16>,
+    most_bytes: u64,
+}
+
+impl Tiled {
+    /// Prepares the first tile on `device`; tiles of other sizes are prepared when it is their turn, and the one before is
+    /// freed first.
+    ///
+    /// # Errors
+    /// Those of [`Device::prepare`].
+    pub fn new(device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
+        let pixels = if tiling.is_whole() { 0 } else { tiling.plan().image_size().pixels() };
+        let labels = memory::filled("labels", pixels, 0)?;
+        let mut tiled = Self { tiling, matcher: None, labels, most_bytes: 0 };
+        if let Some(tile) = tiled.tiling.tiles().first() {
+            tiled.matcher = Some(tiled.prepared(device, tile)?);
+        }
+        Ok(tiled)
+    }
+
+    /// How the plan is tiled.
+    #[must_use]
+    pub fn tiling(&self) -> &Tiling {
+        &self.tiling
+    }
+
+    /// The plan of the whole image.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        self.tiling.plan()
+    }
+
+    /// Most bytes that were allocated at once so far, counted: for a tile, and for the labels of all.
+    #[must_use]
+    pub fn allocated_bytes(&self) -> u64 {
+        self.most_bytes + memory::bytes(&self.labels)
+    }
+
+    /// Matches a pair on the device that this was prepared on; [`Tiled::labels`] and [`Tiled::disparities`] hold the
+    /// answer until the next. Stages are summed over all tiles; preparing tiles of further sizes is in the total.
+    ///
+    /// # Errors
+    /// As [`Matcher::solve_observed`], and those of [`Device::prepare`].
+    pub fn solve_observed(
+        &mut self,
+        device: &dyn Device,
+        pair: &StereoPair,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        let (found, expected) = (pair.size(), self.plan().image_size());
+        if found != expected {
+            return Err(Error::WrongSize { what: "the pair", found, expected });
+        }
+        let start = Instant::now();
+        let (mut times, mut done, total) = (Times::default(), 0, self.tiling.message_updates());
+        for tile in self.tiling.tiles() {
+            let mut matcher = self.prepared(device, &tile)?;
+            let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
+            let added = self.solve_tile(&mut matcher, pair, &tile, observe)?;
+            times = sum(&times, &added);
+            done += matcher.plan().message_updates();
+            self.matcher = Some(matcher);
+        }
+        times.total = start.elapsed();
+        Ok(times)
+    }
+
+    /// The same without an observer.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn solve(&mut self, device: &dyn Device, pair: &StereoPair) -> Result<Times, Error> {
+        self.solve_observed(device, pair, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn solve_tile(
+        &mut self,
+        matcher: &mut Matcher,
+        pair: &StereoPair,
+        tile: &Tile,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        if self.tiling.is_whole() {
+            return matcher.solve_observed(pair, observer);
+        }
+        let times = matcher.solve_observed(&tile.pair(pair), observer)?;
+        let rows = matcher.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
+        for (labels, y) in rows.filter(|(_, y)| tile.rows.kept.contains(y)) {
+            let Span { all, kept } = &tile.columns;
+            let from = kept.start - all.start;
+            let row = &mut self.labels[y * pair.size().width..][kept.clone()];
+            row.copy_from_slice(&labels[from..from + kept.len()]);
+        }
+        Ok(times)
+    }
+
+    /// What is prepared, if it is for such a tile; else that is freed, and the tile's plan is prepared.
+    fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Matcher, Error> {
+        let plan = tile.plan(self.tiling.plan())?;
+        let matcher = match self.matcher.take().filter(|matcher| *matcher.plan() == plan) {
+            Some(matcher) => matcher,
+            None => Matcher::new(device, plan)?,
+        };
+        self.most_bytes = self.most_bytes.max(matcher.allocated_bytes());
+        Ok(matcher)
+    }
+
+    /// Frees all but the last answer, where that is kept apart: where there are several tiles.
+    pub fn free_tiles(&mut self) {
+        if !self.tiling.is_whole() {
+            self.matcher = None;
+        }
+    }
+
+    /// The last answer: a label for every pixel, `[height][width]`.
+    #[must_use]
+    pub fn labels(&self) -> &[u16] {
+        if self.tiling.is_whole() { self.matcher.as_ref().map_or(&[], Matcher::labels) } else { &self.labels }
+    }
+
+    /// The last answer in pixels; allocates the map.
+    #[must_use]
+    pub fn disparities(&self) -> DisparityMap {
+        DisparityMap::from_labels(self.plan().image_size(), self.plan().model(), self.labels())
+    }
+
+    /// The last messages received from `side`, see [`Matcher::messages`].
+    ///
+    /// # Errors
+    /// As there; and [`Error::Plan`] where there are several tiles, whose messages are gone.
+    pub fn messages(&mut self, side: Side) -> Result<Vec<u8>, Error> {
+        match self.matcher.as_mut().filter(|_| self.tiling.is_whole()) {
+            Some(matcher) => matcher.messages(side),
+            None => Err(Error::Plan("messages are kept of images that are matched as a whole only")),
+        }
+    }
+}
+
+/// Sums of the stages of two solves.
+fn sum(a: &Times, b: &Times) -> Times {
+    let both = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
+    let device = match (a.device, b.device) {
+        (Some(a), Some(b)) => Some(both(a, b)),
+        (one, other) => one.or(other),
+    };
+    Times { wall: both(a.wall, b.wall), device, total: a.total + b.total }
+}

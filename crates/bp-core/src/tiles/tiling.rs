@@ -1,0 +1,387 @@
+//! Which tiles a plan is cut into, known before anything runs.
+
+use std::ops::Range;
+
+use crate::{BAND_ROWS, Cut, Error, Plan, Schedule, Settings, Size, StereoPair, image::APRON};
+
+/// Tiles begin at multiples of so many columns and rows, so that nodes of up to five grids have the same children and the
+/// same colour as in the whole image.
+const ALIGN: usize = 32;
+
+/// Columns, and rows where those beyond are wanted too, that a tile is matched with on either side of what is kept of it.
+pub const HALO: usize = 96;
+
+/// Of the columns or rows of an image: those that a tile matches, and those of them whose answer is kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// All that are matched.
+    pub all: Range<usize>,
+    /// What is kept. The spans of an image share all its columns, or rows, among them.
+    pub kept: Range<usize>,
+}
+
+/// A part of an image that is matched by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// Its columns.
+    pub columns: Span,
+    /// Its rows.
+    pub rows: Span,
+}
+
+impl Tile {
+    /// Pixels that are matched.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        Size { width: self.columns.all.len(), height: self.rows.all.len() }
+    }
+
+    /// The plan of the tile: the whole image's, with the cut where the tile meets it.
+    ///
+    /// # Errors
+    /// None for a tile of that plan's [`Tiling`].
+    pub fn plan(&self, whole: &Plan) -> Result<Plan, Error> {
+        let cut = whole.settings().cut.and_then(|cut| self.cut(cut));
+        Plan::new(self.size(), *whole.model(), Settings { cut, ..*whole.settings() })
+    }
+
+    fn cut(&self, Cut { x, y, seed_start }: Cut) -> Option<Cut> {
+        let inside = |span: &Span, at: usize| span.all.contains(&at).then(|| at - span.all.start);
+        let (x, y) = (inside(&self.columns, x), inside(&self.rows, y));
+        let seed_start = seed_start && x.is_some() && y.is_some();
+        (x.is_some() || y.is_some()).then(|| Cut { x: x.unwrap_or(0), y: y.unwrap_or(0), seed_start })
+    }
+
+    /// A copy of the tile's part of a pair.
+    ///
+    /// # Panics
+    /// Where the tile lies outside.
+    #[must_use]
+    pub fn pair(&self, pair: &StereoPair) -> StereoPair {
+        let strip = pair.strip(self.rows.all.clone());
+        if self.columns.all.len() == pair.size().width { strip } else { strip.columns(self.columns.all.clone()) }
+    }
+
+    /// Bytes of such copies, of the tile and of the rows that it is cut from.
+    fn pair_bytes(&self, image: Size) -> u64 {
+        let width = self.columns.all.len();
+        let columns = if width == image.width { width } else { width + image.width };
+        2 * 3 * (columns * (self.rows.all.len() + 2 * APRON)) as u64
+    }
+}
+
+/// A plan, and the tiles that it is run on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tiling {
+    plan: Plan,
+    columns: Vec<Span>,
+    rows: Vec<Span>,
+}
+
+impl Tiling {
+    /// One tile: the image.
+    #[must_use]
+    pub fn whole(plan: Plan) -> Self {
+        let Size { width, height } = plan.image_size();
+        Self { plan, columns: spans(width, width, (0, 0)), rows: spans(height, height, (0, 0)) }
+    }
+
+    /// Tiles of which `kept` columns and rows are kept, both rounded up to multiples of 32, with at least `halo` columns
+    /// around that. Where labels match to the left, there are as many more columns on the left as the largest disparity,
+    /// so that all costs of what is kept are the whole image's; likewise on the right. Rows have a halo too, but not under
+    /// [`Schedule::Sweep`], where bands of rows are independent of each other.
+    #[must_use]
+    pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
+        let Size { width, height } = plan.image_size();
+        let model = plan.model();
+        let [left, right] = [model.disparity(model.labels() as u16 - 1), -model.min_disparity()]
+            .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(ALIGN));
+        let swept = plan.settings().schedule == Schedule::Sweep;
+        let beyond = if swept { 0 } else { halo.next_multiple_of(ALIGN) };
+        let columns = spans(width, kept.width.next_multiple_of(ALIGN), (left, right));
+        let rows = spans(height, kept.height.next_multiple_of(ALIGN), (beyond, beyond));
+        Self { plan, columns, rows }
+    }
+
+    /// The tiling that runs within `bytes`, where `needed` tells what a device needs for a plan, or why it cannot run it:
+    ///
+    /// 1. the whole image;
+    /// 2. strips of rows that give the same answer, the fewest, see [`Tiling::is_exact`];
+    /// 3. tiles with a halo of [`HALO`]: those that compute least in all; under [`Schedule::Sweep`] the highest among
+    ///    those that compute no more than four times what the whole image does, if any.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], which names what the smallest tiles need, or why those cannot run.
+    pub fn within(plan: &Plan, bytes: u64, needed: &Needed<'_>) -> Result<Self, Error> {
+        let fits = |tiling: &Self| tiling.bytes(needed).is_ok_and(|needed| needed <= bytes);
+        let whole = Self::whole(plan.clone());
+        if fits(&whole) {
+            return Ok(whole);
+        }
+        if let Some(strips) = exact_strips(plan, fits) {
+            return Ok(strips);
+        }
+        let tiles: Vec<Self> = heights(plan).filter_map(|height| widest(plan, height, fits)).collect();
+        let swept = plan.settings().schedule == Schedule::Sweep;
+        let high = tiles.iter().position(|tiling| swept && tiling.work() <= 4.0);
+        let least = (0..tiles.len()).min_by(|&a, &b| tiles[a].work().total_cmp(&tiles[b].work()));
+        match high.or(least).and_then(|index| tiles.into_iter().nth(index)) {
+            Some(tiling) => Ok(tiling),
+            None => {
+                let smallest = Self::cut(plan.clone(), Size { width: 1, height: 1 }, HALO);
+                let needed = smallest.bytes(needed)?;
+                Err(Error::OutOfMemory { what: "the smallest tiles", needed, available: Some(bytes) })
+            }
+        }
+    }
+
+    /// The plan of the whole image.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// All tiles, those of one size one after another, the largest first.
+    #[must_use]
+    pub fn tiles(&self) -> Vec<Tile> {
+        let mut tiles = Vec::with_capacity(self.columns.len() * self.rows.len());
+        for columns in &self.columns {
+            tiles.extend(self.rows.iter().map(|rows| Tile { columns: columns.clone(), rows: rows.clone() }));
+        }
+        tiles.sort_by_key(|tile| std::cmp::Reverse((tile.size().pixels(), tile.size().width)));
+        tiles
+    }
+
+    /// How many tiles lie beside and above each other.
+    #[must_use]
+    pub fn counts(&self) -> (usize, usize) {
+        (self.columns.len(), self.rows.len())
+    }
+
+    /// The largest number of columns and of rows that a tile matches.
+    #[must_use]
+    pub fn tile_size(&self) -> Size {
+        let longest = |spans: &[Span]| spans.iter().map(|span| span.all.len()).max().unwrap_or(1);
+        Size { width: longest(&self.columns), height: longest(&self.rows) }
+    }
+
+    /// Whether the image is one tile.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.counts() == (1, 1)
+    }
+
+    /// Whether the answer is the one of the whole image to the bit. It is for strips under [`Schedule::Sweep`] that begin at
+    /// multiples of as many rows as a band of the coarsest grid covers: on every grid bands depend on those that cover them
+    /// on coarser ones, and on no others.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        let apart = |rows: &Span| rows.all == rows.kept && rows.all.start.is_multiple_of(exact_rows(&self.plan));
+        let swept = self.plan.settings().schedule == Schedule::Sweep;
+        self.is_whole() || swept && self.columns.len() == 1 && self.rows.iter().all(apart)
+    }
+
+    /// Message entries that all tiles compute.
+    #[must_use]
+    pub fn message_updates(&self) -> u64 {
+        let plans = self.tiles().into_iter().filter_map(|tile| tile.plan(&self.plan).ok());
+        plans.fold(0, |sum: u64, plan| sum.saturating_add(plan.message_updates()))
+    }
+
+    /// Bytes that [`crate::Tiled`] needs for it: for the largest tile, with a copy of its part of the pair, and for the
+    /// labels of all.
+    ///
+    /// # Errors
+    /// Those of `needed`.
+    pub fn bytes(&self, needed: &Needed<'_>) -> Result<u64, Error> {
+        if self.is_whole() {
+            return needed(&self.plan);
+        }
+        let mut most = 0;
+        for columns in distinct(&self.columns) {
+            for rows in distinct(&self.rows) {
+                let tile = Tile { columns: columns.clone(), rows: rows.clone() };
+                let bytes = needed(&tile.plan(&self.plan)?)?;
+                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.image_size())));
+            }
+        }
+        Ok(most.saturating_add(2 * self.plan.image_size().pixels() as u64))
+    }
+
+    /// Pixels that are matched for each pixel of the image.
+    fn work(&self) -> f64 {
+        let matched = |spans: &[Span]| spans.iter().map(|span| span.all.len()).sum::<usize>() as f64;
+        matched(&self.columns) * matched(&self.rows) / self.plan.image_size().pixels() as f64
+    }
+}
+
+/// Tells how many bytes a device needs for a plan, or why it cannot run it.
+pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
+
+/// The parts of `len` columns or rows of which so many are kept each, with so many more before and after where there are
+/// any.
+fn spans(len: usize, kept: usize, (before, after): (usize, usize)) -> Vec<Span> {
+    let span = |start: usize| {
+        let end = (start + kept).min(len);
+        Span { all: start.saturating_sub(before)..(end + after).min(len), kept: start..end }
+    };
+    (0..len).step_by(kept).map(span).collect()
+}
+
+/// One span of each length.
+fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {
+    let first = |index: usize| spans.iter().position(|span| span.all.len() == spans[index].all.len()) == Some(index);
+    spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)
+}
+
+/// Rows that a band of the coarsest grid covers.
+fn exact_rows(plan: &Plan) -> usize {
+    BAND_ROWS << (plan.grids() - 1)
+}
+
+/// The fewest exact strips that fit.
+fn exact_strips(plan: &Plan, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
+    let (size, unit) = (plan.image_size(), exact_rows(plan));
+    let strips = |units: usize| Tiling::cut(plan.clone(), Size { width: size.width, height: units * unit }, 0);
+    let swept = plan.settings().schedule == Schedule::Sweep;
+    if !swept || size.height <= unit {
+        return None;
+    }
+    evenly(size.height.div_ceil(unit), |units| fits(&strips(units))).map(strips)
+}
+
+/// Heights of tiles to try, from the highest.
+fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
+    let height = plan.image_size().height;
+    let highest = match plan.settings().schedule {
+        Schedule::Sweep => exact_rows(plan),
+        Schedule::Sync | Schedule::Checkerboard => height.next_multiple_of(ALIGN),
+    };
+    std::iter::successors(Some(highest), |&rows| (rows > ALIGN).then(|| rows.div_ceil(2).next_multiple_of(ALIGN)))
+}
+
+/// The widest tiles of a height that fit.
+fn widest(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
+    let tiles = |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * ALIGN, height }, HALO);
+    let blocks = plan.image_size().width.div_ceil(ALIGN);
+    evenly(blocks, |blocks| fits(&tiles(blocks))).map(tiles)
+}
+
+/// How many of so many units a part has, if parts are as few as may be and as even: whatever is smaller than a part that
+/// fits does so too. `None` where not even one unit fits.
+fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
+    let (mut most, mut too_many) = (0, units + 1);
+    while most + 1 < too_many {
+        let middle = most.midpoint(too_many);
+        if fits(middle) {
+            most = middle;
+        } else {
+            too_many = middle;
+        }
+    }
+    (most > 0).then(|| units.div_ceil(units.div_ceil(most)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Algorithm, Model, Profile};
+
+    fn plan((width, height): (usize, usize), labels: usize, algorithm: Algorithm) -> Plan {
+        let size = Size { width, height };
+        let settings = algorithm.settings(size, 8, 2, Schedule::Sync);
+        Plan::new(size, Model::new(Profile::Census, labels).unwrap(), settings).unwrap()
+    }
+
+    fn needed(plan: &Plan) -> Result<u64, Error> {
+        Ok(plan.bytes())
+    }
+
+    fn within(plan: &Plan, bytes: u64) -> Tiling {
+        let tiling = Tiling::within(plan, bytes, &needed).unwrap();
+        assert!(tiling.bytes(&needed).unwrap() <= bytes, "{:?}", tiling.counts());
+        tiling
+    }
+
+    #[test]
+    fn less_memory_means_strips_then_tiles_then_an_error_that_names_the_least() {
+        let plan = plan((1500, 3000), 64, Algorithm::Sweep);
+        let whole = plan.bytes();
+        assert!(within(&plan, whole).is_whole());
+        for (bytes, counts, exact) in [
+            (whole - 1, (1, 2), true),
+            (whole / 2, (1, 3), true),
+            (whole / 5, (1, 6), true),
+            (whole / 8, (2, 6), false),
+            (whole / 40, (6, 24), false),
+        ] {
+            let tiling = within(&plan, bytes);
+            assert_eq!((tiling.counts(), tiling.is_exact()), (counts, exact), "{bytes}");
+        }
+        let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed) else {
+            panic!()
+        };
+        assert_eq!(available, Some(1));
+        assert!(!within(&plan, least).is_exact());
+        assert!(Tiling::within(&plan, least - 1, &needed).is_err());
+    }
+
+    #[test]
+    fn other_schedules_are_tiled_both_ways() {
+        for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
+            let plan = plan((1500, 3000), 16, algorithm);
+            let tiling = within(&plan, plan.bytes() / 4);
+            assert!(!tiling.is_exact() && tiling.work() < 1.4, "{:?} {}", tiling.counts(), tiling.work());
+        }
+    }
+
+    #[test]
+    fn what_a_device_cannot_run_is_tiled_too() {
+        let plan = plan((900, 600), 16, Algorithm::Sweep);
+        let narrow = |plan: &Plan| match plan.image_size() {
+            Size { width: 0..=400, .. } => needed(plan),
+            _ => Err(Error::Plan("too wide")),
+        };
+        let tiling = Tiling::within(&plan, u64::MAX, &narrow).unwrap();
+        assert!(tiling.tile_size().width <= 400);
+        let nothing = |_: &Plan| Err(Error::Plan("too small"));
+        assert_eq!(Tiling::within(&plan, u64::MAX, &nothing), Err(Error::Plan("too small")));
+    }
+
+    #[test]
+    fn tiles_share_the_image_and_see_all_that_labels_match() {
+        for (min_disparity, left, right) in
+            [(0, 64 + 16, 64), (-40, 64, 64 + 40), (100, 64 + 115, 64), (-9999, 64, 9999)]
+        {
+            let plan = plan((333, 222), 16, Algorithm::Cfbp);
+            let model = plan.model().with_min_disparity(min_disparity).unwrap();
+            let plan = Plan::new(plan.image_size(), model, *plan.settings()).unwrap();
+            let tiling = Tiling::cut(plan, Size { width: 60, height: 100 }, 64);
+            let mut kept = vec![0; 333 * 222];
+            for Tile { columns, rows } in tiling.tiles() {
+                let pixels = rows.kept.clone().flat_map(|y| columns.kept.clone().map(move |x| (x, y)));
+                pixels.for_each(|(x, y)| kept[y * 333 + x] += 1);
+                assert!(columns.all.start == 0 || columns.all.start + left <= columns.kept.start, "{columns:?}");
+                assert!(columns.all.end == 333 || columns.kept.end + right <= columns.all.end, "{columns:?}");
+                assert!(columns.all.start.is_multiple_of(ALIGN) && rows.all.start.is_multiple_of(ALIGN));
+            }
+            assert_eq!(kept, [1; 333 * 222]);
+        }
+    }
+
+    #[test]
+    fn a_cut_goes_where_its_tiles_are() {
+        let plan = plan((200, 100), 1, Algorithm::Ctbp);
+        let tiling = Tiling::cut(plan, Size { width: 64, height: 64 }, 0);
+        let cuts: Vec<_> = tiling
+            .tiles()
+            .iter()
+            .map(|tile| (tile.columns.all.start, tile.rows.all.start, tile.plan(tiling.plan()).unwrap().settings().cut))
+            .collect();
+        let cut = |x, y, seed_start| Some(Cut { x, y, seed_start });
+        assert!(cuts.contains(&(64, 0, cut(36, 50, true))));
+        assert!(cuts.contains(&(64, 64, cut(36, 0, false))));
+        assert!(cuts.contains(&(0, 0, cut(0, 50, false))));
+        assert!(cuts.contains(&(0, 64, None)));
+    }
+}

@@ -1,0 +1,128 @@
+//! Tiles against the whole image.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+use bp_core::{
+    Algorithm, Backend, Cut, Device, HALO, Matcher, MessageStart, Model, Plan, Profile, Progress, Schedule, Settings,
+    Side, Size, StereoPair, Tiled, Tiling, conformance::noise_pair, synthetic,
+};
+use bp_cpu_rayon::Rayon;
+use bp_cpu_scalar::Scalar;
+
+fn devices() -> [Box<dyn Device>; 2] {
+    [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()]
+}
+
+fn whole(device: &dyn Device, pair: &StereoPair, plan: &Plan) -> Vec<u16> {
+    let mut matcher = Matcher::new(device, plan.clone()).unwrap();
+    matcher.solve(pair).unwrap();
+    matcher.labels().to_vec()
+}
+
+fn tiled(device: &dyn Device, pair: &StereoPair, tiling: Tiling) -> Vec<u16> {
+    let mut tiled = Tiled::new(device, tiling).unwrap();
+    tiled.solve(device, pair).unwrap();
+    tiled.labels().to_vec()
+}
+
+/// Share of pixels whose labels differ, in percent.
+fn differing(a: &[u16], b: &[u16]) -> f64 {
+    100.0 * a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len() as f64
+}
+
+fn swept(grids: usize, steps: u32) -> Settings {
+    let (schedule, message_start) = (Schedule::Sweep, MessageStart::Receiver);
+    Settings { grids, steps, schedule, message_start, cut: None, coarse_clip: true }
+}
+
+#[test]
+fn strips_of_a_swept_image_are_the_whole_image() {
+    for device in devices() {
+        for (profile, (width, height), min_disparity, settings) in [
+            (Profile::Census, (70, 333), 0, swept(3, 1)),
+            (Profile::Census, (33, 257), -9, swept(2, 2)),
+            (Profile::Thesis, (131, 129), 3, swept(1, 1)),
+            (Profile::Mrf, (40, 200), -4, swept(2, 1)),
+            (Profile::Census, (20, 40), 0, swept(3, 1)),
+        ] {
+            let pair = noise_pair(width, height, 7);
+            let model = Model::new(profile, 14).unwrap().with_min_disparity(min_disparity).unwrap();
+            let plan = Plan::new(pair.size(), model, settings).unwrap();
+            let rows = 32 << (settings.grids - 1);
+            let tiling = Tiling::cut(plan.clone(), Size { width, height: rows }, HALO);
+            assert_eq!((tiling.is_exact(), tiling.counts()), (true, (1, height.div_ceil(rows))));
+            assert!(tiled(device.as_ref(), &pair, tiling) == whole(device.as_ref(), &pair, &plan), "{plan:?}");
+        }
+    }
+}
+
+/// What docs/big-images.md says of real images, on a synthetic one.
+#[test]
+fn tiles_with_a_halo_are_nearly_the_whole_image() {
+    let scene = synthetic::scene(0, 2);
+    let size = scene.pair.size();
+    let device = Rayon.open(0).unwrap();
+    let mut coarse_to_fine = Algorithm::Cfbp.settings(size, 1, 2, Schedule::Checkerboard);
+    (coarse_to_fine.grids, coarse_to_fine.steps) = (5, 10);
+    let cut = Algorithm::Ctbp.settings(size, 20, 2, Schedule::Sync);
+    for (settings, most) in [(swept(5, 1), 0.1), (coarse_to_fine, 0.1), (cut, 0.1)] {
+        let plan = Plan::new(size, Model::new(Profile::Census, 56).unwrap(), settings).unwrap();
+        let expected = whole(device.as_ref(), &scene.pair, &plan);
+        let with = |halo| {
+            let tiling = Tiling::cut(plan.clone(), Size { width: 64, height: 512 }, halo);
+            assert!(tiling.counts().0 > 3);
+            differing(&tiled(device.as_ref(), &scene.pair, tiling), &expected)
+        };
+        let (without, share) = (with(0), with(HALO));
+        assert!(share <= most && without > share, "{settings:?}: {share} % with halo, {without} % without");
+    }
+}
+
+#[test]
+fn a_match_to_the_right_is_seen_by_tiles_too() {
+    let scene = synthetic::scene(1, 2);
+    let swapped = StereoPair::new(scene.pair.right().clone(), scene.pair.left().clone()).unwrap();
+    let model = Model::new(Profile::Census, 64).unwrap().with_min_disparity(-63).unwrap();
+    let plan = Plan::new(swapped.size(), model, swept(5, 1)).unwrap();
+    let device = Rayon.open(0).unwrap();
+    let tiling = Tiling::cut(plan.clone(), Size { width: 64, height: 512 }, HALO);
+    let share = differing(&tiled(device.as_ref(), &swapped, tiling), &whole(device.as_ref(), &swapped, &plan));
+    assert!(share <= 0.1, "{share} %");
+}
+
+#[test]
+fn one_tile_is_the_matcher_itself() {
+    let pair = noise_pair(50, 40, 3);
+    let plan = Plan::new(pair.size(), Model::new(Profile::Census, 9).unwrap(), swept(3, 1)).unwrap();
+    let device = Scalar.open(0).unwrap();
+    let mut matcher = Matcher::new(device.as_ref(), plan.clone()).unwrap();
+    matcher.solve(&pair).unwrap();
+    let mut tiled = Tiled::new(device.as_ref(), Tiling::whole(plan)).unwrap();
+    tiled.solve(device.as_ref(), &pair).unwrap();
+    tiled.free_tiles();
+    assert_eq!(tiled.labels(), matcher.labels());
+    assert_eq!(tiled.allocated_bytes(), matcher.allocated_bytes());
+    assert!(tiled.messages(Side::Left).unwrap() == matcher.messages(Side::Left).unwrap());
+}
+
+#[test]
+fn progress_is_of_all_tiles_and_the_answer_outlives_them() {
+    let pair = noise_pair(90, 140, 3);
+    let cut = Some(Cut { x: 45, y: 70, seed_start: true });
+    let settings = Settings { cut, schedule: Schedule::Sync, ..swept(1, 3) };
+    let plan = Plan::new(pair.size(), Model::new(Profile::Census, 9).unwrap(), settings).unwrap();
+    let device = Scalar.open(0).unwrap();
+    let tiling = Tiling::cut(plan, Size { width: 32, height: 32 }, 32);
+    let total = tiling.message_updates();
+    let mut tiled = Tiled::new(device.as_ref(), tiling).unwrap();
+    let mut seen = vec![];
+    let observer = &mut |progress: Progress| {
+        seen.push((progress.done, progress.total));
+        std::ops::ControlFlow::Continue(())
+    };
+    let times = tiled.solve_observed(device.as_ref(), &pair, observer).unwrap();
+    assert!(seen.is_sorted() && seen.last() == Some(&(total, total)));
+    assert!(times.wall.iter().sum::<std::time::Duration>() <= times.total);
+    tiled.free_tiles();
+    assert!(tiled.labels().len() == 90 * 140 && tiled.labels().iter().any(|&label| label > 0));
+    assert!(tiled.messages(Side::Left).is_err());
+}

@@ -1,0 +1,117 @@
+//! What a map's file does not say of itself, as JSON beside it.
+
+use std::path::{Path, PathBuf};
+
+use bp_core::Calibration;
+use serde::Serialize;
+
+use super::{MapFormat, Raster, write_text};
+use crate::{failure::Failure, record};
+
+/// Version of the sidecar; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
+
+/// The sidecar's path: the map's, and `.json`.
+pub(crate) fn sidecar_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
+}
+
+/// Where a map comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Origin<'a> {
+    /// What was matched, where it was.
+    pub(crate) plan: Option<&'a record::Settings>,
+    /// The geometry, of depths.
+    pub(crate) calibration: Option<&'a Calibration>,
+    /// The files that it was made of.
+    pub(crate) inputs: &'a [&'a Path],
+}
+
+/// What is told; a value is `stored * scale + offset`.
+#[derive(Serialize)]
+struct Sidecar<'a> {
+    schema_version: u32,
+    program: String,
+    quantity: &'static str,
+    unit: &'static str,
+    format: &'static str,
+    scale: f64,
+    offset: f64,
+    unknown: Unknown,
+    width: usize,
+    height: usize,
+    /// Disparities of the first and the last label, in pixels.
+    labels: Option<Range<i64>>,
+    /// The least and the largest known value, in `unit`; none where no pixel is known.
+    found: Option<Range<f32>>,
+    calibration: Option<Geometry>,
+    plan: Option<&'a record::Settings>,
+    inputs: Vec<String>,
+}
+
+/// What is stored where nothing is known; JSON has no number for infinity.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Unknown {
+    Number(u16),
+    Text(&'static str),
+}
+
+#[derive(Serialize)]
+struct Range<T> {
+    min: T,
+    max: T,
+}
+
+#[derive(Serialize)]
+struct Geometry {
+    focal_px: f64,
+    baseline_mm: f64,
+    doffs_px: f64,
+    principal_point_px: [f64; 2],
+}
+
+impl From<&Calibration> for Geometry {
+    fn from(calibration: &Calibration) -> Self {
+        Self {
+            focal_px: calibration.focal(),
+            baseline_mm: calibration.baseline(),
+            doffs_px: calibration.doffs(),
+            principal_point_px: calibration.principal_point(),
+        }
+    }
+}
+
+/// Writes the sidecar of a map that was written to `path`.
+pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_>) -> Result<(), Failure> {
+    let format = MapFormat::of(path)?;
+    let (scale, unknown) = match format {
+        MapFormat::Png16 => (1.0 / f64::from(raster.quantity.steps()), Unknown::Number(0)),
+        MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
+    };
+    let labels = |plan: &record::Settings| {
+        let min = i64::from(plan.min_disparity);
+        Range { min, max: min + plan.labels as i64 - 1 }
+    };
+    let sidecar = Sidecar {
+        schema_version: SCHEMA_VERSION,
+        program: format!("bp {}", env!("CARGO_PKG_VERSION")),
+        quantity: raster.quantity.name(),
+        unit: raster.quantity.unit(),
+        format: format.name(),
+        scale,
+        offset: 0.0,
+        unknown,
+        width: raster.size.width,
+        height: raster.size.height,
+        labels: origin.plan.map(labels),
+        found: raster.range().map(|(min, max)| Range { min, max }),
+        calibration: origin.calibration.map(Into::into),
+        plan: origin.plan,
+        inputs: origin.inputs.iter().map(|path| path.display().to_string()).collect(),
+    };
+    let text = serde_json::to_string_pretty(&sidecar).map_err(|error| Failure::writing(path, &error))?;
+    write_text(&sidecar_of(path), &(text + "\n"))
+}
