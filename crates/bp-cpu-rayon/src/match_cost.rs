@@ -1,7 +1,5 @@
 //! Data costs of the image.
 
-use std::array;
-
 use bp_core::{Plan, Profile, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
@@ -172,19 +170,21 @@ impl Row<'_> {
     ) -> [u8; STRIP] {
         let Matching { features, layout, plan, .. } = self.matching;
         let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let left: [_; CHANNELS] = array::from_fn(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
-        let right: [[_; CHANNELS]; 2] =
-            [0, 1].map(|parity| array::from_fn(|channel| features.right(self.y, channel, parity)));
-        let (node, inside) =
-            (&features.inside(plane)[BLOCK + at..BLOCK + at + lanes], [0, 1].map(|p| features.inside(p)));
+        let left = channels::<CHANNELS>(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
+        let node = &features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
+        let right = [0, 1].map(|parity| {
+            let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
+            (right, features.inside(parity))
+        });
         let mut least = [u8::MAX; STRIP];
         for label in 0..layout.labels {
             let raw = &mut raw[label * layout.lanes + at..][..lanes];
             for lane in (0..lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
                 let (parity, start) = self.lanes(plane, at + lane, label);
-                let inside = load(inside[parity], start);
-                let cost = cost(left.map(|left| load(left, lane)), right[parity].map(|right| load(right, start)));
+                let (right, inside) = &right[parity];
+                let cost = cost(left.map(|left| load(left, lane)), right.map(|right| load(right, start)));
+                let inside = load(inside, start);
                 let cost = (cost & inside | outside & !inside) & load(node, lane);
                 cost.store_slice(&mut raw[lane..lane + S::u8s::LEN]);
                 cost.min(load(&least, lane)).store_slice(&mut least[lane..lane + S::u8s::LEN]);
@@ -234,6 +234,14 @@ impl Row<'_> {
             node: block(self.matching.features.inside(plane), at + BLOCK),
         }
     }
+}
+
+/// `lanes` of so many channels.
+#[inline(always)]
+fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
+    let mut all = [[].as_slice(); CHANNELS];
+    all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
+    all
 }
 
 /// [`Profile::Census`].
