@@ -1,7 +1,7 @@
 //! The driver: runs a prepared plan on pair after pair, in the one order that all backends follow, and times it.
 
 use std::{
-    ops::ControlFlow,
+    ops::{AddAssign, ControlFlow},
     time::{Duration, Instant},
 };
 
@@ -48,6 +48,19 @@ pub struct Times {
     pub device: Option<[Duration; Stage::ALL.len()]>,
     /// From the images in memory to the labels in memory; the census search of a cut plan is in here and in no stage. Wall clock.
     pub total: Duration,
+}
+
+/// Adds stage by stage; where only one has the device's clock, its times stand.
+impl AddAssign for Times {
+    fn add_assign(&mut self, other: Self) {
+        let sum = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
+        self.wall = sum(self.wall, other.wall);
+        self.device = match (self.device, other.device) {
+            (Some(a), Some(b)) => Some(sum(a, b)),
+            (one, other) => one.or(other),
+        };
+        self.total += other.total;
+    }
 }
 
 /// How far a solve has come, in message entries.

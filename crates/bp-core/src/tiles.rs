@@ -2,10 +2,7 @@
 
 mod tiling;
 
-use std::{
-    ops::ControlFlow,
-    time::{Duration, Instant},
-};
+use std::{ops::ControlFlow, time::Instant};
 
 pub use tiling::{HALO, Needed, Span, Tile, Tiling};
 
@@ -77,7 +74,7 @@ impl Tiled {
             let mut matcher = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
             let added = self.solve_tile(&mut matcher, pair, &tile, observe)?;
-            times = sum(&times, &added);
+            times += added;
             done += matcher.plan().message_updates();
             self.matcher = Some(matcher);
         }
@@ -154,14 +151,4 @@ impl Tiled {
             None => Err(Error::Plan("messages are kept of images that are matched as a whole only")),
         }
     }
-}
-
-/// Sums of the stages of two solves.
-fn sum(a: &Times, b: &Times) -> Times {
-    let both = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
-    let device = match (a.device, b.device) {
-        (Some(a), Some(b)) => Some(both(a, b)),
-        (one, other) => one.or(other),
-    };
-    Times { wall: both(a.wall, b.wall), device, total: a.total + b.total }
 }

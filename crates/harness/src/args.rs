@@ -1,5 +1,6 @@
 //! The command line.
 
+mod finishing;
 mod matching;
 mod measuring;
 mod outputs;
@@ -12,6 +13,7 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
+pub(crate) use finishing::FinishArgs;
 pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};

@@ -199,10 +199,29 @@ pub struct Settings {
     pub coarse_clip: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
+    /// What was done to the map after matching, where something was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finish: Option<Finish>,
     /// Message entries that the plan predicts to compute.
     pub message_updates: u64,
     /// Bytes that the plan predicts on this device, or in general where there is none.
     pub planned_bytes: u64,
+}
+
+/// What was done to a map after matching, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Finish {
+    /// Whether a left-right check made pixels unknown.
+    pub check: bool,
+    /// Surfaces of fewer pixels were made unknown.
+    pub speckles: Option<usize>,
+    /// Whether unknown pixels were filled.
+    pub fill: bool,
+    /// Side of the median's window.
+    pub median: Option<usize>,
+    /// Whether fractions of disparities were made.
+    pub subpixel: bool,
 }
 
 /// A cut into four parts.

@@ -6,7 +6,7 @@ use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Sche
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{OutputArgs, named, positive, switch, threads};
+use super::{FinishArgs, OutputArgs, named, positive, switch, threads};
 use crate::{backends, files::PixelLimit};
 
 /// `bp match`.
@@ -41,6 +41,9 @@ pub(crate) struct MatchArgs {
     /// Ground truth of the left image: errors are measured where it is given.
     #[arg(long, value_name = "MAP", help_heading = "Ground truth")]
     pub(crate) ground_truth: Option<PathBuf>,
+    /// What is done to the map after matching.
+    #[command(flatten)]
+    pub(crate) finish: FinishArgs,
     /// What else is written, and how.
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,

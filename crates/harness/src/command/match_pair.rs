@@ -26,7 +26,8 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let outputs = Outputs::of(Some(&args.output), &args.outputs);
+    let confidence = args.finish.confidence.clone();
+    let outputs = Outputs { confidence, ..Outputs::of(Some(&args.output), &args.outputs) };
     let making = Making::of(&args.outputs.making)?;
     let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
@@ -35,9 +36,9 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let survey = Survey::of(&pair)?;
     let range = labels::range(&args.plan, pair.size(), &survey, &outputs);
     let plan = plan::plan(&args.plan, pair.size(), range.unwrap_or_else(|| labels::default(&args.plan, pair.size())))?;
-    outputs.check_model(&making, plan.model(), pair.size())?;
     let warnings = warnings::of(&survey, &plan, [&args.left, &args.right], range.is_none());
     warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
+    outputs.check_model(&making, plan.model(), pair.size())?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
     let outputs = (&outputs, &making);
@@ -59,7 +60,8 @@ fn run(
     let errors: Option<Errors> = truth.map(|truth| truth.errors(&answer.map)).transpose()?;
     let inputs: Vec<&Path> = sources(args).collect();
     let (image, plan) = (Some(pair.left()), Some(&answer.settings));
-    outputs.write(making, &Content { map: &answer.map, image, plan, inputs: &inputs })?;
+    let confidence = answer.confidence.as_deref();
+    outputs.write(making, &Content { map: &answer.map, confidence, image, plan, inputs: &inputs })?;
     Ok(Report::new(pair, session.opened(), answer, errors, warnings, outputs.paths(making)))
 }
 

@@ -1,7 +1,8 @@
 //! In which formats maps are stored, and what unknown is in each.
 //!
 //! `.pfm`, `.tif` and `.npy` hold the values themselves in 32-bit floats, plus infinity where unknown. `.png` holds whole
-//! numbers of 16 bits, 0 where unknown: 256 times a disparity, or a depth in millimetres.
+//! numbers of 16 bits, 0 where unknown: 256 times a disparity, a depth in millimetres, or 65535
+//! times a confidence.
 
 use std::path::Path;
 
@@ -58,6 +59,8 @@ pub(crate) enum Quantity {
     Disparity,
     /// Depths in millimetres.
     Depth,
+    /// Confidences from 0 to 1.
+    Confidence,
 }
 
 impl Quantity {
@@ -66,6 +69,7 @@ impl Quantity {
         match self {
             Self::Disparity => "disparity",
             Self::Depth => "depth",
+            Self::Confidence => "confidence",
         }
     }
 
@@ -74,6 +78,7 @@ impl Quantity {
         match self {
             Self::Disparity => "px",
             Self::Depth => "mm",
+            Self::Confidence => "1",
         }
     }
 
@@ -82,6 +87,7 @@ impl Quantity {
         match self {
             Self::Disparity => 256.0,
             Self::Depth => 1.0,
+            Self::Confidence => 65535.0,
         }
     }
 }

@@ -20,6 +20,14 @@ const WRITING: u64 = 8;
 /// Bytes a pixel of depths.
 const DEPTH: u64 = 4;
 
+/// Bytes a pixel of the mirrored pair while the right image is matched, more than what is kept of it.
+const RIGHT: u64 = 6;
+
+/// Bytes a pixel of what finishing a map takes for a time: a map with a frame and the next map; for the confidence, with
+/// both maps, two maps with frames and what a pixel is worth.
+const FINISHING: u64 = 8;
+const CONFIDENCE: u64 = 20;
+
 /// How a plan is tiled, and what it takes.
 pub(crate) struct Fitted {
     /// The tiles.
@@ -74,7 +82,13 @@ impl Beside {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let truth = if args.ground_truth.is_some() { TRUTH } else { 0 };
         let depth = if args.outputs.depth.is_some() { DEPTH } else { 0 };
-        Self { held: PROGRAM + a_pixel(PAIR + truth), finishing: a_pixel(MAP + WRITING + depth) }
+        let finish = &args.finish;
+        let right = if finish.needs_right() { RIGHT } else { 0 };
+        let finishing = if finish.confidence.is_some() { CONFIDENCE } else { FINISHING };
+        Self {
+            held: PROGRAM + a_pixel(PAIR + truth + right),
+            finishing: a_pixel(MAP + (WRITING + depth).max(finishing)),
+        }
     }
 
     /// Most bytes that are held, where tiles need so many.

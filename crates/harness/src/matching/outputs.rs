@@ -25,6 +25,8 @@ pub(crate) struct Outputs {
     pub(crate) depth: Option<PathBuf>,
     /// A point cloud.
     pub(crate) points: Option<PathBuf>,
+    /// How far the map can be trusted.
+    pub(crate) confidence: Option<PathBuf>,
 }
 
 /// How files are made, the same for every pair.
@@ -40,6 +42,8 @@ pub(crate) struct Making {
 pub(crate) struct Content<'a> {
     /// The map.
     pub(crate) map: &'a DisparityMap,
+    /// How far it can be trusted, `[height][width]`.
+    pub(crate) confidence: Option<&'a [f32]>,
     /// The left image, where points take its colours.
     pub(crate) image: Option<&'a Image>,
     /// What was matched, where it was.
@@ -73,7 +77,8 @@ impl Outputs {
     /// What the options ask for, beside a map.
     pub(crate) fn of(map: Option<&Path>, args: &OutputArgs) -> Self {
         let OutputArgs { picture, depth, points, .. } = args;
-        Self { map: map.map(Into::into), picture: picture.clone(), depth: depth.clone(), points: points.clone() }
+        let [picture, depth, points] = [picture, depth, points].map(Clone::clone);
+        Self { map: map.map(Into::into), picture, depth, points, confidence: None }
     }
 
     /// Fails where a file could not be written, would overwrite an input or another output, or lacks what it is made of;
@@ -98,12 +103,17 @@ impl Outputs {
     /// Fails where a format cannot hold the disparities of a model, or the calibration is for images of another size.
     pub(crate) fn check_model(&self, making: &Making, model: &Model, size: Size) -> Result<(), Failure> {
         let [low, high] = [0, model.labels() as u16 - 1].map(|label| model.disparity(label) as f32);
-        self.check_range(low, high)?;
+        self.check_map(making, (low, high), size)
+    }
+
+    /// The same for a map of disparities from the first to the second of `range`.
+    pub(crate) fn check_map(&self, making: &Making, range: (f32, f32), size: Size) -> Result<(), Failure> {
+        self.check_range(range.0, range.1)?;
         making.calibration(size).map(drop)
     }
 
     /// Fails where a format cannot hold disparities from `low` to `high`.
-    pub(crate) fn check_range(&self, low: f32, high: f32) -> Result<(), Failure> {
+    fn check_range(&self, low: f32, high: f32) -> Result<(), Failure> {
         self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))
     }
 
@@ -117,6 +127,10 @@ impl Outputs {
         let disparities = Raster::disparities(content.map);
         self.map.as_deref().map_or(Ok(()), |path| write_map(path, &disparities, making, content, None))?;
         self.picture.as_deref().map_or(Ok(()), |path| making.picture.write(path, content.map))?;
+        if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
+            let raster = Raster { size: content.map.size(), values, quantity: Quantity::Confidence };
+            write_map(path, &raster, making, content, None)?;
+        }
         let Some(calibration) = making.calibration(content.map.size())? else { return Ok(()) };
         self.depth.as_deref().map_or(Ok(()), |path| write_depth(path, making, content, &calibration))?;
         match (&self.points, content.image) {
@@ -128,13 +142,13 @@ impl Outputs {
     /// All files that are written.
     pub(crate) fn paths(&self, making: &Making) -> Vec<PathBuf> {
         let sidecars = self.maps().filter(|_| making.sidecar).map(sidecar_of);
-        let files = [&self.map, &self.picture, &self.depth, &self.points].into_iter().flatten();
+        let files = [&self.map, &self.picture, &self.depth, &self.points, &self.confidence].into_iter().flatten();
         files.cloned().chain(sidecars).collect()
     }
 
     /// The files that hold a value a pixel.
     fn maps(&self) -> impl Iterator<Item = &Path> {
-        [&self.map, &self.depth].into_iter().flatten().map(PathBuf::as_path)
+        [&self.map, &self.depth, &self.confidence].into_iter().flatten().map(PathBuf::as_path)
     }
 }
 

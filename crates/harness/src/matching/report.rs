@@ -1,11 +1,11 @@
 //! What is told of a match, as text or as JSON.
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{fmt::Write as _, path::PathBuf, time::Duration};
 
-use bp_core::{Errors, Stage, StereoPair, Tiling, Times};
+use bp_core::{Errors, Stage, StereoPair, Tiling};
 use serde::Serialize;
 
-use super::Answer;
+use super::{Answer, Sample};
 use crate::{
     backends::Opened,
     command::evaluate::{self, ErrorReport},
@@ -27,8 +27,10 @@ pub(crate) struct Report {
     peak_bytes: u64,
     /// Of every match, in order.
     samples_ms: Vec<f64>,
-    /// The median of these, and the stages of that match.
+    /// The median of these, what of it came after matching, and the stages of that match; of both images' where both
+    /// were matched.
     total_ms: f64,
+    finishing_ms: f64,
     clocks: Vec<record::Clocked>,
     energy: record::Energy,
     errors: Option<ErrorReport>,
@@ -84,7 +86,8 @@ impl Report {
             peak_bytes: answer.peak_bytes,
             samples_ms: answer.samples.iter().map(total_ms).collect(),
             total_ms: total_ms(&median),
-            clocks: record::clocks(&median),
+            finishing_ms: milliseconds(median.finishing),
+            clocks: record::clocks(&median.matching),
             energy: answer.energy.into(),
             errors: errors.map(Into::into),
             messages_sha256: answer.messages_sha256,
@@ -95,14 +98,18 @@ impl Report {
 }
 
 /// The sample of median total; of an even number, the lower one of the two in the middle.
-fn median(samples: &[Times]) -> Times {
+fn median(samples: &[Sample]) -> Sample {
     let mut sorted = samples.to_vec();
-    sorted.sort_by_key(|times| times.total);
+    sorted.sort_by_key(Sample::total);
     sorted[(samples.len() - 1) / 2]
 }
 
-fn total_ms(times: &Times) -> f64 {
-    1000.0 * times.total.as_secs_f64()
+fn total_ms(sample: &Sample) -> f64 {
+    milliseconds(sample.total())
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    1000.0 * time.as_secs_f64()
 }
 
 /// The range of several samples.
@@ -134,6 +141,9 @@ pub(crate) fn text(report: &Report) -> String {
         for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {
             let _ = writeln!(text, "{:<14}{:<16}{ms:>10.1} ms", "", stage.name());
         }
+    }
+    if settings.finish.is_some() {
+        let _ = writeln!(text, "{:<14}{:<16}{:>10.1} ms", "", "after matching", report.finishing_ms);
     }
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (planned, allocated) = (mebibytes(settings.planned_bytes), mebibytes(report.allocated_bytes));

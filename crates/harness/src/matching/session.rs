@@ -1,9 +1,11 @@
 //! A device that is opened once and prepared anew only where a pair needs another plan than the one before.
 
-use bp_core::{Device, DisparityMap, Energy, Plan, Progress, Side, StereoPair, Tiled, Times};
+use bp_core::{Device, DisparityMap, Energy, Plan, Progress, Side, StereoPair, Tiled};
 use sha2::{Digest, Sha256};
 
 use super::{
+    Sample,
+    finishing::{Finished, finished},
     memory::{self, Fitted},
     plan,
     report::Tiles,
@@ -28,8 +30,10 @@ pub(crate) struct Session<'a> {
 pub(crate) struct Answer {
     /// The disparity map.
     pub(crate) map: DisparityMap,
+    /// How far it can be trusted, `[height][width]`, where that was asked for.
+    pub(crate) confidence: Option<Vec<f32>>,
     /// Times of every match, in order.
-    pub(crate) samples: Vec<Times>,
+    pub(crate) samples: Vec<Sample>,
     /// The energy of the labels.
     pub(crate) energy: Energy,
     /// The settings as records tell them.
@@ -69,14 +73,18 @@ impl<'a> Session<'a> {
                 (Tiled::new(device, tiling)?, peak_bytes)
             }
         };
-        let samples = take_samples(&mut tiled, device, pair, args.repeat)?;
+        let (samples, last) = take_samples(args, &mut tiled, device, pair)?;
         let messages_sha256 = args.messages_hash.then(|| hash_messages(&mut tiled)).transpose()?;
         tiled.free_tiles();
         let answer = Answer {
             energy: Energy::of(pair, tiled.plan().model(), tiled.labels())?,
-            map: tiled.disparities(),
+            map: last.map,
+            confidence: last.confidence,
             samples,
-            settings: plan::recorded_settings(&args.plan, tiled.tiling(), opened)?,
+            settings: record::Settings {
+                finish: record::Finish::of(args.finish.finish()),
+                ..plan::recorded_settings(&args.plan, tiled.tiling(), opened)?
+            },
             tiles: Tiles::of(tiled.tiling()),
             allocated_bytes: tiled.allocated_bytes(),
             peak_bytes,
@@ -89,18 +97,31 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Matches the pair so many times.
-fn take_samples(tiled: &mut Tiled, device: &dyn Device, pair: &StereoPair, repeat: u32) -> Result<Vec<Times>, Failure> {
+/// Matches the pair as often as the options say; the last answer stays.
+fn take_samples(
+    args: &MatchArgs,
+    tiled: &mut Tiled,
+    device: &dyn Device,
+    pair: &StereoPair,
+) -> Result<(Vec<Sample>, Finished), Failure> {
     let updates = tiled.tiling().message_updates();
-    let bar = interrupt::ProgressBar::new(updates.saturating_mul(repeat.into()));
-    let mut samples = Vec::new();
-    for index in 0..u64::from(repeat) {
-        let before = updates.saturating_mul(index);
-        let observer = &mut |progress: Progress| bar.update(before.saturating_add(progress.done));
-        samples.push(tiled.solve_observed(device, pair, observer)?);
+    let matches = u64::from(args.repeat) * if args.finish.needs_right() { 2 } else { 1 };
+    let bar = interrupt::ProgressBar::new(updates.saturating_mul(matches));
+    let mut done = 0_u64;
+    let mut solve = |pair: &StereoPair| {
+        let observer = &mut |progress: Progress| bar.update(done.saturating_add(progress.done));
+        let times = tiled.solve_observed(device, pair, observer)?;
+        done = done.saturating_add(updates);
+        Ok::<_, Failure>((times, tiled.disparities()))
+    };
+    let mut last = finished(&args.finish, pair, &mut solve)?;
+    let mut samples = vec![last.sample];
+    for _ in 1..args.repeat {
+        last = finished(&args.finish, pair, &mut solve)?;
+        samples.push(last.sample);
     }
     bar.finish();
-    Ok(samples)
+    Ok((samples, last))
 }
 
 fn hash_messages(tiled: &mut Tiled) -> Result<String, Failure> {

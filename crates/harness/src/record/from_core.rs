@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Clock, Clocked, Cut, Device, Energy, Errors, Settings, Stages};
+use super::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
 
 impl From<bp_core::Energy> for Energy {
     fn from(energy: bp_core::Energy) -> Self {
@@ -49,9 +49,18 @@ impl Settings {
             message_start: settings.message_start.name().to_owned(),
             coarse_clip: settings.coarse_clip,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            finish: None,
             message_updates: plan.message_updates(),
             planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),
         }
+    }
+}
+
+impl Finish {
+    /// What a map goes through; `None` where that is nothing.
+    pub(crate) fn of(finish: bp_core::maps::Finish) -> Option<Self> {
+        let bp_core::maps::Finish { check, speckles, fill, median, subpixel } = finish;
+        (finish != bp_core::maps::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
     }
 }
 

@@ -7,6 +7,7 @@ mod outputs;
 mod recorded;
 mod running;
 mod speed;
+mod survey;
 
 use std::{fs, path::Path, process::Command};
 
