@@ -22,8 +22,9 @@ pub enum Profile {
     /// `min(Hamming distance of 5x5 census codes, 20)`, see [`Profile::Census`].
     Census5x5,
     /// Truncated absolute differences of grey values and of their horizontal gradients,
-    /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`. Gradients
-    /// as evidence are Scharstein's (1994), this sum with its weights Bleyer, Rhemann and Rother's (2011).
+    /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`.
+    /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the numbers
+    /// are ours.
     Gradient,
     /// Grey difference insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`, where d is the
     /// distance of one image's grey value from the range of the other's around the match: from the least to the greatest
@@ -86,8 +87,8 @@ impl Profile {
             Self::Thesis => (10, 17),
             Self::Census => (2, 10),
             Self::Mrf => (20, 40),
-            Self::Census5x5 => (4, 16),
-            Self::Gradient => (10, 40),
+            Self::Census5x5 => (5, 20),
+            Self::Gradient => (7, 50),
             Self::BirchfieldTomasi => (10, 60),
         }
     }
