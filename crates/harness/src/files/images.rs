@@ -59,12 +59,16 @@ impl PixelLimit {
 /// Reads an image of 8 or 16 bits, or a PFM, grey or colour; transparency is ignored, and so is the orientation that a
 /// camera noted.
 pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
-    let bytes = read_limited(path, limit)?;
-    let (size, pixels) = if pfm::is_pfm(&bytes) {
-        let file = pfm::parse(path, &bytes, limit)?;
+    image_of(path, &read_limited(path, limit)?, limit)
+}
+
+/// The same of a file that is in memory.
+pub(crate) fn image_of(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Image, Failure> {
+    let (size, pixels) = if pfm::is_pfm(bytes) {
+        let file = pfm::parse(path, bytes, limit)?;
         (file.size, file.into_pixels(path)?)
     } else {
-        let decoded = decode(path, &bytes, limit)?;
+        let decoded = decode(path, bytes, limit)?;
         (size(&decoded), colours(decoded))
     };
     Image::from_rgb(size.width, size.height, pixels).map_err(|error| Failure::reading(path, &error))
