@@ -1,3 +1,5 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| _ = harness::fuzzing::baseline(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    harness::fuzzing::baseline(bytes);
+});

@@ -1,9 +1,9 @@
 //! Tiny pairs with settings that nobody thought of, drawn from bytes.
 
-use arbitrary::{Result, Unstructured};
+use arbitrary::Unstructured;
 use bp_core::{
-    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Image, Likeness, MAX_GRIDS, MAX_TRUNCATION,
-    MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling,
+    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, Likeness, MAX_GRIDS,
+    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling,
     conformance::{Case, assert_same, solve},
     depth_map,
     maps::{Finish, MEDIANS, confidence},
@@ -48,7 +48,7 @@ pub(super) fn run(bytes: &[u8]) -> bool {
     true
 }
 
-fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> std::result::Result<(), bp_core::Error> {
+fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     let Drawn { case: Case { pair, plan }, tile, memory, .. } = drawn;
     let mirrored = Case { pair: pair.mirrored(), plan: plan.clone() };
     let [slow, fast] = devices;
@@ -72,12 +72,7 @@ fn most(plan: &Plan) -> u64 {
 }
 
 /// Devices give the same labels of a tiling, and those of the whole image where that is promised.
-fn tiles(
-    tiling: &Tiling,
-    pair: &StereoPair,
-    whole: &[u16],
-    devices: [&dyn Device; 2],
-) -> std::result::Result<(), bp_core::Error> {
+fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Device; 2]) -> Result<(), Error> {
     let labels = devices.map(|device| {
         let mut tiled = Tiled::new(device, tiling.clone())?;
         tiled.solve(device, pair)?;
@@ -91,7 +86,7 @@ fn tiles(
 }
 
 /// A map keeps its size and its range, whatever is done to it.
-fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> std::result::Result<(), bp_core::Error> {
+fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> Result<(), Error> {
     let trust = confidence(&left, right)?;
     assert!(trust.len() == left.size().pixels() && trust.iter().all(|share| (0.0..=1.0).contains(share)), "{trust:?}");
     let (size, range) = (left.size(), left.range());
@@ -104,7 +99,7 @@ fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> std::re
 }
 
 /// Labels that a survey proposes are some that there are models of.
-fn surveyed(pair: &StereoPair) -> std::result::Result<(), bp_core::Error> {
+fn surveyed(pair: &StereoPair) -> Result<(), Error> {
     let survey = Survey::of(pair)?;
     assert!((0.0..=1.0).contains(&survey.matched), "{survey:?}");
     if let Some(seen) = survey.seen {
@@ -114,7 +109,7 @@ fn surveyed(pair: &StereoPair) -> std::result::Result<(), bp_core::Error> {
     Ok(())
 }
 
-fn draw(mut from: Unstructured<'_>) -> Result<Option<Drawn>> {
+fn draw(mut from: Unstructured<'_>) -> arbitrary::Result<Option<Drawn>> {
     let size = size(&mut from)?;
     let (model, settings) = (model(&mut from, size)?, settings(&mut from, size)?);
     let finish = finish(&mut from)?;
@@ -127,7 +122,7 @@ fn draw(mut from: Unstructured<'_>) -> Result<Option<Drawn>> {
 }
 
 /// Up to 24 pixels a side; now and then a ribbon, of which several tiles can be made.
-fn size(from: &mut Unstructured<'_>) -> Result<Size> {
+fn size(from: &mut Unstructured<'_>) -> arbitrary::Result<Size> {
     let [long, short] = [from.int_in_range(1..=24)?, from.int_in_range(1..=24)?];
     let ribbon = (8 * long, short.min(3));
     let (width, height) = match from.int_in_range(0..=7)? {
@@ -138,7 +133,7 @@ fn size(from: &mut Unstructured<'_>) -> Result<Size> {
     Ok(Size { width, height })
 }
 
-fn model(from: &mut Unstructured<'_>, size: Size) -> Result<std::result::Result<Model, bp_core::Error>> {
+fn model(from: &mut Unstructured<'_>, size: Size) -> arbitrary::Result<Result<Model, Error>> {
     let profile = *from.choose(&Profile::ALL)?;
     let many = *from.choose(&[63, 64, 65, 129, 300, 1024])?;
     let labels = if from.ratio(1, 8)? { many } else { from.int_in_range(1..=33)? };
@@ -154,7 +149,7 @@ fn model(from: &mut Unstructured<'_>, size: Size) -> Result<std::result::Result<
     Ok(model.map(|model| model.with_weak_edges(weak_edges)))
 }
 
-fn settings(from: &mut Unstructured<'_>, size: Size) -> Result<Settings> {
+fn settings(from: &mut Unstructured<'_>, size: Size) -> arbitrary::Result<Settings> {
     let schedule = *from.choose(&Schedule::ALL)?;
     if from.arbitrary()? {
         let (k, z) = (from.int_in_range(0..=12)?, from.int_in_range(0..=4)?);
@@ -173,7 +168,7 @@ fn settings(from: &mut Unstructured<'_>, size: Size) -> Result<Settings> {
     })
 }
 
-fn finish(from: &mut Unstructured<'_>) -> Result<Finish> {
+fn finish(from: &mut Unstructured<'_>) -> arbitrary::Result<Finish> {
     let median = *from.choose(&MEDIANS)?;
     Ok(Finish {
         check: from.arbitrary()?,
@@ -185,7 +180,7 @@ fn finish(from: &mut Unstructured<'_>) -> Result<Finish> {
 }
 
 /// Both images show the bytes that are left over and over, the right one from where the left one ends.
-fn pair(size: Size, bytes: &[u8]) -> std::result::Result<StereoPair, bp_core::Error> {
+fn pair(size: Size, bytes: &[u8]) -> Result<StereoPair, Error> {
     let mut values = bytes.iter().chain([&0]).copied().cycle();
     let mut pixels = |_| std::array::from_fn(|_| values.next().unwrap_or(0));
     let mut image = || Image::from_rgb(size.width, size.height, (0..size.pixels()).map(&mut pixels).collect());
