@@ -20,6 +20,7 @@ mod interrupt;
 mod machine;
 mod matching;
 mod notes;
+mod panics;
 pub mod record;
 pub mod report;
 pub mod reproduce;

@@ -1,15 +1,10 @@
 //! `bp conform`: whether backends answer as the reference does, to the bit.
 
-use std::{
-    any::Any,
-    io::Write,
-    panic::{self, AssertUnwindSafe},
-    time::Instant,
-};
+use std::{io::Write, time::Instant};
 
 use bp_core::conformance;
 
-use crate::{args::ConformArgs, backends, failure::Failure, tell};
+use crate::{args::ConformArgs, backends, failure::Failure, panics::caught, tell};
 
 /// Runs the command: all backends, though one may fail.
 pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
@@ -30,22 +25,11 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
 fn check(opened: &backends::Opened) -> Result<(), Failure> {
     let reference = backends::reference()?;
     let start = Instant::now();
-    // The suite is made for tests and panics on a difference, which here is an answer like any other. Its words go into
-    // the failure, not through the hook; what it leaves behind is not used again.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| ()));
+    // The suite is made for tests and panics on a difference, which here is an answer like any other.
     let run = || conformance::assert_conforms(reference.device.as_ref(), opened.device.as_ref());
-    let outcome = panic::catch_unwind(AssertUnwindSafe(run));
-    panic::set_hook(hook);
-    outcome.map_err(|payload| Failure::other(words(payload.as_ref())))?;
+    caught(run).map_err(Failure::other)?;
     let (cases, seconds) = (conformance::cases().count(), start.elapsed().as_secs_f64());
     let what = format!("{cases} cases as {} to the bit, and what comes after another pair", reference.name);
     writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
     Ok(())
-}
-
-/// What a panic said.
-fn words(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| payload.downcast_ref().copied()).unwrap_or("it panicked").to_owned()
 }

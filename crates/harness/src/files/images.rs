@@ -14,7 +14,7 @@ use image::{
 use sha2::{Digest, Sha256};
 
 use super::pfm;
-use crate::{failure::Failure, machine};
+use crate::{failure::Failure, machine, panics::caught};
 
 /// The most pixels that a file may hold.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ pub(crate) fn image_of(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<I
         let file = pfm::parse(path, bytes, limit)?;
         (file.size, file.into_pixels(path)?)
     } else {
-        let decoded = decode(path, bytes, limit)?;
+        let decoded = decoded(path, || decode(path, bytes, limit))?;
         (size(path, &decoded)?, colours(decoded))
     };
     Image::from_rgb(size.width, size.height, pixels).map_err(|error| Failure::reading(path, &error))
@@ -100,8 +100,10 @@ pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, 
 
 /// The same of a file that is in memory.
 pub(super) fn stored_grey(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
-    check_unscaled(path, bytes)?;
-    let decoded = decode(path, bytes, limit)?;
+    let decoded = decoded(path, || {
+        check_unscaled(path, bytes)?;
+        decode(path, bytes, limit)
+    })?;
     let size = size(path, &decoded)?;
     let sixteen = has_16_bits(&decoded);
     let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
@@ -171,6 +173,13 @@ pub(super) fn read_limited(path: &Path, limit: PixelLimit) -> Result<Vec<u8>, Fa
     Ok(bytes)
 }
 
+/// What a decoder makes of a file. Some panic on broken ones: that of the crate `png` 0.18.1 does on a palette that ends
+/// within a colour.
+pub(super) fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    let broken = |words| Err(Failure::reading(path, &format!("{ENDS_EARLY} (the decoder: {words})")));
+    caught(decode).unwrap_or_else(broken)
+}
+
 fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
     let format = image::guess_format(bytes).ok().filter(|format| FORMATS.contains(format));
@@ -229,4 +238,17 @@ fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Failure {
 fn has_jpeg_end(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     last([0xff, 0xd9]) > last([0xff, 0xda])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_decoder_panics_on_is_refused() {
+        let bytes = include_bytes!("../../../../fuzz/corpus/image/cut_palette.png");
+        let read = || image_of(Path::new("palette.png"), bytes, PixelLimit::megapixels(1));
+        let message = read().unwrap_err().to_string();
+        assert!(message.contains("palette.png") && message.contains(ENDS_EARLY), "{message}");
+    }
 }

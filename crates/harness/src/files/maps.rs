@@ -7,7 +7,7 @@ use image::ImageFormat;
 
 use super::{
     PixelLimit,
-    images::{read_limited, stored_grey},
+    images::{decoded, read_limited, stored_grey},
     npy, pfm, tiff,
 };
 use crate::failure::Failure;
@@ -46,7 +46,7 @@ fn floats(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Option<(Size, 
         return npy::parse(path, bytes, limit).map(Some);
     }
     match image::guess_format(bytes) {
-        Ok(ImageFormat::Tiff) => tiff::parse(path, bytes, limit),
+        Ok(ImageFormat::Tiff) => decoded(path, || tiff::parse(path, bytes, limit)),
         _ => Ok(None),
     }
 }
@@ -91,5 +91,12 @@ mod tests {
             assert!(Raster::disparities(&map(&[beyond, 0.0])).write(&folder.path().join("no.png")).is_err());
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+    }
+
+    #[test]
+    fn maps_and_masks_without_pixels_are_refused() {
+        let (path, empty) = (Path::new("map.pgm"), b"P5 0 5 255\n");
+        assert!(map_of(path, empty, None, PixelLimit::megapixels(1)).is_err());
+        assert!(mask_of(path, empty, PixelLimit::megapixels(1)).is_err());
     }
 }
