@@ -2,6 +2,8 @@
 
 // [colour][row of the grid][word], two bytes for each of the four nodes.
 @group(0) @binding(6) var<storage, read_write> labels: array<vec2<u32>>;
+// Grey values, see weak_edges.wgsl.
+@group(0) @binding(7) var<storage, read> greys: array<u32>;
 
 // Enough for 1024 labels and those that fill the last quad.
 const LABEL_BITS: u32 = 11;
@@ -23,7 +25,7 @@ fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
 
 // Labels of four nodes of a row and colour, from node 4 word + shift on, where shift is -1, 0 or 1.
 fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
-    let first = (colour * parameters.height + y) * parameters.words;
+    let first = grid_index(colour, y, 0);
     var found: vec4<u32>;
     for (var i = 0; i < 4; i++) {
         let node = clamp(4 * i32(word) + i + shift, 0, 4 * i32(parameters.words) - 1);
@@ -33,33 +35,44 @@ fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
     return found;
 }
 
-// The smoothness cost of a label beside these, where there are any.
-fn smoothness(label: u32, beside: vec4<u32>, exist: vec4<bool>) -> vec4<u32> {
-    let apart = max(vec4(label), beside) - min(vec4(label), beside);
-    return select(vec4(0u), min(parameters.slope * apart, vec4(parameters.truncation)), exist);
+// Neighbours on one side whose labels are decided already: those, where there are any, and where the edges to them are weak.
+struct Beside {
+    labels: vec4<u32>,
+    exist: vec4<bool>,
+    weak: vec4<bool>,
 }
 
-// Labels of neighbours that are decided already, and which of them there are.
 struct Decided {
-    left: vec4<u32>,
-    right: vec4<u32>,
-    up: vec4<u32>,
-    has_left: vec4<bool>,
-    has_right: vec4<bool>,
-    has_up: vec4<bool>,
+    left: Beside,
+    right: Beside,
+    up: Beside,
+}
+
+// The smoothness cost of a label beside these.
+fn smoothness(label: u32, beside: Beside) -> vec4<u32> {
+    let apart = max(vec4(label), beside.labels) - min(vec4(label), beside.labels);
+    var cost = min(parameters.slope * apart, vec4(parameters.truncation));
+    if WEAK {
+        cost = select(cost, min(parameters.weak_slope * apart, vec4(parameters.weak_truncation)), beside.weak);
+    }
+    return select(vec4(0u), cost, beside.exist);
 }
 
 fn decided_neighbours(nodes: Nodes) -> Decided {
     let x = columns(nodes);
     let other = 1 - parameters.colour;
     var known: Decided;
-    known.has_up = vec4(nodes.y % BAND_ROWS != 0 && nodes.y != parameters.cut_y);
-    known.up = decided(other, max(nodes.y, 1) - 1, nodes.word, 0);
+    let weak = weak_edges(nodes);
+    known.up.exist = vec4(nodes.y % BAND_ROWS != 0 && nodes.y != parameters.cut_y);
+    known.up.labels = decided(other, max(nodes.y, 1) - 1, nodes.word, 0);
+    known.up.weak = unpack(weak[UP]) != vec4(0u);
     if parameters.colour == 1 {
-        known.has_left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
-        known.has_right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
-        known.left = decided(other, nodes.y, nodes.word, i32(nodes.parity) - 1);
-        known.right = decided(other, nodes.y, nodes.word, i32(nodes.parity));
+        known.left.exist = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
+        known.right.exist = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
+        known.left.labels = decided(other, nodes.y, nodes.word, i32(nodes.parity) - 1);
+        known.right.labels = decided(other, nodes.y, nodes.word, i32(nodes.parity));
+        known.left.weak = unpack(weak[LEFT]) != vec4(0u);
+        known.right.weak = unpack(weak[RIGHT]) != vec4(0u);
     }
     return known;
 }
@@ -83,14 +96,12 @@ fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
             let label = 4 * quad + i;
             var total = unpack(packed[i]);
             if SWEEP {
-                total += smoothness(label, known.left, known.has_left)
-                    + smoothness(label, known.right, known.has_right)
-                    + smoothness(label, known.up, known.has_up);
+                total += smoothness(label, known.left) + smoothness(label, known.right) + smoothness(label, known.up);
             }
             best = min(best, (total << vec4(LABEL_BITS)) | vec4(label));
         }
     }
     best &= vec4((1u << LABEL_BITS) - 1);
     let pairs = best.xz | (best.yw << vec2(16u));
-    labels[(parameters.colour * parameters.height + nodes.y) * parameters.words + nodes.word] = pairs;
+    labels[grid_index(parameters.colour, nodes.y, nodes.word)] = pairs;
 }

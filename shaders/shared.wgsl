@@ -42,10 +42,16 @@ struct Parameters {
     sends: u32,
     // refine: the side that the messages are sent to, numbered likewise.
     side: u32,
-    // coarsen and refine: width, words and strip of the grid that is read.
+    // coarsen, coarsen_greys and refine: size, words and strip of the grid that is read.
     other_width: u32,
+    other_height: u32,
     other_words: u32,
     other_first_row: u32,
+    // Weak edges: slope, truncation, the least of both, and the grey difference above which edges are weak.
+    weak_slope: u32,
+    weak_truncation: u32,
+    weak_step: u32,
+    edge_threshold: u32,
 }
 
 @group(0) @binding(0) var<storage, read> parameters: Parameters;
@@ -96,6 +102,11 @@ fn columns(nodes: Nodes) -> vec4<u32> {
 // Index of a node's first quad in a plane; further quads follow at distances of `words`.
 fn plane_index(row: u32, word: u32) -> u32 {
     return (row + 1) * parameters.quads * parameters.words + word;
+}
+
+// Index of a word of what is kept of the whole grid: [colour][row][word].
+fn grid_index(colour: u32, y: u32, word: u32) -> u32 {
+    return (colour * parameters.height + y) * parameters.words + word;
 }
 
 // A mask of whole bytes from four conditions.

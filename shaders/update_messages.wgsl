@@ -9,6 +9,8 @@
 @group(0) @binding(7) var<storage, read_write> to_right: array<vec4<u32>>;
 @group(0) @binding(8) var<storage, read_write> to_up: array<vec4<u32>>;
 @group(0) @binding(9) var<storage, read_write> to_down: array<vec4<u32>>;
+// Grey values, see weak_edges.wgsl.
+@group(0) @binding(10) var<storage, read> greys: array<u32>;
 
 // Whether only some sides are sent to, as under the schedule `sweep`.
 override SELECTIVE: bool = false;
@@ -102,7 +104,8 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let first = plane_index(nodes.row, nodes.word);
-    let step = splat(parameters.step);
+    let weak = weak_edges(nodes);
+    let step = of_edges(weak, parameters.step, parameters.weak_step);
 
     var least = vec4(0xffffffffu);
     // What the labels below offer to the next one.
@@ -119,7 +122,7 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
         store_quad(index, h);
     }
 
-    let truncation = splat(parameters.truncation);
+    let truncation = of_edges(weak, parameters.truncation, parameters.weak_truncation);
     let mask = receivers(nodes);
     offer = vec4(0xffffffffu);
     for (var quad = parameters.quads; quad > 0; quad--) {

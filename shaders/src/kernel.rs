@@ -21,8 +21,12 @@ use Access::{Read, Write};
 pub enum Kernel {
     /// What the profile compares, of every pixel of one image; part of the stage `match_cost`.
     Features,
+    /// Grey values of the left image, where there are weak edges; part of the stage `match_cost`.
+    Greys,
     /// Data costs of the image.
     MatchCost,
+    /// Grey values of a coarser grid, where there are weak edges; part of the stage `coarsen`.
+    CoarsenGreys,
     /// Data costs of a coarser grid.
     Coarsen,
     /// First messages of a grid.
@@ -35,15 +39,25 @@ pub enum Kernel {
 
 impl Kernel {
     /// All kernels.
-    pub const ALL: [Self; 6] =
-        [Self::Features, Self::MatchCost, Self::Coarsen, Self::Refine, Self::UpdateMessages, Self::SelectLabels];
+    pub const ALL: [Self; 8] = [
+        Self::Features,
+        Self::Greys,
+        Self::MatchCost,
+        Self::CoarsenGreys,
+        Self::Coarsen,
+        Self::Refine,
+        Self::UpdateMessages,
+        Self::SelectLabels,
+    ];
 
     /// The name of the kernel, of its file and of its entry point.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Features => "features",
+            Self::Greys => "greys",
             Self::MatchCost => "match_cost",
+            Self::CoarsenGreys => "coarsen_greys",
             Self::Coarsen => "coarsen",
             Self::Refine => "refine",
             Self::UpdateMessages => "update_messages",
@@ -56,18 +70,23 @@ impl Kernel {
     pub fn source(self) -> String {
         let own = match self {
             Self::Features => include_str!("../features.wgsl"),
+            Self::Greys => include_str!("../greys.wgsl"),
             Self::MatchCost => include_str!("../match_cost.wgsl"),
+            Self::CoarsenGreys => include_str!("../coarsen_greys.wgsl"),
             Self::Coarsen => include_str!("../coarsen.wgsl"),
             Self::Refine => include_str!("../refine.wgsl"),
             Self::UpdateMessages => include_str!("../update_messages.wgsl"),
             Self::SelectLabels => include_str!("../select_labels.wgsl"),
         };
         let of_several = match self {
-            Self::MatchCost | Self::Coarsen => include_str!("../costs.wgsl"),
-            Self::UpdateMessages | Self::SelectLabels => include_str!("../messages.wgsl"),
-            Self::Features | Self::Refine => "",
+            Self::Features | Self::Greys => [include_str!("../image.wgsl"), ""],
+            Self::MatchCost | Self::Coarsen => [include_str!("../costs.wgsl"), ""],
+            Self::UpdateMessages | Self::SelectLabels => {
+                [include_str!("../messages.wgsl"), include_str!("../weak_edges.wgsl")]
+            }
+            Self::CoarsenGreys | Self::Refine => ["", ""],
         };
-        [include_str!("../shared.wgsl"), of_several, own].concat()
+        [include_str!("../shared.wgsl"), of_several[0], of_several[1], own].concat()
     }
 
     /// What it does with the storage buffers bound to group 0 from binding 1 on, in order. Binding 0 is one block of
@@ -75,12 +94,12 @@ impl Kernel {
     #[must_use]
     pub fn bindings(self) -> &'static [Access] {
         match self {
-            Self::Features => &[Read, Write],
+            Self::Features | Self::Greys | Self::CoarsenGreys => &[Read, Write],
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine => &[Write, Read, Read],
-            Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write],
-            Self::SelectLabels => &[Read, Read, Read, Read, Read, Write],
+            Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read],
+            Self::SelectLabels => &[Read, Read, Read, Read, Read, Write, Read],
         }
     }
 

@@ -59,6 +59,11 @@ impl Grid {
         self.plane_bytes(strip).saturating_mul(self.sum_bytes as u64)
     }
 
+    /// Bytes of the grey values of all nodes: a byte for each node of a row of both colours, up to whole words.
+    pub(crate) fn grey_bytes(&self) -> u64 {
+        2 * (self.words * WORD_NODES) as u64 * self.size.height as u64
+    }
+
     /// The most rows of a strip whose largest buffer fits.
     fn most_rows(&self, bytes: u64) -> usize {
         let rows = bytes / self.row_bytes().saturating_mul(self.sum_bytes.max(1) as u64).max(1);

@@ -63,8 +63,18 @@ parameters! {
     side: u32,
     /// Columns of the grid that is read.
     other_width: u32,
+    /// Its rows.
+    other_height: u32,
     /// Words in a row of its planes.
     other_words: u32,
     /// Row of it that its strip begins with.
     other_first_row: u32,
+    /// Slope of the smoothness cost of weak edges.
+    weak_slope: u32,
+    /// Truncation of theirs.
+    weak_truncation: u32,
+    /// The least of both.
+    weak_step: u32,
+    /// Grey difference above which edges are weak.
+    edge_threshold: u32,
 }

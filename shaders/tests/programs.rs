@@ -7,7 +7,9 @@ use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
 use bp_shaders::{Access, Command, Kernel, Limits, Parameters, Program};
 
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
-    Plan::new(size, Model::new(profile, 30).unwrap(), algorithm.settings(size, 20, 2, schedule)).unwrap()
+    let weak_edges = (profile == Profile::Census).then_some(10);
+    let model = Model::new(profile, 30).unwrap().with_weak_edges(weak_edges);
+    Plan::new(size, model, algorithm.settings(size, 20, 2, schedule)).unwrap()
 }
 
 fn plans() -> impl Iterator<Item = Plan> {
@@ -76,7 +78,7 @@ fn expected(kernel: Kernel, schedule: Schedule, (row, colour): (u32, u32)) -> u3
     let last_of_band = row % 32 == 31;
     match (kernel, schedule) {
         (Kernel::Features, _) => 2,
-        (Kernel::MatchCost | Kernel::SelectLabels, _) => 1,
+        (Kernel::Greys | Kernel::MatchCost | Kernel::SelectLabels, _) => 1,
         // Two steps are composed.
         (Kernel::UpdateMessages, Schedule::Sync) => 2,
         (Kernel::UpdateMessages, Schedule::Checkerboard) => 1,
@@ -84,7 +86,7 @@ fn expected(kernel: Kernel, schedule: Schedule, (row, colour): (u32, u32)) -> u3
         (Kernel::UpdateMessages, Schedule::Sweep) if colour == 1 && last_of_band => 1,
         (Kernel::UpdateMessages, Schedule::Sweep) if colour == 0 && row % 32 == 0 => 1,
         (Kernel::UpdateMessages, Schedule::Sweep) => 2,
-        (Kernel::Coarsen | Kernel::Refine, _) => 0,
+        (Kernel::CoarsenGreys | Kernel::Coarsen | Kernel::Refine, _) => 0,
     }
 }
 
@@ -97,6 +99,9 @@ fn every_row_is_computed_as_often_as_it_should_be() {
         let sum = |wanted| rows.iter().filter(|((kernel, ..), _)| *kernel == wanted).map(|(_, &n)| n as usize).sum();
         let coarse: usize = (1..plan.grids()).map(height).sum();
         assert_eq!(2 * coarse, sum(Kernel::Coarsen), "{plan:?}");
+        let weak = plan.model().weak_edges().is_some();
+        let greys = if weak { [2 * size.height, 2 * coarse] } else { [0, 0] };
+        assert_eq!([sum(Kernel::Greys), sum(Kernel::CoarsenGreys)], greys, "{plan:?}");
         if plan.settings().schedule != Schedule::Sweep {
             let fine: usize = (0..plan.grids() - 1).map(height).sum();
             assert_eq!(4 * 2 * fine, sum(Kernel::Refine), "{plan:?}");
@@ -116,7 +121,7 @@ fn what_no_device_can_run_is_refused() {
     let bp = plan(size, Algorithm::Bp, Schedule::Sync, Profile::Thesis);
     let refusal = |plan: &Plan, limits: Limits| Program::new(plan, &limits).unwrap_err().to_string();
     let error = refusal(&bp, Limits { bindings: 8, ..Limits::roomy() });
-    assert!(error.starts_with("a device cannot run this plan: a kernel needs 10 buffers"), "{error}");
+    assert!(error.starts_with("a device cannot run this plan: a kernel needs 11 buffers"), "{error}");
     let error = refusal(&bp, Limits { workgroups: 1, ..Limits::roomy() });
     assert!(error.contains("a row has 90 pixels and it computes at most 64"), "{error}");
     let error = refusal(&bp, Limits { binding_bytes: 1000, ..Limits::roomy() });

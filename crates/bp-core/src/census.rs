@@ -1,6 +1,6 @@
 //! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
-use crate::{Image, Model, Seed, StereoPair};
+use crate::{Image, Model, Seed, StereoPair, image::grey};
 
 /// Half length of the strip that is compared around the centre: the thesis's "length scan".
 const HALF_LENGTH: usize = 10;
@@ -27,10 +27,16 @@ pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
 /// A bit for each neighbour at most `reach` columns and rows away.
 fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize) -> u32 {
     let centre = image.grey(x, y);
-    let (x, y) = (x as isize, y as isize);
-    let window = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
-    let neighbours = window.filter(|&offset| offset != (0, 0));
-    neighbours.fold(0, |code, (dx, dy)| code << 1 | u32::from(image.grey_near(x + dx, y + dy) > centre))
+    let last = image.size().width as isize - 1;
+    let mut code = 0;
+    for dy in -reach..=reach {
+        let row = image.row_near(y as isize + dy);
+        for dx in (-reach..=reach).filter(|&dx| (dx, dy) != (0, 0)) {
+            let neighbour = grey(row[(x as isize + dx).clamp(0, last) as usize]);
+            code = code << 1 | u32::from(neighbour > centre);
+        }
+    }
+    code
 }
 
 /// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the

@@ -122,9 +122,9 @@ impl DataCost {
     fn compare(&self, l: usize, r: usize) -> u16 {
         match &self.planes {
             Planes::Thesis([left, right]) => features::truncated_difference(left[l], right[r]),
-            Planes::Census([left, right]) => features::hamming_distance(&[left[l]], &[right[r]]).min(6),
+            Planes::Census([left, right]) => ((left[l] ^ right[r]).count_ones() as u16).min(6),
             Planes::Mrf([left, right]) => features::sum_of_differences(left[l], right[r]),
-            Planes::Census5x5([left, right]) => features::hamming_distance(&left[l], &right[r]).min(20),
+            Planes::Census5x5([left, right]) => features::hamming_distance(left[l], right[r]).min(20),
             Planes::Gradient([left, right]) => features::gradient_difference(left[l], right[r]),
             Planes::BirchfieldTomasi([left, right]) => features::sampling_insensitive_difference(left[l], right[r]),
         }

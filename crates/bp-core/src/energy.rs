@@ -27,10 +27,12 @@ impl Energy {
         for (i, &label) in labels.iter().enumerate() {
             let (x, y) = (i % size.width, i / size.width);
             energy.data += u64::from(cost.at(x, y, label));
-            let right = (x + 1 < size.width).then(|| labels[i + 1]);
-            let down = labels.get(i + size.width).copied();
-            let neighbours = right.into_iter().chain(down);
-            energy.smoothness += neighbours.map(|other| u64::from(model.smoothness(label, other))).sum::<u64>();
+            let right = (x + 1 < size.width).then(|| (i + 1, (x + 1, y)));
+            let down = (y + 1 < size.height).then(|| (i + size.width, (x, y + 1)));
+            for (other, (other_x, other_y)) in right.into_iter().chain(down) {
+                let smoothness = model.smoothness_between(pair.left().grey(x, y), pair.left().grey(other_x, other_y));
+                energy.smoothness += u64::from(smoothness.of(label, labels[other]));
+            }
         }
         Ok(energy)
     }
@@ -71,6 +73,9 @@ mod tests {
         assert_eq!(energy, Energy { data: 30, smoothness: 0 });
         let energy = Energy::of(&pair, &model, &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy, Energy { data: 765 + 30 + 765, smoothness: 20 + 20 + 40 });
+        // Across there are 10 grey values between neighbours, down 20.
+        let energy = Energy::of(&pair, &model.with_weak_edges(Some(10)), &[1, 1, 0, 2]).unwrap();
+        assert_eq!(energy.smoothness, 10 + 10 + 40);
         assert!(Energy::of(&pair, &model, &[0; 3]).is_err());
     }
 

@@ -36,6 +36,10 @@
 //! normalised and clipped after. The lower clip of [`crate::Settings::coarse_clip`] is part of what is computed, not of
 //! how: with it, D of a coarse grid means the clipped cost.
 //!
+//! **Weak edges** ([`crate::Model::with_weak_edges`]) have a slope and a truncation of their own, both at most s and K. A
+//! message over one lies in 0..=K div 2, so within 0..=K, and its truncation offers `h_min + K div 2`, so that an entry above
+//! `h_min + K` matters even less to it. All bounds here hold with s and K.
+//!
 //! **Plain adds.** A sum never exceeds `4K + 1 + 3K + min(s, K)` in a message update and `4K + 1 + 4K` in a belief.
 //! Where these are at most 255, wrapping adds give the same; otherwise they must saturate.
 //!

@@ -32,9 +32,9 @@ pub(crate) fn sum_of_differences(left: [u8; 3], right: [u8; 3]) -> u16 {
     left.into_iter().zip(right).map(|(left, right)| difference(left, right)).sum()
 }
 
-/// Bits in which two codes differ.
-pub(crate) fn hamming_distance(left: &[u8], right: &[u8]) -> u16 {
-    left.iter().zip(right).map(|(left, right)| (left ^ right).count_ones() as u16).sum()
+/// Bits in which two of [`census_5x5`] differ.
+pub(crate) fn hamming_distance([a, b, c]: [u8; 3], [d, e, f]: [u8; 3]) -> u16 {
+    (u32::from_be_bytes([0, a, b, c]) ^ u32::from_be_bytes([0, d, e, f])).count_ones() as u16
 }
 
 /// The cost under [`crate::Profile::Gradient`] of two of [`gradient`].

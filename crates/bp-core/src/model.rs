@@ -1,6 +1,6 @@
 //! The grid Markov random field: labels, data cost profile and smoothness.
 
-use crate::Error;
+use crate::{Error, Smoothness};
 
 /// Most labels of a model.
 pub const MAX_LABELS: usize = 1024;
@@ -22,8 +22,9 @@ pub enum Profile {
     /// `min(Hamming distance of 5x5 census codes, 20)`, see [`Profile::Census`].
     Census5x5,
     /// Truncated absolute differences of grey values and of their horizontal gradients,
-    /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`. Gradients
-    /// as evidence are Scharstein's (1994), this sum with its weights Bleyer, Rhemann and Rother's (2011).
+    /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`.
+    /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the numbers
+    /// are ours.
     Gradient,
     /// Grey difference insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`, where d is the
     /// distance of one image's grey value from the range of the other's around the match: from the least to the greatest
@@ -86,15 +87,16 @@ impl Profile {
             Self::Thesis => (10, 17),
             Self::Census => (2, 10),
             Self::Mrf => (20, 40),
-            Self::Census5x5 => (4, 16),
-            Self::Gradient => (10, 40),
+            Self::Census5x5 => (5, 20),
+            Self::Gradient => (7, 50),
             Self::BirchfieldTomasi => (10, 60),
         }
     }
 }
 
 /// What is to be minimised: the labels and the energy
-/// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q).
+/// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q), with
+/// half of s and K where that edge is weak, see [`Model::with_weak_edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Model {
     profile: Profile,
@@ -102,6 +104,7 @@ pub struct Model {
     min_disparity: i32,
     slope: u8,
     truncation: u8,
+    weak_edges: Option<u8>,
 }
 
 impl Model {
@@ -114,7 +117,7 @@ impl Model {
             return Err(Error::Labels { labels });
         }
         let (slope, truncation) = profile.smoothness();
-        Ok(Self { profile, labels: labels as u16, min_disparity: 0, slope, truncation })
+        Ok(Self { profile, labels: labels as u16, min_disparity: 0, slope, truncation, weak_edges: None })
     }
 
     /// The same with label i standing for a disparity of `min_disparity + i` pixels.
@@ -137,6 +140,15 @@ impl Model {
             return Err(Error::Truncation { truncation });
         }
         Ok(Self { slope, truncation, ..self })
+    }
+
+    /// The same with *weak edges*: surfaces are expected to end where the image changes, so that an edge between two
+    /// nodes whose grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2.
+    /// On every grid edges are told weak by that grid's own grey values, see [`Model::coarse_grey`]. `None`, which is how a
+    /// model starts: no edge is weak. That smoothness should give way there is Boykov, Veksler and Zabih's (2001).
+    #[must_use]
+    pub fn with_weak_edges(self, threshold: Option<u8>) -> Self {
+        Self { weak_edges: threshold, ..self }
     }
 
     /// The data cost profile.
@@ -175,16 +187,33 @@ impl Model {
         self.truncation
     }
 
-    /// Cost of one step between neighbouring labels, `min(s, K)`: what the two passes of a message update add.
+    /// The grey difference above which edges are weak; `None` where none is.
     #[must_use]
-    pub fn step(&self) -> u8 {
-        self.slope.min(self.truncation)
+    pub fn weak_edges(&self) -> Option<u8> {
+        self.weak_edges
     }
 
-    /// The smoothness cost `min(s |a - b|, K)` of two neighbouring nodes.
+    /// The smoothness cost of edges that are not weak.
     #[must_use]
-    pub fn smoothness(&self, a: u16, b: u16) -> u32 {
-        (u32::from(self.slope) * u32::from(a.abs_diff(b))).min(u32::from(self.truncation))
+    pub fn smoothness(&self) -> Smoothness {
+        Smoothness { slope: self.slope, truncation: self.truncation }
+    }
+
+    /// The smoothness cost of an edge between nodes of these grey values.
+    #[must_use]
+    pub fn smoothness_between(&self, a: u8, b: u8) -> Smoothness {
+        let is_weak = self.weak_edges.is_some_and(|threshold| a.abs_diff(b) > threshold);
+        if is_weak { self.smoothness().weakened() } else { self.smoothness() }
+    }
+
+    /// The grey value of a node of a coarser grid: the mean of those of its `count` children, whose sum is given, rounded
+    /// as `(sum + count div 2) div count`.
+    ///
+    /// # Panics
+    /// Where `count` is 0.
+    #[must_use]
+    pub fn coarse_grey(sum: u16, count: u16) -> u8 {
+        ((sum + count / 2) / count) as u8
     }
 
     /// The value `4K + 1` that stored data costs are clipped at: no label as dear as that is ever chosen. See also
@@ -222,6 +251,18 @@ mod tests {
         assert!(model.with_smoothness(1, 63).is_ok());
         assert_eq!(model.with_smoothness(1, 64), Err(Error::Truncation { truncation: 64 }));
         assert!(model.with_min_disparity(i32::MIN).is_err());
+    }
+
+    #[test]
+    fn edges_are_weak_above_the_threshold_only() {
+        let plain = Model::new(Profile::Census, 4).unwrap().with_smoothness(3, 11).unwrap();
+        let model = plain.with_weak_edges(Some(10));
+        let weak = Smoothness { slope: 1, truncation: 5 };
+        assert_eq!([(50, 60), (60, 50)].map(|(a, b)| model.smoothness_between(a, b)), [plain.smoothness(); 2]);
+        assert_eq!([(50, 61), (61, 50)].map(|(a, b)| model.smoothness_between(a, b)), [weak; 2]);
+        assert_eq!(plain.smoothness_between(0, 255), plain.smoothness());
+        assert_eq!((weak.of(2, 9), weak.of(9, 6), weak.step()), (5, 3, 1));
+        assert_eq!([(3, 2), (5, 4), (6, 4), (1020, 4)].map(|(sum, n)| Model::coarse_grey(sum, n)), [2, 1, 2, 255]);
     }
 
     #[test]

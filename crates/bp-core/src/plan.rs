@@ -189,6 +189,9 @@ impl Plan {
         for grid in 0..self.grids() {
             let volume = self.volume(grid) as u64;
             buffers.push(Buffer { name: "data cost", grid, bytes: volume });
+            if self.grey_bytes(grid) > 0 {
+                buffers.push(Buffer { name: "grey values", grid, bytes: self.grey_bytes(grid) });
+            }
             if self.keeps_sums(grid) {
                 let bytes = volume.saturating_mul(self.sum_bytes(grid) as u64);
                 buffers.push(Buffer { name: "data cost sums", grid, bytes });
@@ -203,6 +206,15 @@ impl Plan {
             }
         }
         buffers
+    }
+
+    /// Bytes of the grey values that tell a grid's weak edges, one a node, where there are any.
+    ///
+    /// # Panics
+    /// Where there is no such grid.
+    #[must_use]
+    pub fn grey_bytes(&self, grid: usize) -> u64 {
+        if self.model.weak_edges().is_some() { self.sizes[grid].pixels() as u64 } else { 0 }
     }
 
     /// Sum over [`Plan::buffers`].

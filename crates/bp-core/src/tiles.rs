@@ -4,7 +4,7 @@ mod tiling;
 
 use std::{ops::ControlFlow, time::Instant};
 
-pub use tiling::{HALO, Needed, Span, Tile, Tiling};
+pub use tiling::{HALO, Likeness, Needed, Span, Tile, Tiling};
 
 use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 
@@ -73,10 +73,10 @@ impl Tiled {
         for tile in self.tiling.tiles() {
             let mut matcher = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
-            let added = self.solve_tile(&mut matcher, pair, &tile, observe)?;
-            times += added;
+            let solved = self.solve_tile(&mut matcher, pair, &tile, observe);
             done += matcher.plan().message_updates();
             self.matcher = Some(matcher);
+            times += solved?;
         }
         times.total = start.elapsed();
         Ok(times)

@@ -86,7 +86,7 @@ impl Features {
 }
 
 /// Fewest rows that are worth handing to another thread.
-const MIN_ROWS: usize = 32;
+pub(crate) const MIN_ROWS: usize = 32;
 
 /// Bytes that [`Features`] hold, predicted.
 pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
@@ -232,7 +232,7 @@ fn mean(a: u8, b: u8) -> u8 {
 }
 
 #[inline(always)]
-fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
+pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
 }
 

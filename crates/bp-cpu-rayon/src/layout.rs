@@ -4,6 +4,8 @@ use std::ops::Deref;
 
 use bp_core::{Error, Plan, Side, Size, memory};
 
+use crate::greys::{self, Around, Greys};
+
 /// Every row of lanes is a whole number of blocks; no vector is longer.
 pub(crate) const BLOCK: usize = 64;
 
@@ -55,14 +57,15 @@ impl Shape {
     pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
         (0..self.size.width).map(|x| (x, x % 2, x / 2))
     }
-
-    /// Bytes that a [`Layout`] holds.
-    pub(crate) fn layout_bytes(&self) -> u64 {
-        (4 * (self.lanes + 2 * BLOCK) + 2 * self.lanes + self.size.height) as u64
-    }
 }
 
-/// A shape, and which nodes have which neighbours.
+/// Bytes that the [`Layout`] of a grid holds.
+pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
+    let Shape { lanes, size, .. } = Shape::new(plan, grid);
+    (4 * (lanes + 2 * BLOCK) + 2 * lanes + size.height) as u64 + greys::bytes(plan, grid)
+}
+
+/// A shape and the edges between its nodes: which there are and, once a pair is taken in, which of these are weak.
 #[derive(Debug)]
 pub(crate) struct Layout {
     shape: Shape,
@@ -73,6 +76,7 @@ pub(crate) struct Layout {
     none_and_all: [Vec<u8>; 2],
     /// By row: whether it exchanges messages with the row above.
     joined_above: Vec<bool>,
+    pub(crate) greys: Greys,
 }
 
 impl Deref for Layout {
@@ -104,13 +108,14 @@ impl Layout {
             masks: [[mask(0, Side::Right)?, mask(0, Side::Left)?], [mask(1, Side::Left)?, mask(1, Side::Right)?]],
             none_and_all: [memory::filled("masks", shape.lanes, 0)?, memory::filled("masks", shape.lanes, u8::MAX)?],
             joined_above,
+            greys: Greys::new(plan, grid)?,
         })
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let masks = self.masks.iter().flatten().chain(&self.none_and_all);
-        masks.map(memory::bytes).sum::<u64>() + memory::bytes(&self.joined_above)
+        masks.map(memory::bytes).sum::<u64>() + memory::bytes(&self.joined_above) + self.greys.bytes()
     }
 
     /// Of `plane`: the masks of the neighbours in the same and in the next pair of columns, `[lane]`.
@@ -126,6 +131,11 @@ impl Layout {
     /// The mask of nodes none of which has a neighbour, and that of nodes which all have one, `[lane]`.
     pub(crate) fn none_and_all(&self) -> [&[u8]; 2] {
         self.none_and_all.each_ref().map(Vec::as_slice)
+    }
+
+    /// The grey values around the nodes of `plane` in row `y`; `None` where no edge is weak.
+    pub(crate) fn around(&self, plane: usize, y: usize) -> Option<Around<'_>> {
+        self.greys.around(plane, y)
     }
 
     /// Whether row `y` exchanges messages with the row above; not so for the row below the last.

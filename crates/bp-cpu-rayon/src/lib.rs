@@ -7,14 +7,14 @@
 //! memory is predicted for how many.
 //!
 //! `layout` says how values lie in memory, `edges` why one message an edge is enough, `wavefront` how several
-//! steps pass over the image at once, `sweep` how a band is swept by itself, `features` what is compared. One file a
-//! kernel: `match_cost`, `coarsen`, `refine`, `update_messages`,
-//! `select_labels`.
+//! steps pass over the image at once, `sweep` how a band is swept by itself, `features` what is compared, `greys` which edges are weak.
+//! One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`.
 
 mod coarsen;
 mod costs;
 mod edges;
 mod features;
+mod greys;
 mod layout;
 mod match_cost;
 mod refine;

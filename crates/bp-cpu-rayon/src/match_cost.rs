@@ -1,7 +1,5 @@
 //! Data costs of the image.
 
-use std::array;
-
 use bp_core::{Plan, Profile, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
@@ -137,13 +135,26 @@ impl Row<'_> {
 
     #[inline(always)]
     fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
+        // A closure, since a function that is handed over may be called where it should be inlined.
+        macro_rules! compared_by {
+            ($cost:ident) => {
+                self.strip(
+                    simd,
+                    plane,
+                    strip,
+                    raw,
+                    #[inline(always)]
+                    |left, right| $cost(simd, left, right),
+                )
+            };
+        }
         match self.matching.plan.model().profile() {
-            Profile::Census => self.strip(simd, plane, strip, raw, hamming_distance::<S>),
-            Profile::Census5x5 => self.strip(simd, plane, strip, raw, hamming_distance_5x5::<S>),
-            Profile::Gradient => self.strip(simd, plane, strip, raw, gradient_difference::<S>),
-            Profile::BirchfieldTomasi => self.strip(simd, plane, strip, raw, sampling_insensitive_difference::<S>),
+            Profile::Census => compared_by!(hamming_distance),
+            Profile::Census5x5 => compared_by!(hamming_distance_5x5),
+            Profile::Gradient => compared_by!(gradient_difference),
+            Profile::BirchfieldTomasi => compared_by!(sampling_insensitive_difference),
             // The costs of mrf are wide.
-            Profile::Thesis | Profile::Mrf => self.strip(simd, plane, strip, raw, truncated_difference::<S>),
+            Profile::Thesis | Profile::Mrf => compared_by!(truncated_difference),
         }
     }
 
@@ -155,23 +166,25 @@ impl Row<'_> {
         plane: usize,
         (at, lanes): (usize, usize),
         raw: &mut [u8],
-        cost: impl Fn(S, [S::u8s; CHANNELS], [S::u8s; CHANNELS]) -> S::u8s,
+        cost: impl Fn([S::u8s; CHANNELS], [S::u8s; CHANNELS]) -> S::u8s,
     ) -> [u8; STRIP] {
         let Matching { features, layout, plan, .. } = self.matching;
         let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let left: [_; CHANNELS] = array::from_fn(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
-        let right: [[_; CHANNELS]; 2] =
-            [0, 1].map(|parity| array::from_fn(|channel| features.right(self.y, channel, parity)));
-        let (node, inside) =
-            (&features.inside(plane)[BLOCK + at..BLOCK + at + lanes], [0, 1].map(|p| features.inside(p)));
+        let left = channels::<CHANNELS>(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
+        let node = &features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
+        let right = [0, 1].map(|parity| {
+            let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
+            (right, features.inside(parity))
+        });
         let mut least = [u8::MAX; STRIP];
         for label in 0..layout.labels {
             let raw = &mut raw[label * layout.lanes + at..][..lanes];
             for lane in (0..lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
                 let (parity, start) = self.lanes(plane, at + lane, label);
-                let inside = load(inside[parity], start);
-                let cost = cost(simd, left.map(|left| load(left, lane)), right[parity].map(|right| load(right, start)));
+                let (right, inside) = &right[parity];
+                let cost = cost(left.map(|left| load(left, lane)), right.map(|right| load(right, start)));
+                let inside = load(inside, start);
                 let cost = (cost & inside | outside & !inside) & load(node, lane);
                 cost.store_slice(&mut raw[lane..lane + S::u8s::LEN]);
                 cost.min(load(&least, lane)).store_slice(&mut least[lane..lane + S::u8s::LEN]);
@@ -223,6 +236,14 @@ impl Row<'_> {
     }
 }
 
+/// `lanes` of so many channels.
+#[inline(always)]
+fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
+    let mut all = [[].as_slice(); CHANNELS];
+    all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
+    all
+}
+
 /// [`Profile::Census`].
 #[inline(always)]
 fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
@@ -232,7 +253,7 @@ fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1])
 /// [`Profile::Census5x5`].
 #[inline(always)]
 fn hamming_distance_5x5<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
-    let [a, b, c] = array::from_fn(|channel| left[channel] ^ right[channel]);
+    let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
     // Added bit by bit first, to a sum and a carry that counts twice: that leaves two vectors of bits to count.
     let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
     let twice = carry.count_ones();
@@ -249,24 +270,27 @@ fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s;
 /// [`Profile::Gradient`]: `(3 a + 35 b + 5) div 10`, which is `(3 a div 5 + 7 b + 1) div 2`.
 #[inline(always)]
 fn gradient_difference<S: Simd>(simd: S, left: [S::u8s; 2], right: [S::u8s; 2]) -> S::u8s {
-    let [grey, gradient] = array::from_fn(|channel| difference::<S>(left[channel], right[channel]));
-    let most = |most| S::u8s::splat(simd, most);
+    let (grey, gradient) = (difference::<S>(left[0], right[0]), difference::<S>(left[1], right[1]));
+    let [four, five, fifteen] = [4, 5, 15].map(|most| S::u8s::splat(simd, most));
     // A table has 16 entries, and a takes 21 values; but 15 more of it are 9 more of 3 a div 5.
     let table = |difference| 3 * difference / 5;
-    let upper = grey.saturating_sub(most(15)).min(most(5));
-    let greys = look_up(simd, table, grey.min(most(15))) + look_up(simd, table, upper);
-    let gradients = look_up(simd, |difference| 7 * difference + 1, gradient.min(most(4)));
+    let upper = grey.saturating_sub(fifteen).min(five);
+    let greys = look_up(simd, table, grey.min(fifteen)) + look_up(simd, table, upper);
+    let gradients = look_up(simd, |difference| 7 * difference + 1, gradient.min(four));
     (greys + gradients) >> 1
 }
 
 /// [`Profile::BirchfieldTomasi`]: `(15 d + 5) div 10`, which is `d + (d + 1) div 2`.
 #[inline(always)]
 fn sampling_insensitive_difference<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
-    let outside = |[value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]| {
-        value.saturating_sub(greatest) | least.saturating_sub(value)
-    };
-    let outside = outside(left, right).min(outside(right, left)).min(S::u8s::splat(simd, 20));
+    let outside = outside::<S>(left, right).min(outside::<S>(right, left)).min(S::u8s::splat(simd, 20));
     outside + ((outside + S::u8s::splat(simd, 1)) >> 1)
+}
+
+/// How far a value lies outside the range around the other pixel's.
+#[inline(always)]
+fn outside<S: Simd>([value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]) -> S::u8s {
+    value.saturating_sub(greatest) | least.saturating_sub(value)
 }
 
 #[inline(always)]

@@ -1,11 +1,14 @@
 //! Labels: those of least belief, or in sequence, given the labels already decided.
 
-use bp_core::{MAX_TRUNCATION, Model, Plan, Schedule, Side};
+use std::array;
+
+use bp_core::{MAX_TRUNCATION, Model, Plan, Schedule, Side, Smoothness};
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
 use crate::{
     edges::Rows,
+    greys::Around,
     layout::{Layout, STRIP},
     refine::slot,
 };
@@ -83,6 +86,7 @@ impl<'a> Answer<'a> {
             let (even, odd) = (y % 2, 1 - y % 2);
             let above_row = above.filter(|_| self.layout.joined_above(y));
             let up = |strip, column| Known {
+                slot: slot(Side::Up, even),
                 labels: decided(above_row.unwrap_or_default(), column),
                 mask: part(self.layout.none_and_all()[usize::from(above_row.is_some())], strip),
             };
@@ -90,7 +94,11 @@ impl<'a> Answer<'a> {
             self.decide((even, y), [left, right, down], |(strip, column), _| [up(strip, column)], row);
             let beside = |side, (strip, column): (_, isize), row: &[u16]| {
                 let dx = if side == Side::Left { -1 } else { 1 };
-                Known { labels: decided(row, column + dx), mask: part(self.mask(odd, side), strip) }
+                Known {
+                    slot: slot(side, odd),
+                    labels: decided(row, column + dx),
+                    mask: part(self.mask(odd, side), strip),
+                }
             };
             let down = self.received((odd, y), Side::Down);
             let known = |(strip, column), row: &[u16]| {
@@ -113,10 +121,21 @@ impl<'a> Answer<'a> {
         row: &mut [u16],
     ) {
         let nodes = Undecided { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
+        let around = self.layout.around(plane, y).filter(|_| K > 0);
         for strip in self.layout.strips(plane) {
             let column = 2 * strip.0 + plane;
             let known = known((strip, column as isize), row);
-            let labels = dispatch!(self.level, simd => nodes.strip(simd, strip, &received, &known));
+            let labels = match around {
+                Some(around) => {
+                    let edges = dispatch!(self.level, simd => nodes.edges(simd, strip, around, &known));
+                    let edges = edges.each_ref().map(|edge| edge.each_ref().map(<[u8; STRIP]>::as_slice));
+                    dispatch!(self.level, simd => nodes.strip::<_, true, _, _>(simd, strip, &received, &known, &edges))
+                }
+                None => {
+                    let none = [[[].as_slice(); 2]; K];
+                    dispatch!(self.level, simd => nodes.strip::<_, false, _, _>(simd, strip, &received, &known, &none))
+                }
+            };
             row.iter_mut().skip(column).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
         }
     }
@@ -138,6 +157,7 @@ fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
 
 /// Decided labels of neighbours of a strip of nodes, and where there are any.
 struct Known<'a> {
+    slot: usize,
     labels: [u16; STRIP],
     mask: &'a [u8],
 }
@@ -150,14 +170,46 @@ struct Undecided<'a> {
 }
 
 impl Undecided<'_> {
+    /// Step and truncation of the edges to decided labels, for a strip of nodes.
+    #[inline(always)]
+    fn edges<S: Simd, const K: usize>(
+        &self,
+        simd: S,
+        (at, lanes): (usize, usize),
+        around: Around<'_>,
+        known: &[Known<'_>; K],
+    ) -> [[[u8; STRIP]; 2]; K] {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let usual = self.model.smoothness();
+                let (step, truncation) = (
+                    [usual, usual.weakened()].map(Smoothness::step),
+                    [usual, usual.weakened()].map(|smoothness| smoothness.truncation),
+                );
+                known.each_ref().map(|known| {
+                    let mut edges = [[0; STRIP]; 2];
+                    for lane in (0..lanes).step_by(S::u8s::LEN) {
+                        for (edge, values) in edges.iter_mut().zip([step, truncation]) {
+                            let chosen: S::u8s = around.choose(simd, known.slot, at + lane, values);
+                            chosen.store_slice(&mut edge[lane..lane + S::u8s::LEN]);
+                        }
+                    }
+                    edges
+                })
+            },
+        )
+    }
+
     /// Decides a strip of nodes, chunk by chunk of labels, since what is compared has 8 bits.
     #[inline(always)]
-    fn strip<S: Simd, const M: usize, const K: usize>(
+    fn strip<S: Simd, const WEAK: bool, const M: usize, const K: usize>(
         &self,
         simd: S,
         strip: (usize, usize),
         received: &[Received<'_>; M],
         known: &[Known<'_>; K],
+        edges: &[[&[u8]; 2]; K],
     ) -> [u16; STRIP] {
         simd.vectorize(
             #[inline(always)]
@@ -165,11 +217,23 @@ impl Undecided<'_> {
                 let mut labels = [0; STRIP];
                 let mut best = [u8::MAX; STRIP];
                 for from in (0..self.layout.labels).step_by(CHUNK) {
-                    let near = known.each_ref().map(|known| (near(known, from), known.mask));
+                    let near: [Near<'_>; K] = array::from_fn(|i| Near {
+                        labels: near(&known[i], from),
+                        mask: known[i].mask,
+                        edges: edges[i],
+                    });
                     let before = best;
                     let mut index = [0; STRIP];
                     for label in from..(from + CHUNK).min(self.layout.labels) {
-                        self.compare(simd, strip, (label, label - from), received, &near, &mut best, &mut index);
+                        self.compare::<S, WEAK, M, K>(
+                            simd,
+                            strip,
+                            (label, label - from),
+                            received,
+                            &near,
+                            &mut best,
+                            &mut index,
+                        );
                     }
                     for lane in 0..strip.1 {
                         if best[lane] < before[lane] {
@@ -185,7 +249,7 @@ impl Undecided<'_> {
     /// Compares the cost of a label, of which its place in the chunk is written down, with the best so far.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
-    fn compare<S: Simd, const M: usize, const K: usize>(
+    fn compare<S: Simd, const WEAK: bool, const M: usize, const K: usize>(
         &self,
         simd: S,
         (at, lanes): (usize, usize),
@@ -196,6 +260,7 @@ impl Undecided<'_> {
         index: &mut [u8; STRIP],
     ) {
         let start = label * self.layout.lanes + at;
+        let (usual, far) = (self.model.smoothness(), far(self.model, WEAK));
         let here = S::u8s::splat(simd, (low + FAR) as u8);
         let low = S::u8s::splat(simd, low as u8);
         let costs = &self.costs[start..start + lanes];
@@ -207,10 +272,16 @@ impl Undecided<'_> {
             for (values, mask) in received {
                 sum += load(values) & load(mask);
             }
-            for (labels, mask) in near {
-                let label = load(labels);
+            for near in near {
+                let label = load(&near.labels);
                 let distance = here.saturating_sub(label) | label.saturating_sub(here);
-                sum += smoothness::<S>(simd, self.model, distance) & load(mask);
+                let [step, truncation] = if WEAK {
+                    near.edges.map(load)
+                } else {
+                    [usual.step(), usual.truncation].map(|value| S::u8s::splat(simd, value))
+                };
+                let smoothness = (distance.min(S::u8s::splat(simd, far)) * step).min(truncation);
+                sum += smoothness & load(near.mask);
             }
             // What is added to the data cost is at most 4K.
             let belief = load(costs).saturating_add(sum);
@@ -222,7 +293,12 @@ impl Undecided<'_> {
 }
 
 /// Labels relative to a chunk of labels, clamped to where distances count, and where there are any.
-type Near<'a> = ([u8; STRIP], &'a [u8]);
+struct Near<'a> {
+    labels: [u8; STRIP],
+    mask: &'a [u8],
+    /// Step and truncation of the edges to them, where some are weak.
+    edges: [&'a [u8]; 2],
+}
 
 #[inline(always)]
 fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
@@ -233,10 +309,10 @@ fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
     relative
 }
 
-/// The smoothness cost of distances between labels; the product fits, since distances beyond K div s count as that plus 1.
-#[inline(always)]
-fn smoothness<S: Simd>(simd: S, model: &Model, distance: S::u8s) -> S::u8s {
-    let (step, truncation) = (model.step(), model.truncation());
-    let far = truncation.checked_div(step).map_or(0, |far| far + 1);
-    (distance.min(S::u8s::splat(simd, far)) * S::u8s::splat(simd, step)).min(S::u8s::splat(simd, truncation))
+/// The least distance of labels that costs the truncation over every edge. Times the step it fits 8 bits: s div 2 is at
+/// least a third of s, or 0.
+fn far(model: &Model, weak: bool) -> u8 {
+    let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
+    let usual = model.smoothness();
+    if weak { far(usual).max(far(usual.weakened())) } else { far(usual) }
 }

@@ -10,7 +10,8 @@ use crate::{
     costs::{self, Costs},
     edges::{self, Edges, Rows},
     features::{self, Features},
-    layout::{Layout, Shape},
+    greys::Around,
+    layout::{self, Layout, Shape},
     match_cost::{Matching, is_narrow, match_cost},
     refine::{Coarser, refine},
     select_labels::{Answer, select_labels},
@@ -77,7 +78,7 @@ pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let messages = kept.map(|grid| edges::bytes(&Shape::new(plan, grid)) as u64 * sets(plan, grid) as u64);
     let labels = 2 * plan.image_size().pixels() as u64;
     let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
-    let layouts = (0..plan.grids()).map(|grid| Shape::new(plan, grid).layout_bytes());
+    let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), sweep::bytes(plan)];
     costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
@@ -183,10 +184,12 @@ impl Grid<'_> {
     pub(crate) fn send(&self, way: Way, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
         let mut slots = edges::slots(self.layout, rows, plane);
         self.drop_missing(y, &mut slots);
+        let mut nodes = self.nodes(plane, y);
         if way == Way::Up {
             slots.swap(2, 3);
+            nodes.around = nodes.around.map(Around::upwards);
         }
-        update_messages(self.level, sends, &self.nodes(plane, y), slots);
+        update_messages(self.level, sends, &nodes, slots);
     }
 
     fn nodes(&self, plane: usize, y: usize) -> Nodes<'_> {
@@ -196,8 +199,8 @@ impl Grid<'_> {
             masks: layout.masks(plane),
             nodes: layout.nodes(plane),
             lanes: layout.lanes,
-            step: model.step(),
-            truncation: model.truncation(),
+            smoothness: model.smoothness(),
+            around: layout.around(plane, y),
         }
     }
 
@@ -235,6 +238,7 @@ fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&
 impl Solver for RayonSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         self.features.load(self.level, pair);
+        self.layouts[0].greys.load(self.level, pair.left());
         self.seed = seed;
         if is_stored(&self.plan, 0) {
             let mut costs = std::mem::replace(&mut self.costs[0], Costs::none());
@@ -253,6 +257,8 @@ impl Solver for RayonSolver {
             coarsen_unstored(&self.matching(), &self.windows, &self.layouts[grid], &mut coarse);
         }
         self.costs[grid] = coarse;
+        let (fine, coarse) = self.layouts.split_at_mut(grid);
+        coarse[0].greys.coarsen(&fine[grid - 1].greys);
         Ok(())
     }
 

@@ -1,6 +1,9 @@
 //! Message passing: the kernel that sends the messages of one plane of nodes in one row.
 
+use bp_core::Smoothness;
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
+
+use crate::greys::Around;
 
 /// Which messages a node sends. Those it does not send stay what they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,47 +28,79 @@ pub(crate) struct Nodes<'a> {
     pub(crate) nodes: usize,
     /// Lanes from one label to the next.
     pub(crate) lanes: usize,
-    /// Cost of one step between labels, see [`bp_core::Model::step`].
-    pub(crate) step: u8,
-    /// Truncation K.
-    pub(crate) truncation: u8,
+    /// The smoothness cost of edges that are not weak.
+    pub(crate) smoothness: Smoothness,
+    /// What tells which are; `None` where none is.
+    pub(crate) around: Option<Around<'a>>,
 }
 
 impl Nodes<'_> {
     fn labels(&self) -> usize {
         self.costs.len() / self.lanes
     }
+
+    /// A value of the smoothness cost over the edges of `W` vectors of nodes, by slot. Where none is weak, it is one vector.
+    #[inline(always)]
+    fn of_edges<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
+        &self,
+        simd: S,
+        at: usize,
+        value: impl Fn(Smoothness) -> u8,
+    ) -> [[V; 4]; W] {
+        let mut values = [[V::splat(simd, value(self.smoothness)); 4]; W];
+        if let Some(around) = self.around.filter(|_| WEAK) {
+            let usual_and_weak = [value(self.smoothness), value(self.smoothness.weakened())];
+            for (w, values) in values.iter_mut().enumerate() {
+                for (slot, out) in values.iter_mut().enumerate() {
+                    *out = around.choose(simd, slot, at + w * V::LEN, usual_and_weak);
+                }
+            }
+        }
+        values
+    }
 }
 
 /// Sends messages, in place: each takes the place of the one that came over the same edge. The last slot is the one on;
 /// for a pass upwards the last two are exchanged.
 pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
+    if nodes.around.is_some() {
+        send::<true>(level, sends, nodes, slots)
+    } else {
+        send::<false>(level, sends, nodes, slots)
+    }
+}
+
+fn send<const WEAK: bool>(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     match sends {
-        Sends::All => dispatch!(level, simd => row::<_, true, true, true>(simd, nodes, slots)),
-        Sends::Sides => dispatch!(level, simd => row::<_, true, false, false>(simd, nodes, slots)),
-        Sends::SidesAndOn => dispatch!(level, simd => row::<_, true, false, true>(simd, nodes, slots)),
-        Sends::On => dispatch!(level, simd => row::<_, false, false, true>(simd, nodes, slots)),
+        Sends::All => dispatch!(level, simd => row::<_, WEAK, true, true, true>(simd, nodes, slots)),
+        Sends::Sides => dispatch!(level, simd => row::<_, WEAK, true, false, false>(simd, nodes, slots)),
+        Sends::SidesAndOn => dispatch!(level, simd => row::<_, WEAK, true, false, true>(simd, nodes, slots)),
+        Sends::On => dispatch!(level, simd => row::<_, WEAK, false, false, true>(simd, nodes, slots)),
     }
 }
 
 /// Two vectors at a time as long as there are nodes for them, then one, then narrow ones.
 #[inline(always)]
-fn row<S: Simd, const SIDES: bool, const UP: bool, const ON: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
+fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
+    simd: S,
+    nodes: &Nodes<'_>,
+    slots: [&mut [u8]; 4],
+) {
     let [same, next, up, down] = slots;
     // One length for all, known before the loops, spares a check at every access.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
     while at + 2 * S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 2, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 2, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += 2 * S::u8s::LEN;
     }
     while at + S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 1, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 1, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += S::u8s::LEN;
     }
     while at < nodes.nodes {
-        vectors::<S, u8x16<S>, 1, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, u8x16<S>, 1, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
         at += u8x16::<S>::LEN;
     }
 }
@@ -73,7 +108,7 @@ fn row<S: Simd, const SIDES: bool, const UP: bool, const ON: bool>(simd: S, node
 /// `W` vectors of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
 /// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
 #[inline(always)]
-fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const ON: bool>(
+fn vectors<S, V, const W: usize, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
@@ -83,22 +118,22 @@ fn vectors<S, V, const W: usize, const SIDES: bool, const UP: bool, const ON: bo
     V: SimdInt<S, Element = u8>,
 {
     let sent = [SIDES, SIDES, UP, ON];
-    let least = pass_up::<S, V, W>(simd, nodes, sent, slots, at);
-    pass_down::<S, V, W>(simd, nodes, sent, slots, at, least);
+    let least = pass_up::<S, V, W, WEAK>(simd, nodes, sent, slots, at);
+    pass_down::<S, V, W, WEAK>(simd, nodes, sent, slots, at, least);
 }
 
 /// Writes the envelopes from below to the slots and returns the least entry of each side's h.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
-fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
+fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     sent: [bool; 4],
     slots: &mut [&mut [u8]; 4],
     at: usize,
 ) -> [[V; 4]; W] {
-    let step = V::splat(simd, nodes.step);
-    let mut masks = [[step; 2]; W];
+    let step = nodes.of_edges::<S, V, W, WEAK>(simd, at, Smoothness::step);
+    let mut masks = [[V::splat(simd, 0); 2]; W];
     for w in 0..W {
         let from = at + w * V::LEN;
         masks[w] = nodes.masks.map(|mask| V::from_slice(simd, &mask[from..from + V::LEN]));
@@ -111,7 +146,7 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
             let h = gather::<S, V>(simd, nodes, masks[w], slots, start + w * V::LEN);
             for side in 0..4 {
                 if sent[side] {
-                    envelope[w][side] = envelope[w][side].saturating_add(step).min(h[side]);
+                    envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(h[side]);
                     least[w][side] = least[w][side].min(envelope[w][side]);
                 }
             }
@@ -131,8 +166,7 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
 
 /// Turns the envelopes from below into messages.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
-fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
+fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     sent: [bool; 4],
@@ -140,7 +174,8 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
     at: usize,
     least: [[V; 4]; W],
 ) {
-    let (step, truncation) = (V::splat(simd, nodes.step), V::splat(simd, nodes.truncation));
+    let step = nodes.of_edges::<S, V, W, WEAK>(simd, at, Smoothness::step);
+    let truncation = nodes.of_edges::<S, V, W, WEAK>(simd, at, |smoothness| smoothness.truncation);
     let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
     let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
@@ -151,7 +186,7 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
             for side in 0..4 {
                 if sent[side] {
                     let half = V::from_slice(simd, &slots[side][from..from + V::LEN]);
-                    envelope[w][side] = envelope[w][side].saturating_add(step).min(half);
+                    envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(half);
                 }
             }
         }
@@ -159,7 +194,7 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize>(
             let from = start + w * V::LEN;
             for side in 0..4 {
                 if sent[side] {
-                    let message = (envelope[w][side] - least[w][side]).min(truncation);
+                    let message = (envelope[w][side] - least[w][side]).min(truncation[w][side]);
                     message.store_slice(&mut slots[side][from..from + V::LEN]);
                 }
             }

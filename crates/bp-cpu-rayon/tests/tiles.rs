@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, Cut, Device, HALO, Matcher, MessageStart, Model, Plan, Profile, Progress, Schedule, Settings,
-    Side, Size, StereoPair, Tiled, Tiling, conformance::noise_pair, synthetic,
+    Algorithm, Backend, Cut, Device, HALO, Likeness, Matcher, MessageStart, Model, Plan, Profile, Progress, Schedule,
+    Settings, Side, Size, StereoPair, Tiled, Tiling, conformance::noise_pair, synthetic,
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
@@ -49,7 +49,7 @@ fn strips_of_a_swept_image_are_the_whole_image() {
             let plan = Plan::new(pair.size(), model, settings).unwrap();
             let rows = 32 << (settings.grids - 1);
             let tiling = Tiling::cut(plan.clone(), Size { width, height: rows }, HALO);
-            assert_eq!((tiling.is_exact(), tiling.counts()), (true, (1, height.div_ceil(rows))));
+            assert_eq!((tiling.likeness(), tiling.counts()), (Likeness::Same, (1, height.div_ceil(rows))));
             assert!(tiled(device.as_ref(), &pair, tiling) == whole(device.as_ref(), &pair, &plan), "{plan:?}");
         }
     }

@@ -7,6 +7,7 @@
 mod coarsen;
 mod costs;
 mod decode;
+mod greys;
 mod match_cost;
 mod messages;
 mod refine;

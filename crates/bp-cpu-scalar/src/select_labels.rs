@@ -2,13 +2,20 @@
 
 use bp_core::{Plan, Schedule, Side};
 
-use crate::{costs::Costs, decode::decode, messages::Messages};
+use crate::{costs::Costs, decode::decode, greys::Greys, messages::Messages};
 
 /// Writes the label of every node. `belief` is room for one node's labels.
-pub(crate) fn select_labels(plan: &Plan, costs: &Costs, messages: &Messages, labels: &mut [u16], belief: &mut [u8]) {
+pub(crate) fn select_labels(
+    plan: &Plan,
+    costs: &Costs,
+    greys: &Greys,
+    messages: &Messages,
+    labels: &mut [u16],
+    belief: &mut [u8],
+) {
     match plan.settings().schedule {
         Schedule::Sync | Schedule::Checkerboard => least_beliefs(costs, messages, labels, belief),
-        Schedule::Sweep => decode(plan, costs, messages, labels, belief),
+        Schedule::Sweep => decode(plan, costs, greys, messages, labels, belief),
     }
 }
 

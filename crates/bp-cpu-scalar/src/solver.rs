@@ -5,7 +5,7 @@ use std::ops::Range;
 use bp_core::{DataCost, Error, Plan, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
-    coarsen::coarsen, costs::Costs, match_cost::match_cost, messages::Messages, refine::refine,
+    coarsen::coarsen, costs::Costs, greys::Greys, match_cost::match_cost, messages::Messages, refine::refine,
     select_labels::select_labels, update_messages::update_messages,
 };
 
@@ -14,6 +14,7 @@ pub(crate) struct ScalarSolver {
     plan: Plan,
     data_cost: DataCost,
     costs: Vec<Costs>,
+    greys: Vec<Greys>,
     /// Messages of even grids and, where the plan has several grids, of odd ones: only a grid and its next coarser one
     /// are needed at a time.
     messages: Vec<Messages>,
@@ -28,6 +29,7 @@ impl ScalarSolver {
         Ok(Self {
             data_cost: DataCost::new(plan.image_size(), *plan.model())?,
             costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid)).collect::<Result<_, _>>()?,
+            greys: (0..plan.grids()).map(|grid| Greys::new(plan, grid)).collect::<Result<_, _>>()?,
             messages: (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid)).collect::<Result<_, _>>()?,
             scratch: memory::filled("one node's costs", labels, 0)?,
             h: memory::filled("one node's message", labels, 0)?,
@@ -39,6 +41,7 @@ impl ScalarSolver {
 impl Solver for ScalarSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         self.data_cost.load(pair, seed)?;
+        self.greys[0].load(pair.left());
         match_cost(&self.data_cost, self.plan.image_size(), &mut self.costs[0], &mut self.scratch);
         Ok(())
     }
@@ -46,6 +49,8 @@ impl Solver for ScalarSolver {
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
         let (fine, coarse) = self.costs.split_at_mut(grid);
         coarsen(&fine[grid - 1], self.plan.size(grid - 1), &mut coarse[0], &mut self.scratch);
+        let (fine, coarse) = self.greys.split_at_mut(grid);
+        coarse[0].coarsen(&fine[grid - 1]);
         Ok(())
     }
 
@@ -67,13 +72,13 @@ impl Solver for ScalarSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];
-            update_messages(&self.plan, grid, step, &self.costs[grid], messages, &mut self.h);
+            update_messages(&self.plan, grid, step, &self.costs[grid], &self.greys[grid], messages, &mut self.h);
         }
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        select_labels(&self.plan, &self.costs[0], &self.messages[0], labels, &mut self.h);
+        select_labels(&self.plan, &self.costs[0], &self.greys[0], &self.messages[0], labels, &mut self.h);
         Ok(())
     }
 
@@ -88,8 +93,9 @@ impl Solver for ScalarSolver {
 
     fn allocated_bytes(&self) -> u64 {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
+        let greys: u64 = self.greys.iter().map(Greys::bytes).sum();
         let messages: u64 = self.messages.iter().map(Messages::bytes).sum();
         let scratch = memory::bytes(&self.scratch) + memory::bytes(&self.h);
-        self.data_cost.bytes() + costs + messages + scratch
+        self.data_cost.bytes() + costs + greys + messages + scratch
     }
 }

@@ -4,6 +4,7 @@ use bp_core::{BAND_ROWS, Plan, Side};
 
 use crate::{
     costs::Costs,
+    greys::Greys,
     messages::Messages,
     update_messages::{gather, send},
 };
@@ -14,9 +15,9 @@ pub(crate) const EVEN: usize = 0;
 pub(crate) const ODD: usize = 1;
 
 /// Runs one loop on `grid`, see [`bp_core::Schedule::Sweep`]. `h` is room for one message.
-pub(crate) fn sweep(plan: &Plan, grid: usize, costs: &Costs, messages: &mut Messages, h: &mut [u8]) {
+pub(crate) fn sweep(plan: &Plan, grid: usize, costs: &Costs, greys: &Greys, messages: &mut Messages, h: &mut [u8]) {
     let height = plan.size(grid).height;
-    let mut sweep = Sweep { plan, grid, costs, messages, h };
+    let mut sweep = Sweep { plan, grid, costs, greys, messages, h };
     for first in (0..height).step_by(BAND_ROWS) {
         sweep.band(first, (first + BAND_ROWS).min(height) - 1);
     }
@@ -32,6 +33,7 @@ struct Sweep<'a> {
     plan: &'a Plan,
     grid: usize,
     costs: &'a Costs,
+    greys: &'a Greys,
     messages: &'a mut Messages,
     h: &'a mut [u8],
 }
@@ -59,7 +61,9 @@ impl Sweep<'_> {
             for &to in sides {
                 let Some((to_x, to_y)) = self.plan.neighbour(self.grid, (x, y), to) else { continue };
                 gather(self.costs, self.messages, node, to, self.h);
-                send(self.plan.model(), self.h, self.messages.received_mut(to_y * width + to_x, to.opposite()));
+                let receiver = to_y * width + to_x;
+                let slot = self.messages.received_mut(receiver, to.opposite());
+                send(self.greys.smoothness(node, receiver), self.h, slot);
             }
             // Only now: what came from one side is part of what goes to the others.
             for &to in sides {

@@ -1,8 +1,8 @@
 //! Message passing.
 
-use bp_core::{Model, Plan, Schedule, Side};
+use bp_core::{Plan, Schedule, Side, Smoothness};
 
-use crate::{costs::Costs, messages::Messages, sweep::sweep};
+use crate::{costs::Costs, greys::Greys, messages::Messages, sweep::sweep};
 
 /// Runs one step of the plan's schedule on `grid`. `h` is room for one message.
 pub(crate) fn update_messages(
@@ -10,17 +10,26 @@ pub(crate) fn update_messages(
     grid: usize,
     step: u32,
     costs: &Costs,
+    greys: &Greys,
     messages: &mut Messages,
     h: &mut [u8],
 ) {
     match plan.settings().schedule {
-        Schedule::Sync | Schedule::Checkerboard => parallel_step(plan, grid, step, costs, messages, h),
-        Schedule::Sweep => sweep(plan, grid, costs, messages, h),
+        Schedule::Sync | Schedule::Checkerboard => parallel_step(plan, grid, step, costs, greys, messages, h),
+        Schedule::Sweep => sweep(plan, grid, costs, greys, messages, h),
     }
 }
 
 /// A step whose messages depend on none of the same step.
-fn parallel_step(plan: &Plan, grid: usize, step: u32, costs: &Costs, messages: &mut Messages, h: &mut [u8]) {
+fn parallel_step(
+    plan: &Plan,
+    grid: usize,
+    step: u32,
+    costs: &Costs,
+    greys: &Greys,
+    messages: &mut Messages,
+    h: &mut [u8],
+) {
     let size = plan.size(grid);
     let sync = plan.settings().schedule == Schedule::Sync;
     for y in 0..size.height {
@@ -30,10 +39,11 @@ fn parallel_step(plan: &Plan, grid: usize, step: u32, costs: &Costs, messages: &
             }
             for side in Side::ALL {
                 let Some((to_x, to_y)) = plan.neighbour(grid, (x, y), side) else { continue };
-                gather(costs, messages, y * size.width + x, side, h);
+                let node = y * size.width + x;
+                gather(costs, messages, node, side, h);
                 let (receiver, from) = (to_y * size.width + to_x, side.opposite());
                 let slot = if sync { messages.next_mut(receiver, from) } else { messages.received_mut(receiver, from) };
-                send(plan.model(), h, slot);
+                send(greys.smoothness(node, receiver), h, slot);
             }
         }
     }
@@ -54,8 +64,8 @@ pub(crate) fn gather(costs: &Costs, messages: &Messages, node: usize, to: Side, 
 
 /// Turns h into a message: `min over a of (h(a) + min(s |a - d|, K))` for every label d, normalised by its minimum,
 /// which is h's. A pass up and a pass down the labels make the lower envelope (Felzenszwalb and Huttenlocher 2006).
-pub(crate) fn send(model: &Model, h: &mut [u8], message: &mut [u8]) {
-    let (step, truncation) = (model.step(), model.truncation());
+pub(crate) fn send(smoothness: Smoothness, h: &mut [u8], message: &mut [u8]) {
+    let (step, truncation) = (smoothness.step(), smoothness.truncation);
     let least = h.iter().copied().min().unwrap_or(0);
     let mut envelope = u8::MAX;
     for h in h.iter_mut() {

@@ -32,9 +32,10 @@ fn answer_in_strips(pair: &StereoPair, model: Model, settings: Settings, rows: u
 
 fn any_model(labels: std::ops::Range<usize>) -> impl Strategy<Value = Model> {
     let profile = prop::sample::select(Profile::ALL.to_vec());
-    (profile, labels, any::<u8>(), 0..=63_u8, -3..4_i32).prop_map(|(profile, labels, slope, truncation, min)| {
+    let weak = prop::option::of(0..120_u8);
+    (profile, labels, any::<u8>(), 0..=63_u8, -3..4_i32, weak).prop_map(|(profile, labels, slope, k, min, weak)| {
         let model = Model::new(profile, labels).unwrap().with_min_disparity(min).unwrap();
-        model.with_smoothness(slope, truncation).unwrap()
+        model.with_smoothness(slope, k).unwrap().with_weak_edges(weak)
     })
 }
 
@@ -65,16 +66,20 @@ fn any_case() -> impl Strategy<Value = Case> {
 }
 
 /// The least energy of any labelling of a chain that gives node p label d, `[node][label]`.
-fn min_marginals(cost: &DataCost, model: &Model, nodes: &[(usize, usize)]) -> Vec<Vec<i64>> {
+fn min_marginals(pair: &StereoPair, model: &Model, nodes: &[(usize, usize)]) -> Vec<Vec<i64>> {
+    let cost = DataCost::of_pair(pair, *model).unwrap();
+    let grey = |(x, y)| pair.left().grey(x, y);
     let labels = 0..model.labels() as u16;
     let data = |&(x, y): &(usize, usize)| labels.clone().map(|d| i64::from(cost.at(x, y, d))).collect::<Vec<_>>();
     // Least energy of all nodes before one, for each of its labels.
     let before = |order: &[(usize, usize)]| {
         let mut sums = vec![vec![0; model.labels()]];
-        for node in &order[..order.len() - 1] {
-            let so_far: Vec<i64> = sums[sums.len() - 1].iter().zip(data(node)).map(|(sum, cost)| sum + cost).collect();
+        for edge in order.windows(2) {
+            let so_far = sums[sums.len() - 1].iter().zip(data(&edge[0])).map(|(sum, cost)| sum + cost);
+            let so_far: Vec<i64> = so_far.collect();
+            let smoothness = model.smoothness_between(grey(edge[0]), grey(edge[1]));
             let reach = |d: u16| {
-                let offers = labels.clone().map(|a| so_far[usize::from(a)] + i64::from(model.smoothness(a, d)));
+                let offers = labels.clone().map(|a| so_far[usize::from(a)] + i64::from(smoothness.of(a, d)));
                 offers.min().unwrap()
             };
             sums.push(labels.clone().map(reach).collect());
@@ -108,7 +113,7 @@ proptest! {
         let answer = answer(&pair, model, plan_settings(1, len as u32, Schedule::Sync));
         let cost = DataCost::of_pair(&pair, model).unwrap();
         let nodes: Vec<_> = (0..len).map(|i| (i % width, i / width)).collect();
-        let marginals = min_marginals(&cost, &model, &nodes);
+        let marginals = min_marginals(&pair, &model, &nodes);
         let mut unique = true;
         for (node, (&(x, y), marginals)) in nodes.iter().zip(&marginals).enumerate() {
             let received = |d: usize| -> i64 {
@@ -134,7 +139,7 @@ proptest! {
         let pair = noise_pair(1, height, seed.into());
         let labels = answer(&pair, model, plan_settings(1, 1, Schedule::Sweep)).labels;
         let nodes: Vec<_> = (0..height).map(|y| (0, y)).collect();
-        let marginals = min_marginals(&DataCost::of_pair(&pair, model).unwrap(), &model, &nodes);
+        let marginals = min_marginals(&pair, &model, &nodes);
         let energy = Energy::of(&pair, &model, &labels).unwrap().total();
         prop_assert_eq!(energy as i64, *marginals[0].iter().min().unwrap());
     }
@@ -255,7 +260,7 @@ fn a_sweep_in_strips_is_a_sweep_of_the_whole() {
     let rows = BAND_ROWS << (settings.grids - 1);
     assert_eq!(rows, 512);
     for profile in Profile::ALL {
-        let model = Model::new(profile, 5).unwrap();
+        let model = Model::new(profile, 5).unwrap().with_weak_edges(Some(40));
         let (whole, strips) = (answer(&pair, model, settings), answer_in_strips(&pair, model, settings, rows));
         assert!(strips == whole, "{}", profile.name());
     }

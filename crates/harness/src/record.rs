@@ -180,6 +180,9 @@ pub struct Settings {
     pub slope: u8,
     /// Truncation of the smoothness cost (K).
     pub truncation: u8,
+    /// Grey difference above which edges are weak, where any may be; records from before that option lack it.
+    #[serde(default)]
+    pub edge_threshold: Option<u8>,
     /// Algorithm.
     pub algorithm: String,
     /// Loops asked for (k), where the algorithm derived its own from them.

@@ -33,6 +33,8 @@ pub(crate) struct Buffers {
     /// Stand in for sums that are not kept, where a kernel would read or write them.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
+    /// Grey values of the whole grid, where there are weak edges, `[grid]`.
+    pub(crate) greys: Option<Vec<usize>>,
     /// `[grid][strip]`.
     pub(crate) strips: Vec<Vec<StripBuffers>>,
 }
@@ -58,6 +60,10 @@ impl Buffers {
             labels: device("labels", label_bytes(size)),
             unused: device("unused", 16),
             unused_written: device("unused", 16),
+            greys: plan
+                .model()
+                .weak_edges()
+                .map(|_| grids.iter().map(|grid| device("grey values", grid.grey_bytes())).collect()),
             strips: grids.iter().map(|grid| strips(plan, grid, &mut device)).collect(),
             list,
         }

@@ -30,6 +30,7 @@ impl Composer<'_> {
             let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
         }
+        self.greys(part);
         part.push_short(Command::Barrier);
         for nodes in self.nodes(0) {
             let constants = vec![
@@ -45,6 +46,43 @@ impl Composer<'_> {
         }
     }
 
+    /// Grey values of the left image, where they tell weak edges.
+    fn greys(&mut self, part: &mut PartRecorder) {
+        let Some(greys) = &self.buffers.greys else { return };
+        let pipeline = Pipeline { kernel: Kernel::Greys, constants: vec![("APRON", APRON as u32)] };
+        for colour in 0..2 {
+            let bound = vec![self.buffers.images[0], greys[0]];
+            self.dispatch(part, pipeline.clone(), bound, self.whole_grid(0, colour));
+        }
+    }
+
+    /// Those of a coarser grid.
+    fn coarsen_greys(&mut self, part: &mut PartRecorder, grid: usize) {
+        let Some(greys) = &self.buffers.greys else { return };
+        let pipeline = Pipeline { kernel: Kernel::CoarsenGreys, constants: Vec::new() };
+        for colour in 0..2 {
+            let from = self.grids[grid - 1].strips[0];
+            let work = self.reading(self.whole_grid(grid, colour), grid - 1, from);
+            self.dispatch(part, pipeline.clone(), vec![greys[grid - 1], greys[grid]], work);
+        }
+    }
+
+    /// The nodes of one colour in all rows of a grid, for what is not cut into strips.
+    fn whole_grid(&self, grid: usize, colour: usize) -> Work {
+        let count = self.grids[grid].size.height;
+        self.work(Nodes { grid, strip: 0, colour }, Rows { first: 0, step: 1, count })
+    }
+
+    /// The grey values of a grid, or, where a kernel is to read none, costs that it is given anyway.
+    fn greys_read(&self, nodes: Nodes) -> usize {
+        self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
+    }
+
+    /// Whether kernels are to look for weak edges, as a constant of theirs.
+    fn looks_for_weak_edges(&self) -> (&'static str, u32) {
+        ("WEAK", self.buffers.greys.is_some().into())
+    }
+
     /// The buffers that data costs of these nodes are stored to.
     fn costs_written(&self, nodes: Nodes) -> [usize; 2] {
         let strip = self.strip(nodes);
@@ -54,6 +92,7 @@ impl Composer<'_> {
 
     /// Every strip of the finer grid gives its rows of the coarser one.
     pub(super) fn coarsen(&mut self, part: &mut PartRecorder, grid: usize) {
+        self.coarsen_greys(part, grid);
         let (fine, coarse) = (&self.grids[grid - 1], &self.grids[grid]);
         let constants = vec![("SUM_BYTES", coarse.sum_bytes as u32), ("FINE_SUM_BYTES", fine.sum_bytes as u32)];
         let pipeline = Pipeline { kernel: Kernel::Coarsen, constants };
@@ -76,6 +115,7 @@ impl Composer<'_> {
         let other = &self.grids[grid];
         let parameters = Parameters {
             other_width: other.size.width as u32,
+            other_height: other.size.height as u32,
             other_words: other.words as u32,
             other_first_row: strip.first as u32,
             ..work.parameters
@@ -147,17 +187,20 @@ impl Composer<'_> {
     }
 
     pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
-        let constants =
-            vec![("SATURATING", self.saturates(3, self.plan.model().step())), ("SELECTIVE", selective.into())];
+        let constants = vec![
+            ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
+            ("SELECTIVE", selective.into()),
+            self.looks_for_weak_edges(),
+        ];
         Pipeline { kernel: Kernel::UpdateMessages, constants }
     }
 
-    /// Data cost, what the other colour sent, and what these nodes send.
+    /// Data cost, what the other colour sent, what these nodes send, and grey values.
     pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
         let strip = self.strip(nodes);
         let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
         let sent = strip.sent[written].map(|side| side[nodes.colour]);
-        [&[strip.cost[nodes.colour]], received.as_slice(), &sent].concat()
+        [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
     }
 
     /// Whether a stored data cost plus so many messages plus `more` may pass 255, as 1 or 0.
@@ -212,13 +255,15 @@ impl Composer<'_> {
         let constants = vec![
             ("SATURATING", self.saturates(4, 0)),
             ("SWEEP", sweep.into()),
+            self.looks_for_weak_edges(),
             ("BAND_ROWS", bp_core::BAND_ROWS as u32),
         ];
         let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);
         let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
-        let bound = [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels]].concat();
+        let bound =
+            [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels, self.greys_read(nodes)]].concat();
         self.dispatch(part, pipeline, bound, work);
     }
 }

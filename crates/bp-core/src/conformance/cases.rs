@@ -3,8 +3,8 @@
 use super::Case;
 use crate::{Algorithm, Cut, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
-/// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels, and
-/// with the smoothness that strains 8 bits most; strips of a higher image with aprons of every kind.
+/// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels,
+/// with the smoothness that strains 8 bits most and with weak edges; strips of a higher image with aprons of every kind.
 pub fn cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
     let small = sizes.into_iter().flat_map(|size| [1, 2, 3, 16].map(|labels| (size, labels)));
@@ -16,7 +16,9 @@ pub fn cases() -> impl Iterator<Item = Case> {
     // last one short; fewer models, since the oracle is slow.
     let wide_or_high = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
-        Profile::ALL.into_iter().filter_map(move |profile| Some((size, Model::new(profile, 5).ok()?)))
+        let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
+        let weak = Model::new(Profile::Census, 5).map(|model| model.with_weak_edges(Some(25)));
+        plain.chain(weak).map(move |model| (size, model))
     });
     let whole = every.chain(large).flat_map(|((width, height), model)| {
         let pair = noise_pair(width, height, model.labels() as u64);
@@ -32,7 +34,7 @@ fn strips() -> impl Iterator<Item = Case> {
     let strips = rows.map(|rows| pair.strip(rows)).into_iter();
     strips.flat_map(|strip| Profile::ALL.map(|profile| (strip.clone(), profile))).flat_map(|(strip, profile)| {
         let settings = Schedule::ALL.map(|schedule| Algorithm::Cfbp.settings(strip.size(), 7, 2, schedule));
-        let model = Model::new(profile, 6).ok();
+        let model = Model::new(profile, 6).map(|model| model.with_weak_edges(Some(20))).ok();
         settings.into_iter().filter_map(move |settings| case(&strip, model?, settings))
     })
 }
@@ -48,8 +50,14 @@ fn models(labels: usize) -> Vec<Model> {
     let strained = strained.into_iter().flat_map(move |(slope, truncation)| {
         of(Profile::Mrf).filter_map(move |model| model.with_smoothness(slope, truncation).ok())
     });
+    let weak = [(Profile::Census, 2, 10, 30), (Profile::Mrf, 3, 63, 10), (Profile::Mrf, 255, 63, 60)];
+    let weak = weak.into_iter().flat_map(move |(profile, slope, truncation, threshold)| {
+        of(profile)
+            .filter_map(move |model| model.with_smoothness(slope, truncation).ok())
+            .map(move |model| model.with_weak_edges(Some(threshold)))
+    });
     let negative = of(Profile::Census).filter_map(|model| model.with_min_disparity(-2).ok());
-    plain.chain(strained).chain(negative).collect()
+    plain.chain(strained).chain(weak).chain(negative).collect()
 }
 
 fn settings(size: Size) -> Vec<Settings> {

@@ -15,6 +15,7 @@ pub struct Oracle;
 impl Device for Oracle {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
         let grid = |grid: usize| Grid {
+            greys: vec![0; plan.size(grid).pixels()],
             sums: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
             costs: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
             received: vec![
@@ -28,9 +29,10 @@ impl Device for Oracle {
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
-/// Costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and received messages
+/// Grey values `[node]`, costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and received messages
 /// `[node][side][label]`.
 struct Grid {
+    greys: Vec<i64>,
     sums: Vec<Vec<i64>>,
     costs: Vec<Vec<i64>>,
     received: Messages,
@@ -60,14 +62,26 @@ impl OracleSolver {
         }
     }
 
-    /// What `node` sends when its costs are `costs`: all but what it received from the receiver, `to`.
-    fn message(&self, costs: &[i64], received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
-        let model = self.plan.model();
+    /// The smoothness cost of labels a and d at the ends of the edge from (x, y) to that side.
+    fn smoothness(&self, grid: usize, (x, y): (usize, usize), side: Side) -> impl Fn(usize, usize) -> i64 + use<> {
+        let (model, width) = (self.plan.model(), self.plan.size(grid).width);
+        let (slope, truncation) = (i64::from(model.slope()), i64::from(model.truncation()));
+        let grey = |(x, y): (usize, usize)| self.grids[grid].greys[y * width + x];
+        let difference = self.plan.neighbour(grid, (x, y), side).map_or(0, |other| grey((x, y)) - grey(other));
+        let is_weak = model.weak_edges().is_some_and(|threshold| difference.abs() > threshold.into());
+        let (slope, truncation) = if is_weak { (slope / 2, truncation / 2) } else { (slope, truncation) };
+        move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
+    }
+
+    /// What the node at `from` sends, given what it `received`: all but what came from the receiver, `to`.
+    fn message(&self, grid: usize, from: (usize, usize), received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
+        let costs = &self.grids[grid].costs[from.1 * self.plan.size(grid).width + from.0];
+        let smoothness = self.smoothness(grid, from, to);
         let sources = || Side::ALL.into_iter().filter(|&side| side != to);
         let h: Vec<i64> = (0..costs.len())
             .map(|a| costs[a] + sources().map(|side| received[side as usize][a]).sum::<i64>())
             .collect();
-        let offer = |a: usize, d: usize| h[a] + i64::from(model.smoothness(a as u16, d as u16));
+        let offer = |a: usize, d: usize| h[a] + smoothness(a, d);
         let message: Vec<i64> = (0..h.len()).map(|d| (0..h.len()).map(|a| offer(a, d)).min().unwrap_or(0)).collect();
         let least = message.iter().copied().min().unwrap_or(0);
         message.into_iter().map(|value| value - least).collect()
@@ -84,7 +98,7 @@ impl OracleSolver {
             }
             for to in Side::ALL {
                 if let Some((to_x, to_y)) = self.plan.neighbour(grid, (x, y), to) {
-                    let message = self.message(&self.grids[grid].costs[node], &before[node], to);
+                    let message = self.message(grid, (x, y), &before[node], to);
                     let receiver = to_y * self.plan.size(grid).width + to_x;
                     self.grids[grid].received[receiver][to.opposite() as usize] = message;
                 }
@@ -113,6 +127,7 @@ impl Solver for OracleSolver {
         let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
         data_cost.load(pair, seed)?;
         for (node, (x, y)) in self.nodes(0) {
+            self.grids[0].greys[node] = pair.left().grey(x, y).into();
             for (label, cost) in self.grids[0].sums[node].iter_mut().enumerate() {
                 *cost = data_cost.at(x, y, label as u16).into();
             }
@@ -130,6 +145,12 @@ impl Solver for OracleSolver {
             coarse[0].sums[parent].iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
         }
         self.set_costs(grid);
+        let mut children = vec![Vec::new(); self.plan.size(grid).pixels()];
+        for (node, (x, y)) in self.nodes(grid - 1) {
+            children[y / 2 * self.plan.size(grid).width + x / 2].push(self.grids[grid - 1].greys[node]);
+        }
+        let mean = |of: &Vec<i64>| (of.iter().sum::<i64>() + of.len() as i64 / 2) / of.len() as i64;
+        self.grids[grid].greys = children.iter().map(mean).collect();
         Ok(())
     }
 

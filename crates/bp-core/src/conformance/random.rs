@@ -10,7 +10,7 @@ const VOLUME: usize = 60_000;
 
 /// A case drawn at random, the same for the same seed as long as `fastrand` draws the same. Sizes lie around one and
 /// several vectors, blocks, strips and bands; there are fewer rows where there are many labels. Half of the pairs have
-/// an apron.
+/// an apron, half of the models weak edges.
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
@@ -18,7 +18,9 @@ pub fn random_case(seed: u64) -> Case {
     let height = random.usize(1..80).min(1 + VOLUME / (width * model.labels()));
     let [above, below] = if random.bool() { [random.usize(..=APRON), random.usize(..=APRON)] } else { [0, 0] };
     let pair = noise_pair(width, above + height + below, random.u32(..).into()).strip(above..above + height);
-    let plan = Plan::new(pair.size(), model, settings(&mut random, width, height));
+    let settings = settings(&mut random, width, height);
+    let weak_edges = random.bool().then(|| random.u8(..120));
+    let plan = Plan::new(pair.size(), model.with_weak_edges(weak_edges), settings);
     Case { plan: plan.unwrap_or_else(|error| panic!("{error}")), pair }
 }
 
@@ -92,6 +94,9 @@ mod tests {
             let is_it = |plan: &Plan| (plan.model().profile(), plan.settings().schedule) == (profile, schedule);
             assert!(plans.iter().any(is_it), "{profile:?} {schedule:?}");
         }
+        let weak = |plan: &&Plan| plan.model().weak_edges().is_some();
+        assert!(Profile::ALL.iter().all(|&p| plans.iter().filter(weak).any(|plan| plan.model().profile() == p)));
+        assert!(Schedule::ALL.iter().all(|&s| plans.iter().filter(weak).any(|plan| plan.settings().schedule == s)));
         assert!([127, 129, 300, 512, 1024].iter().all(|&labels| any_model(&|model| model.labels() == labels)));
         assert!([1 << 24, -(1 << 24)].iter().all(|&min| any_model(&|model| model.min_disparity() == min)));
         assert!(any_model(&|model| model.truncation() == MAX_TRUNCATION && model.profile() == Profile::Mrf));

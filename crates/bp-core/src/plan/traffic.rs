@@ -18,14 +18,16 @@ impl Plan {
         let images: u64 =
             self.buffers().iter().filter(|buffer| buffer.name == "images").map(|buffer| buffer.bytes).sum();
         let messages = |grid: usize| 2 * self.edges(grid) * self.model().labels() as u64;
-        let coarsen = (1..grids).map(|grid| self.summed_bytes(grid - 1) + self.written_bytes(grid)).sum();
+        let greys = |grid: usize| self.grey_bytes(grid - 1) + self.grey_bytes(grid);
+        let coarsen = |grid: usize| self.summed_bytes(grid - 1) + self.written_bytes(grid) + greys(grid);
+        let coarsen = (1..grids).map(coarsen).sum();
         // The coarsest grid's first messages are zeros, which nothing is read for.
         let refine =
             (0..grids).map(|grid| messages(grid) + if grid + 1 < grids { messages(grid + 1) } else { 0 }).sum();
-        let step = |grid| Some(costs_of_step(grid)? + 2 * self.updates_per_step(grid));
+        let step = |grid| Some(costs_of_step(grid)? + 2 * self.updates_per_step(grid) + self.grey_bytes(grid));
         let steps = (0..grids).map(step).sum::<Option<u64>>()? * u64::from(settings.steps);
         let select_labels = self.volume(0) as u64 + messages(0) + 2 * pixels;
-        Some([images + self.written_bytes(0), coarsen, refine, steps, select_labels])
+        Some([images + self.written_bytes(0) + self.grey_bytes(0), coarsen, refine, steps, select_labels])
     }
 
     /// Bytes of a grid's costs that the next coarser one's are summed from.

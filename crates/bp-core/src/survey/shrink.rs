@@ -1,15 +1,15 @@
 //! Smaller copies of the images.
 
 use super::LONGEST_SIDE;
-use crate::{Error, Image, Size, StereoPair, memory};
+use crate::{Error, Image, Size, StereoPair, image::grey, memory};
 
 /// By what both sides are divided.
 pub(super) fn factor(size: Size) -> usize {
     size.width.max(size.height).div_ceil(LONGEST_SIDE)
 }
 
-/// Both images in grey, with the mean of each `factor` by `factor` block as a pixel. What fills no block is left out,
-/// unless there is nothing else.
+/// Both images in grey, the luma of the mean colour of each `factor` by `factor` block as a pixel. What fills no block
+/// is left out, unless there is nothing else.
 pub(super) fn shrunk(pair: &StereoPair, factor: usize) -> Result<StereoPair, Error> {
     StereoPair::new(mean_of_blocks(pair.left(), factor)?, mean_of_blocks(pair.right(), factor)?)
 }
@@ -18,14 +18,39 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
     let Size { width, height } = image.size();
     let (columns, rows) = ((width / factor).max(1), (height / factor).max(1));
     let mut means = memory::filled("a smaller image", columns * rows, 0u8)?;
+    let mut sums = vec![[0u64; 3]; columns];
     for (row, means) in means.chunks_exact_mut(columns).enumerate() {
         let ys = row * factor..((row + 1) * factor).min(height);
-        for (column, mean) in means.iter_mut().enumerate() {
-            let xs = column * factor..((column + 1) * factor).min(width);
-            let count = (xs.len() * ys.len()) as u64;
-            let sum: u64 = ys.clone().map(|y| xs.clone().map(|x| u64::from(image.grey(x, y))).sum::<u64>()).sum();
-            *mean = ((sum + count / 2) / count) as u8;
+        let count = (ys.len() * factor.min(width)) as u64;
+        sums.fill([0; 3]);
+        for line in image.pixels()[ys.start * width..ys.end * width].chunks_exact(width) {
+            for (sum, block) in sums.iter_mut().zip(line.chunks(factor)) {
+                add(sum, block);
+            }
+        }
+        for (mean, sum) in means.iter_mut().zip(&sums) {
+            *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
     }
     Image::from_grey(columns, rows, &means)
+}
+
+fn add(sums: &mut [u64; 3], colours: &[[u8; 3]]) {
+    for colour in colours {
+        sums.iter_mut().zip(colour).for_each(|(sum, &value)| *sum += u64::from(value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_is_the_mean_of_its_block() {
+        let image = Image::from_grey(5, 3, &[1, 2, 9, 9, 77, 3, 5, 9, 9, 77, 77, 77, 77, 77, 77]).unwrap();
+        assert_eq!(mean_of_blocks(&image, 2).unwrap(), Image::from_grey(2, 1, &[3, 9]).unwrap());
+        assert_eq!(mean_of_blocks(&image, 1).unwrap(), image);
+        let line = Image::from_grey(1, 4, &[1, 3, 5, 8]).unwrap();
+        assert_eq!(mean_of_blocks(&line, 2).unwrap(), Image::from_grey(1, 2, &[2, 7]).unwrap());
+    }
 }

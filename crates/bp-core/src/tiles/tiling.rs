@@ -70,6 +70,31 @@ impl Tile {
     }
 }
 
+/// How near the answer of tiles is to the whole image's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Likeness {
+    /// The same to the bit: there is one tile, or strips under [`Schedule::Sweep`] that begin at multiples of as many rows
+    /// as a band of the coarsest grid covers. On every grid bands depend on those that cover them on coarser ones, and on
+    /// no others.
+    Same,
+    /// Only what lies farther off than the halo was not heard of.
+    Near,
+    /// Bands of coarser grids were cut under [`Schedule::Sweep`].
+    Rough,
+}
+
+impl Likeness {
+    /// The answer in words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Same => "the whole image's answer",
+            Self::Near => "nearly the whole image's answer",
+            Self::Rough => "a less accurate answer",
+        }
+    }
+}
+
 /// A plan, and the tiles that it is run on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
@@ -106,7 +131,7 @@ impl Tiling {
     /// The tiling that runs within `bytes`, where `needed` tells what a device needs for a plan, or why it cannot run it:
     ///
     /// 1. the whole image;
-    /// 2. strips of rows that give the same answer, the fewest, see [`Tiling::is_exact`];
+    /// 2. strips of rows that give the same answer, the fewest, see [`Likeness::Same`];
     /// 3. tiles with a halo of [`HALO`]: those that compute least in all; under [`Schedule::Sweep`] the highest among
     ///    those that compute no more than four times what the whole image does, if any.
     ///
@@ -171,14 +196,17 @@ impl Tiling {
         self.counts() == (1, 1)
     }
 
-    /// Whether the answer is the one of the whole image to the bit. It is for strips under [`Schedule::Sweep`] that begin at
-    /// multiples of as many rows as a band of the coarsest grid covers: on every grid bands depend on those that cover them
-    /// on coarser ones, and on no others.
+    /// How near the answer is to the whole image's.
     #[must_use]
-    pub fn is_exact(&self) -> bool {
-        let apart = |rows: &Span| rows.all == rows.kept && rows.all.start.is_multiple_of(exact_rows(&self.plan));
+    pub fn likeness(&self) -> Likeness {
         let swept = self.plan.settings().schedule == Schedule::Sweep;
-        self.is_whole() || swept && self.columns.len() == 1 && self.rows.iter().all(apart)
+        let unit = exact_rows(&self.plan);
+        match self.rows.iter().all(|rows| rows.all.start.is_multiple_of(unit)) {
+            _ if self.is_whole() => Likeness::Same,
+            true if swept && self.columns.len() == 1 => Likeness::Same,
+            false if swept => Likeness::Rough,
+            _ => Likeness::Near,
+        }
     }
 
     /// Message entries that all tiles compute.
@@ -307,22 +335,22 @@ mod tests {
     fn less_memory_means_strips_then_tiles_then_an_error_that_names_the_least() {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let whole = plan.bytes();
-        assert!(within(&plan, whole).is_whole());
-        for (bytes, counts, exact) in [
-            (whole - 1, (1, 2), true),
-            (whole / 2, (1, 3), true),
-            (whole / 5, (1, 6), true),
-            (whole / 8, (2, 6), false),
-            (whole / 40, (6, 24), false),
+        assert_eq!(within(&plan, whole).likeness(), Likeness::Same);
+        for (bytes, counts, likeness) in [
+            (whole - 1, (1, 2), Likeness::Same),
+            (whole / 2, (1, 3), Likeness::Same),
+            (whole / 5, (1, 6), Likeness::Same),
+            (whole / 8, (2, 6), Likeness::Near),
+            (whole / 40, (6, 24), Likeness::Rough),
         ] {
             let tiling = within(&plan, bytes);
-            assert_eq!((tiling.counts(), tiling.is_exact()), (counts, exact), "{bytes}");
+            assert_eq!((tiling.counts(), tiling.likeness()), (counts, likeness), "{bytes}");
         }
         let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed) else {
             panic!()
         };
         assert_eq!(available, Some(1));
-        assert!(!within(&plan, least).is_exact());
+        assert_eq!(within(&plan, least).likeness(), Likeness::Rough);
         assert!(Tiling::within(&plan, least - 1, &needed).is_err());
     }
 
@@ -331,7 +359,12 @@ mod tests {
         for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
             let plan = plan((1500, 3000), 16, algorithm);
             let tiling = within(&plan, plan.bytes() / 4);
-            assert!(!tiling.is_exact() && tiling.work() < 1.4, "{:?} {}", tiling.counts(), tiling.work());
+            assert!(
+                tiling.likeness() == Likeness::Near && tiling.work() < 1.4,
+                "{:?} {}",
+                tiling.counts(),
+                tiling.work()
+            );
         }
     }
 

@@ -120,6 +120,10 @@ pub(crate) struct PlanArgs {
     /// Truncation K of the smoothness cost. [default: the profile's]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
     pub(crate) truncation: Option<u8>,
+    /// Weak edges: half slope and truncation where neighbouring grey values of the left image differ by more than N.
+    /// [default: no edge is weak]
+    #[arg(long, value_name = "N")]
+    pub(crate) edge_threshold: Option<u8>,
 }
 
 /// Labels as they are asked for.

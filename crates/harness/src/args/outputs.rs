@@ -11,14 +11,14 @@ use crate::files::{Colours, PixelLimit};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct OutputArgs {
-    /// Also write the map as a coloured picture.
+    /// Write the map as a coloured picture.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
-    /// Also write depth in millimetres: .pfm, .tif and .npy as 32-bit floats, .png in 16 bits (0 where unknown or beyond
+    /// Write depth in millimetres: .pfm, .tif and .npy as 32-bit floats, .png in 16 bits (0 where unknown or beyond
     /// 65535 mm); needs a calibration.
     #[arg(long, value_name = "MAP")]
     pub(crate) depth: Option<PathBuf>,
-    /// Also write points with the left image's colours, in millimetres from the left camera, x right, y down, z forward;
+    /// Write points with the left image's colours, in millimetres from the left camera, x right, y down, z forward;
     /// needs a calibration.
     #[arg(long, value_name = "FILE.ply")]
     pub(crate) points: Option<PathBuf>,

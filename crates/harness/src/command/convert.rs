@@ -27,8 +27,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
-    let (low, high) = map.range().unwrap_or((0.0, 0.0));
-    outputs.check_range(low, high)?;
+    outputs.check_map(&making, map.range().unwrap_or((0.0, 0.0)), map.size())?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;
     outputs.write(&making, &Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs })
 }

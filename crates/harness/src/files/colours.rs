@@ -1,5 +1,7 @@
 //! Colours for values.
 
+use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
+
 /// From which colours a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Colours {
@@ -28,7 +30,11 @@ impl Colours {
     pub(crate) fn at(self, place: f64) -> [u8; 3] {
         let place = place.clamp(0.0, 1.0);
         match self {
-            Self::Viridis => colorous::VIRIDIS.eval_continuous(place).as_array(),
+            // Not colorous's, which differs a little: recorded figures are made again to the byte.
+            Self::Viridis => {
+                let colour = ViridisRGB.get_color(place as f32);
+                [colour.0, colour.1, colour.2]
+            }
             Self::Turbo => colorous::TURBO.eval_continuous(place).as_array(),
             // Red, green and blue rise and fall one after another, each as a hat around 3/4, 2/4 and 1/4.
             Self::Jet => {
@@ -46,7 +52,7 @@ mod tests {
     fn ends_and_middles_are_the_published_ones() {
         let ends = |colours: Colours| [0.0, 0.5, 1.0].map(|place| colours.at(place));
         assert_eq!(ends(Colours::Viridis)[0], [68, 1, 84]);
-        assert_eq!(ends(Colours::Viridis)[2], [253, 231, 37]);
+        assert_eq!(ends(Colours::Viridis)[2], [254, 232, 37]);
         assert_eq!(ends(Colours::Jet), [[0, 0, 128], [128, 255, 128], [128, 0, 0]]);
         // Of the polynomials; the table that they approach begins with [48, 18, 59].
         assert_eq!(ends(Colours::Turbo), [[34, 23, 27], [148, 250, 80], [144, 12, 0]]);

@@ -5,15 +5,15 @@ use std::{
     path::Path,
 };
 
-use bp_core::{DeviceKind, Size};
+use bp_core::Size;
 use tiff::{
     ColorType, TiffError, TiffResult,
     decoder::{Decoder, DecodingResult, Limits},
     encoder::{TiffEncoder, colortype::Gray32Float},
 };
 
-use super::PixelLimit;
-use crate::{failure::Failure, machine};
+use super::{PixelLimit, images::check_room};
+use crate::failure::Failure;
 
 /// Encodes values `[height][width]`.
 pub(super) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
@@ -39,7 +39,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Opti
     let size = Size::new(width as usize, height as usize).map_err(|error| Failure::reading(path, &error))?;
     // Doubles and what they become.
     let needed = 12 * size.pixels() as u64;
-    machine::check_memory(DeviceKind::Processor, needed, None, &format!("{} is too large", path.display()))?;
+    check_room(path, needed)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;

@@ -17,6 +17,9 @@ const TRUTH: u64 = 5;
 const MAP: u64 = 4;
 const WRITING: u64 = 8;
 
+/// Bytes a pixel of labels, which are there until the map is to be written.
+const LABELS: u64 = 2;
+
 /// Bytes a pixel of depths.
 const DEPTH: u64 = 4;
 
@@ -73,7 +76,7 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
 struct Beside {
     /// All the time.
     held: u64,
-    /// Once the labels are there. Those and their energy need less than writing the map, and are gone by then.
+    /// Once the labels are there. Their energy needs less than what comes later.
     finishing: u64,
 }
 
@@ -87,7 +90,7 @@ impl Beside {
         let finishing = if finish.confidence.is_some() { CONFIDENCE } else { FINISHING };
         Self {
             held: PROGRAM + a_pixel(PAIR + truth + right),
-            finishing: a_pixel(MAP + (WRITING + depth).max(finishing)),
+            finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),
         }
     }
 
@@ -99,11 +102,8 @@ impl Beside {
 
 /// What a tiling is, in words.
 fn described(tiling: &Tiling) -> String {
-    let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
-    if tiling.is_exact() {
-        return format!("{rows} strips of up to {size} pixels, with the same answer,");
-    }
-    format!("{columns}x{rows} tiles of up to {size} pixels, with nearly the same answer (docs/big-images.md),")
+    let ((columns, rows), size, answer) = (tiling.counts(), tiling.tile_size(), tiling.likeness().name());
+    format!("{columns}x{rows} tiles of up to {size} pixels, which give {answer} (docs/big-images.md),")
 }
 
 /// How many bytes the program may hold.

@@ -103,12 +103,17 @@ impl Outputs {
     /// Fails where a format cannot hold the disparities of a model, or the calibration is for images of another size.
     pub(crate) fn check_model(&self, making: &Making, model: &Model, size: Size) -> Result<(), Failure> {
         let [low, high] = [0, model.labels() as u16 - 1].map(|label| model.disparity(label) as f32);
-        self.check_range(low, high)?;
+        self.check_map(making, (low, high), size)
+    }
+
+    /// The same for a map of disparities from the first to the second of `range`.
+    pub(crate) fn check_map(&self, making: &Making, range: (f32, f32), size: Size) -> Result<(), Failure> {
+        self.check_range(range.0, range.1)?;
         making.calibration(size).map(drop)
     }
 
     /// Fails where a format cannot hold disparities from `low` to `high`.
-    pub(crate) fn check_range(&self, low: f32, high: f32) -> Result<(), Failure> {
+    fn check_range(&self, low: f32, high: f32) -> Result<(), Failure> {
         self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))
     }
 

@@ -12,6 +12,7 @@ pub(crate) fn plan(args: &PlanArgs, size: Size, range: DisparityRange) -> Result
     let model = Model::new(args.profile, range.labels)?.with_min_disparity(range.min_disparity)?;
     let slope = args.slope.unwrap_or(model.slope());
     let model = model.with_smoothness(slope, args.truncation.unwrap_or(model.truncation()))?;
+    let model = model.with_weak_edges(args.edge_threshold);
     Ok(Plan::new(size, model, settings(args, size, range.labels))?)
 }
 

@@ -51,16 +51,16 @@ pub(crate) struct Tiles {
     /// The most that one matches, in pixels.
     width: usize,
     height: usize,
-    /// Whether the answer is the one of the whole image.
-    exact: bool,
+    /// How near the answer is to the whole image's.
+    answer: &'static str,
 }
 
 impl Tiles {
     /// What is told of a tiling.
     pub(crate) fn of(tiling: &Tiling) -> Option<Self> {
         let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
-        let exact = tiling.is_exact();
-        (!tiling.is_whole()).then_some(Self { columns, rows, width: size.width, height: size.height, exact })
+        let answer = tiling.likeness().name();
+        (!tiling.is_whole()).then_some(Self { columns, rows, width: size.width, height: size.height, answer })
     }
 }
 
@@ -131,8 +131,7 @@ pub(crate) fn text(report: &Report) -> String {
     let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
     let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
     let _ = writeln!(text, "{:<10}{plan}, on {}: {}{software}", "plan", report.backend, report.device.name);
-    if let Some(Tiles { columns, rows, width, height, exact }) = &report.tiles {
-        let answer = if *exact { "the whole image's answer" } else { "nearly the whole image's answer" };
+    if let Some(Tiles { columns, rows, width, height, answer }) = &report.tiles {
         let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
     }
     let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));

@@ -77,7 +77,6 @@ impl<'a> Session<'a> {
         };
         let (samples, last) = take_samples(args, &mut tiled, device, (pair, *starts_warm))?;
         let messages_sha256 = args.messages_hash.then(|| hash_messages(&mut tiled)).transpose()?;
-        tiled.free_tiles();
         let answer = Answer {
             energy: Energy::of(pair, tiled.plan().model(), tiled.labels())?,
             map: last.map,
@@ -93,7 +92,7 @@ impl<'a> Session<'a> {
             messages_sha256,
         };
         interrupt::check()?;
-        // The memory of tiles is for writing the answer.
+        // Labels of tiles make room for writing the answer.
         *prepared = tiled.tiling().is_whole().then_some((tiled, peak_bytes));
         Ok(answer)
     }
@@ -115,6 +114,8 @@ fn take_samples(
         let solve = if starts_warm { Tiled::solve_warm_observed } else { Tiled::solve_observed };
         let times = solve(tiled, device, pair, observer)?;
         done = done.saturating_add(updates);
+        // The memory of tiles is for the map.
+        tiled.free_tiles();
         Ok::<_, Failure>((times, tiled.disparities()))
     };
     let mut last = finished(&args.finish, pair, &mut solve)?;

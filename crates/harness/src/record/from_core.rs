@@ -40,6 +40,7 @@ impl Settings {
             min_disparity: model.min_disparity(),
             slope: model.slope(),
             truncation: model.truncation(),
+            edge_threshold: model.weak_edges(),
             algorithm: algorithm.name().to_owned(),
             k,
             z,

@@ -9,6 +9,7 @@ mod outputs;
 mod recorded;
 mod running;
 mod speed;
+mod survey;
 
 use std::{fs, path::Path, process::Command};
 
@@ -78,7 +79,14 @@ fn settings_change_what_they_say() {
     let hash = |options: &str| run(options)["messages_sha256"].as_str().unwrap().to_owned();
     assert_eq!(hash(""), hash(""));
     let default = hash("--algorithm cfbp --grids 3 --loops 1");
-    for other in ["--message-start sender", "--slope 1", "--truncation 5", "--profile mrf", "--min-disparity -2"] {
+    for other in [
+        "--message-start sender",
+        "--slope 1",
+        "--truncation 5",
+        "--edge-threshold 9",
+        "--profile mrf",
+        "--min-disparity -2",
+    ] {
         assert_ne!(hash(&format!("--algorithm cfbp --grids 3 --loops 1 {other}")), default, "{other}");
     }
     assert_ne!(hash("--algorithm sweep --profile mrf --coarse-clip off"), hash("--algorithm sweep --profile mrf"));
@@ -217,10 +225,11 @@ fn what_cannot_be_written_is_told_before_the_work_and_leaves_nothing() {
 }
 
 #[test]
-fn more_memory_than_there_is_is_refused_before_it_is_taken() {
+fn more_memory_than_is_allowed_is_refused_before_it_is_taken() {
     let folder = Folder::new();
     fs::write(folder.path("big.pgm"), [b"P5\n20000 4000\n255\n".as_slice(), &vec![0; 80_000_000]].concat()).unwrap();
-    folder.fails("match big.pgm big.pgm -o a.pfm --labels 1024", 6, &["bytes are needed", "--labels"]);
+    let words = ["bytes are needed", "--max-memory", "--labels"];
+    folder.fails("match big.pgm big.pgm -o a.pfm --labels 1024 --max-memory 1GiB", 6, &words);
 }
 
 #[test]

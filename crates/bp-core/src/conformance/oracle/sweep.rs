@@ -45,12 +45,11 @@ impl OracleSolver {
     /// The even or odd nodes of row y send to `sides`, all messages computed before any is sent.
     fn send_row(&mut self, grid: usize, y: usize, parity: usize, sides: &[Side]) {
         let width = self.plan.size(grid).width;
-        let super::Grid { costs, received, .. } = &self.grids[grid];
+        let received = &self.grids[grid].received;
         let mut messages = Vec::new();
         for x in (0..width).filter(|x| (x + y) % 2 == parity) {
             for &to in sides {
-                let node = y * width + x;
-                messages.push((x, to, self.message(&costs[node], &received[node], to)));
+                messages.push((x, to, self.message(grid, (x, y), &received[y * width + x], to)));
             }
         }
         for (x, to, message) in messages {
@@ -113,8 +112,9 @@ impl OracleSolver {
                 sum += self.grids[0].received[node][side as usize][usize::from(*d)];
             }
             for &side in decided.iter().filter(|&&side| !(first_row && side == Side::Up)) {
-                if let Some((x, y)) = self.plan.neighbour(0, (x, y), side) {
-                    sum += i64::from(self.plan.model().smoothness(*d, labels[y * width + x]));
+                if let Some((other_x, other_y)) = self.plan.neighbour(0, (x, y), side) {
+                    let other = usize::from(labels[other_y * width + other_x]);
+                    sum += self.smoothness(0, (x, y), side)(usize::from(*d), other);
                 }
             }
             sum

@@ -1,0 +1,60 @@
+//! Labels from a look at the images, and warnings of pairs that are none.
+
+use super::folder::{Folder, text};
+
+/// Two views of a noisy plane 9 px apart, one whose rows are 2 px lower, and another scene; large enough to be looked at.
+fn views() -> Folder {
+    let folder = Folder::new();
+    let noise = |x: u32, y: u32| {
+        let mixed = (x ^ y << 16).wrapping_mul(0x9e37_79b1);
+        ((mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca6b) >> 24) as u8
+    };
+    for (name, x0, y0) in [("a.png", 0, 4), ("b.png", 9, 4), ("low.png", 9, 2), ("other.png", 5000, 700)] {
+        image::GrayImage::from_fn(90, 70, |x, y| image::Luma([noise(x + x0, y + y0)])).save(folder.path(name)).unwrap();
+    }
+    folder
+}
+
+fn warnings(folder: &Folder, arguments: &str) -> String {
+    let report = folder.json(&format!("match {arguments} -o map.pfm --json"));
+    let warnings: Vec<&str> =
+        report["warnings"].as_array().unwrap().iter().map(|line| line.as_str().unwrap()).collect();
+    warnings.join("; ")
+}
+
+#[test]
+fn labels_auto_takes_the_range_that_the_images_need() {
+    let folder = views();
+    let settings = |arguments: &str| {
+        let report = folder.json(&format!("match {arguments} --labels auto --json"));
+        (report["settings"]["min_disparity"].as_i64().unwrap(), report["settings"]["labels"].as_u64().unwrap())
+    };
+    assert_eq!(settings("a.png b.png -o map.pfm"), (7, 16));
+    assert_eq!(settings("b.png a.png -o map.pfm"), (-11, 16));
+    assert_eq!(settings("a.png b.png -o map.pfm --min-disparity 2"), (2, 32));
+    // The margin alone is negative here, and a PNG holds nothing negative.
+    assert_eq!(settings("a.png a.png -o map.pfm"), (-2, 16));
+    assert_eq!(settings("a.png a.png -o map.png"), (0, 16));
+    let output = folder.run("match a.png b.png -o map.pfm --labels auto");
+    assert!(text(&output.stderr).contains("16 labels, from 7 to 22 px"));
+    folder.fails("match b.png a.png -o no.png --labels auto", 2, &["exchanged", "use an output that ends in .pfm"]);
+    folder.fails("match a.png b.png -o no.png --labels some", 2, &["auto or a number from 1 to 1024"]);
+}
+
+#[test]
+fn wrong_pairs_and_labels_are_told_with_what_to_do() {
+    let folder = views();
+    assert_eq!(warnings(&folder, "a.png b.png"), "");
+    for (arguments, words) in [
+        ("b.png a.png", ["b.png and a.png look exchanged", "the other way round"]),
+        ("a.png low.png", ["rows of a.png and low.png do not correspond", "2 px too low): rectify"]),
+        ("a.png other.png", ["hardly anything in a.png and other.png matches", "different scenes"]),
+        ("a.png b.png --labels 6", ["disparities from about 9 to 9 px", "raise --labels"]),
+        ("a.png b.png --min-disparity 12", ["reach from 12 to", "lower --min-disparity"]),
+        ("a.png other.png --labels auto", ["--labels auto: too little", "the default is taken"]),
+    ] {
+        let told = warnings(&folder, arguments);
+        assert!(words.iter().all(|word| told.contains(word)), "{arguments}: {told}");
+    }
+    assert_eq!(warnings(&folder, "b.png a.png --labels 20 --min-disparity -15").matches("labels").count(), 0);
+}

@@ -1,0 +1,94 @@
+"""What scripts share that run `bp match` on the public pairs: pairs, runs, errors, tables."""
+import argparse, datetime, json, os, pathlib, platform, statistics, subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
+BP = TARGET / "release" / "bp"
+TIMED = 3  # matches of each round, after one that is not timed
+
+# Pair: labels, then left, right, truth, and what tells the visible pixels, in the data folder.
+OLD, NEW = "middlebury2001-2003", "middlebury2006"
+OLD_FILES = ("imL.png", "imR.png", "groundtruth.png", "--mask", "nonocc.png")
+NEW_FILES = ("view1.png", "view5.png", "disp1.png", "--ground-truth-right", "disp5.png")
+OLD_PAIRS = {"tsukuba": (16, f"{OLD}/tsukuba", OLD_FILES), "cones": (64, f"{OLD}/cones", OLD_FILES)}
+# The thesis's six, at half size.
+SIX = {name: (112, f"{NEW}/{name}", NEW_FILES)
+       for name in ("Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books")}
+
+
+def parser(description):
+    made = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    beside = ROOT.parent / "shared" / "data"
+    data = os.environ.get("BP_DATA") or (beside if beside.is_dir() else "data")
+    made.add_argument("--data", default=data, type=pathlib.Path, help="data folder [BP_DATA, else %(default)s]")
+    made.add_argument("--output", metavar="FILE.json", type=pathlib.Path, help="also write everything as JSON")
+    return made
+
+
+def build():
+    subprocess.run(["cargo", "build", "--quiet", "--release", "--locked", "--package", "harness"], cwd=ROOT, check=True)
+
+
+def bp(*words):
+    return json.loads(subprocess.run([BP, *map(str, words), "--json"], check=True, stdout=subprocess.PIPE).stdout)
+
+
+class Pair:
+    def __init__(self, name, files, data):
+        self.name = name
+        self.labels, folder, (left, right, truth, option, visible) = files
+        self.images = [data / folder / left, data / folder / right]
+        manifest = json.loads((ROOT / "bench-data" / "middlebury.json").read_text())["files"]
+        scale = next(file["scale"] for file in manifest if file["path"] == f"{folder}/{truth}")
+        self.truth = [data / folder / truth, "--scale", scale, option, data / folder / visible]
+        missing = [path for path in (*self.images, data / folder / truth) if not path.exists()]
+        if missing:
+            raise SystemExit(f"--data {data}: there is no {missing[0]}; see scripts/fetch-middlebury")
+
+    def errors(self, path):
+        report = bp("evaluate", path, *self.truth)
+        one = report["thresholds_px"].index(1)
+        figures = {}
+        for region in ("all", "visible"):
+            errors = report[region]
+            figures |= {f"bad_{region}": errors["bad_or_unanswered"][one], f"rmse_{region}": errors["rmse"]}
+        return figures | {"answered": 100 * report["all"]["answered"] / report["all"]["known"]}
+
+
+class BeliefPropagation:
+    """`bp match` with some options."""
+
+    def __init__(self, pair, options, output):
+        self.pair, self.output = pair, output
+        self.command = ["match", *pair.images, "--output", output, "--labels", pair.labels, "--no-sidecar",
+                        *options.split()]
+
+    def times(self, threads):
+        return bp(*self.command, "--repeat", 1 + TIMED, "--threads", threads)["samples_ms"][1:]
+
+    def errors(self, _):
+        return {"filled": self.pair.errors(self.output)}
+
+
+def about():
+    """The machine and the versions."""
+    lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines() if os.path.exists("/proc/cpuinfo") else []
+    cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    git = ["git", "-C", ROOT, "describe", "--always", "--dirty", "--abbrev=12"]
+    commit = subprocess.run(git, stdout=subprocess.PIPE, text=True).stdout.strip()
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    machine = {"cpu": cpu, "cores": cores, "system": platform.platform()}
+    return {"date": datetime.date.today().isoformat(), "machine": machine, "versions": {"bp": commit or "unknown"}}
+
+
+def median_and_range(times):
+    return f"{statistics.median(times):.1f} ({min(times):.1f} to {max(times):.1f})"
+
+
+def markdown(heads, rows):
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [heads, ["---"] * len(heads), *rows])
+
+
+def write(path, report):
+    if path:
+        path.write_text(json.dumps(report, indent=1) + "\n")
