@@ -53,9 +53,10 @@ pub(crate) fn planned(
 ) -> Result<(Plan, Vec<String>), Failure> {
     let range = labels::range(args, size, survey, outputs);
     let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
-    outputs.check_model(making, plan.model(), size)?;
     let warnings = warnings::of(survey, &plan, files, range.is_none());
+    // Told first: exchanged images may be why the outputs cannot hold what is asked for.
     warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
+    outputs.check_model(making, plan.model(), size)?;
     Ok((plan, warnings))
 }
 
