@@ -1,4 +1,5 @@
 //! What the operations on maps are good for, on made-up scenes whose truth is exact.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
     Algorithm, Backend, DisparityMap, GroundTruth, MapErrors, Matcher, Model, Plan, Profile, Schedule, StereoPair,
