@@ -22,7 +22,11 @@ use std::{
 pub(crate) use calibration::Geometry;
 pub(crate) use colours::Colours;
 pub(crate) use format::{MapFormat, Quantity, Raster, check_ending, check_range};
+#[cfg(feature = "fuzzing")]
+pub(crate) use images::image_of;
 pub(crate) use images::{PixelLimit, hex, pixels_sha256, read_image, read_stored_grey};
+#[cfg(feature = "fuzzing")]
+pub(crate) use maps::{map_of, mask_of};
 pub(crate) use maps::{read_map, read_mask};
 pub(crate) use picture::{Picture, encode_picture};
 pub(crate) use ply::write_points;

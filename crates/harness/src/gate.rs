@@ -28,6 +28,12 @@ pub(crate) use renew::Renewal;
 use runners::Runners;
 pub(crate) use table::page;
 
+/// Whether the text of a file holds baselines, of one kind or the other.
+#[cfg(feature = "fuzzing")]
+pub(crate) fn is_baseline(path: &std::path::Path, text: &str) -> bool {
+    file::parse::<baseline::Baseline>(path, text).is_ok() || file::parse::<callgrind::Counts>(path, text).is_ok()
+}
+
 /// What the sides of the scene are divided by, labels, and loops of BP.
 const FULL: (usize, usize, u32) = (2, 56, 56);
 

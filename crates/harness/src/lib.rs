@@ -13,6 +13,8 @@ mod compare;
 mod export;
 mod failure;
 mod files;
+#[cfg(feature = "fuzzing")]
+pub mod fuzzing;
 mod gate;
 mod interrupt;
 mod machine;

@@ -15,5 +15,7 @@ pub(crate) mod warnings;
 pub(crate) use batch::Shard;
 pub(crate) use finishing::Sample;
 pub(crate) use outputs::{Content, Making, Outputs};
+#[cfg(feature = "fuzzing")]
+pub(crate) use pairs::parse as listed_pairs;
 pub(crate) use report::{Report, text};
 pub(crate) use session::{Answer, Session};

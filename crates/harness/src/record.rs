@@ -5,6 +5,8 @@ mod from_core;
 mod load;
 
 pub(crate) use from_core::clocks;
+#[cfg(feature = "fuzzing")]
+pub(crate) use load::parse;
 pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, load, record_file};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -62,9 +62,14 @@ struct Report<'a> {
 impl<'a> Report<'a> {
     fn new(folder: &Path, record: &'a Record) -> Result<Self, Failure> {
         let results = Results::new(record)?;
+        let figures = figures::all(folder, &results)?;
+        Self::of(results, figures)
+    }
+
+    fn of(results: Results<'a>, figures: Vec<Drawing>) -> Result<Self, Failure> {
         Ok(Self {
             tables: tables::all(&results),
-            figures: figures::all(folder, &results)?,
+            figures,
             diagrams: diagrams::all(&results)?,
             tradeoffs: tradeoffs::all(&results)?,
             results,
@@ -92,6 +97,13 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
     }
     write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
     write_text(&folder.join(PAGE_FILE), &html::page(&report))
+}
+
+/// The pages of a record whose maps are not there, and what stands in a README.
+#[cfg(feature = "fuzzing")]
+pub(crate) fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
+    let report = Report::of(Results::new(record)?, Vec::new())?;
+    Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), &report.results)])
 }
 
 /// `bp report`.

@@ -26,9 +26,13 @@ pub(crate) struct Geometry {
 impl Geometry {
     /// Reads a `calib.txt`.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        Self::parse(path, &read_limited(path, PixelLimit { pixels: 0 })?)
+    }
+
+    /// The same of a file that is in memory.
+    pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, Failure> {
         let failed = |error: &dyn std::fmt::Display| Failure::reading(path, error);
-        let bytes = read_limited(path, PixelLimit { pixels: 0 })?;
-        let text = std::str::from_utf8(&bytes).map_err(|_| failed(&"not a calibration: it is no text"))?;
+        let text = std::str::from_utf8(bytes).map_err(|_| failed(&"not a calibration: it is no text"))?;
         let entries = Entries { path, text };
         let [focal, skew, column, zero, focal_down, row] = entries.camera("cam0")?;
         if skew != 0.0 || zero != 0.0 || (focal_down / focal - 1.0).abs() > 1e-3 {

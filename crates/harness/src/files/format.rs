@@ -115,6 +115,19 @@ impl<'a> Raster<'a> {
         known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
+    /// Files of it in all formats that hold the values themselves.
+    #[cfg(feature = "fuzzing")]
+    pub(crate) fn floats(&self) -> [Vec<u8>; 3] {
+        let written = |write: &dyn Fn(&mut Vec<u8>) -> std::io::Result<()>| {
+            let mut bytes = Vec::new();
+            write(&mut bytes).unwrap_or_else(|error| panic!("{error}"));
+            bytes
+        };
+        let tiff = tiff::encode(self.size, self.values).unwrap_or_else(|error| panic!("{error}"));
+        let pfm = written(&|bytes| pfm::write(bytes, self.size, self.values));
+        [pfm, written(&|bytes| npy::write(bytes, self.size, self.values)), tiff]
+    }
+
     /// Writes it in the format of the path's ending.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
         let Self { size, values, quantity } = *self;

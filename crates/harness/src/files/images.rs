@@ -59,13 +59,17 @@ impl PixelLimit {
 /// Reads an image of 8 or 16 bits, or a PFM, grey or colour; transparency is ignored, and so is the orientation that a
 /// camera noted.
 pub(crate) fn read_image(path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
-    let bytes = read_limited(path, limit)?;
-    let (size, pixels) = if pfm::is_pfm(&bytes) {
-        let file = pfm::parse(path, &bytes, limit)?;
+    image_of(path, &read_limited(path, limit)?, limit)
+}
+
+/// The same of a file that is in memory.
+pub(crate) fn image_of(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Image, Failure> {
+    let (size, pixels) = if pfm::is_pfm(bytes) {
+        let file = pfm::parse(path, bytes, limit)?;
         (file.size, file.into_pixels(path)?)
     } else {
-        let decoded = decode(path, &bytes, limit)?;
-        (size(&decoded), colours(decoded))
+        let decoded = decode(path, bytes, limit)?;
+        (size(path, &decoded)?, colours(decoded))
     };
     Image::from_rgb(size.width, size.height, pixels).map_err(|error| Failure::reading(path, &error))
 }
@@ -79,8 +83,10 @@ fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
     }
 }
 
-fn size(image: &DynamicImage) -> Size {
-    Size { width: image.width() as usize, height: image.height() as usize }
+/// The size, which some formats allow to be 0.
+fn size(path: &Path, image: &DynamicImage) -> Result<Size, Failure> {
+    let size = Size::new(image.width() as usize, image.height() as usize);
+    size.map_err(|error| Failure::reading(path, &error))
 }
 
 fn has_16_bits(image: &DynamicImage) -> bool {
@@ -96,7 +102,7 @@ pub(crate) fn read_stored_grey(path: &Path, limit: PixelLimit) -> Result<(Size, 
 pub(super) fn stored_grey(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<(Size, Vec<u16>, bool), Failure> {
     check_unscaled(path, bytes)?;
     let decoded = decode(path, bytes, limit)?;
-    let size = size(&decoded);
+    let size = size(path, &decoded)?;
     let sixteen = has_16_bits(&decoded);
     let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
     let values: Option<Vec<u16>> = if sixteen {

@@ -15,11 +15,20 @@ use crate::failure::Failure;
 /// Reads a map. Stored whole numbers are divided by `scale`, by default 256 where they have 16 bits and 1 where they have
 /// 8; 0 is unknown. Floats are divided by `scale` where that is given; what is not finite is unknown.
 pub(crate) fn read_map(path: &Path, scale: Option<f32>, limit: PixelLimit) -> Result<DisparityMap, Failure> {
-    let bytes = read_limited(path, limit)?;
-    let (size, values) = match floats(path, &bytes, limit)? {
+    map_of(path, &read_limited(path, limit)?, scale, limit)
+}
+
+/// The same of a file that is in memory.
+pub(crate) fn map_of(
+    path: &Path,
+    bytes: &[u8],
+    scale: Option<f32>,
+    limit: PixelLimit,
+) -> Result<DisparityMap, Failure> {
+    let (size, values) = match floats(path, bytes, limit)? {
         Some((size, values)) => (size, values.into_iter().map(|value| value / scale.unwrap_or(1.0)).collect()),
         None => {
-            let (size, values, sixteen) = stored_grey(path, &bytes, limit)?;
+            let (size, values, sixteen) = stored_grey(path, bytes, limit)?;
             let scale = scale.unwrap_or(if sixteen { 256.0 } else { 1.0 });
             let disparity = |value: u16| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / scale };
             (size, values.into_iter().map(disparity).collect())
@@ -44,7 +53,12 @@ fn floats(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Option<(Size, 
 
 /// Reads a mask `[height][width]`: true where the stored value is 255.
 pub(crate) fn read_mask(path: &Path, limit: PixelLimit) -> Result<(Size, Vec<bool>), Failure> {
-    let (size, values, sixteen) = stored_grey(path, &read_limited(path, limit)?, limit)?;
+    mask_of(path, &read_limited(path, limit)?, limit)
+}
+
+/// The same of a file that is in memory.
+pub(crate) fn mask_of(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<(Size, Vec<bool>), Failure> {
+    let (size, values, sixteen) = stored_grey(path, bytes, limit)?;
     if sixteen {
         return Err(Failure::reading(path, &"a mask has 8 bits, 255 where a pixel counts"));
     }

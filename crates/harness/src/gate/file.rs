@@ -31,15 +31,20 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failur
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         text => text.map_err(|error| Failure::reading(path, &error))?,
     };
+    parse(path, &text).map(Some)
+}
+
+/// The baseline in the text of a file.
+pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Failure> {
     let failed = |error: serde_json::Error| Failure::reading(path, &error);
     // The version comes first: another one may well have other fields.
-    let Version { schema_version } = serde_json::from_str(&text).map_err(failed)?;
+    let Version { schema_version } = serde_json::from_str(text).map_err(failed)?;
     if schema_version != SCHEMA_VERSION {
         let what = format!("version {schema_version} of baselines, this program has {SCHEMA_VERSION}");
         return Err(Failure::reading(path, &format!("{what}; delete it, and make it anew by --update")));
     }
-    let file: Versioned<T> = serde_json::from_str(&text).map_err(failed)?;
-    Ok(Some(file.baseline))
+    let file: Versioned<T> = serde_json::from_str(text).map_err(failed)?;
+    Ok(file.baseline)
 }
 
 /// Writes a file, and its folder where that is missing.

@@ -10,6 +10,9 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+#[cfg(feature = "fuzzing")]
+pub(crate) use list::parse;
+
 use crate::{args::MatchArgs, failure::Failure};
 
 /// A pair, and what its outputs are named after.

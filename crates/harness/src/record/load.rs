@@ -35,18 +35,22 @@ struct Versioned {
 /// Reads a record: the file, or the one in a run's folder.
 pub(crate) fn load(path: &Path) -> Result<Record, Failure> {
     let path = record_file(path);
-    let text = read(&path)?;
+    parse(&path, &read(&path)?)
+}
+
+/// The record in the text of a file.
+pub(crate) fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
     let refused = |error: &dyn Display| {
         let why: String = printable(&error.to_string()).chars().take(MAX_MESSAGE).collect();
-        Failure::reading(&path, &format!("not a record of `bp reproduce` (see results/schema.json): {why}"))
+        Failure::reading(path, &format!("not a record of `bp reproduce` (see results/schema.json): {why}"))
     };
     // The version comes first: another one may well have other fields.
-    let Versioned { schema_version } = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    let Versioned { schema_version } = serde_json::from_str(text).map_err(|error| refused(&error))?;
     if schema_version != SCHEMA_VERSION {
         let what = format!("schema version {schema_version}, this program reads {SCHEMA_VERSION}");
-        return Err(Failure::reading(&path, &format!("{what}; read it with the version of bp that wrote it")));
+        return Err(Failure::reading(path, &format!("{what}; read it with the version of bp that wrote it")));
     }
-    let record: Record = serde_json::from_str(&text).map_err(|error| refused(&error))?;
+    let record: Record = serde_json::from_str(text).map_err(|error| refused(&error))?;
     match record.cells.iter().filter_map(Cell::measured).find(|measured| !is_beside(&measured.map)) {
         Some(measured) => Err(refused(&format!("a map outside of its folder: {}", measured.map))),
         None => Ok(record),

@@ -10,7 +10,7 @@ const LINE: &str = "a line holds left, right and, where wanted, a name, with tab
 
 /// The pairs of a list that messages call `source`. Empty lines, those that start with # and a heading of
 /// "left,right,name" are passed over.
-pub(super) fn parse(bytes: &[u8], source: &str) -> Result<Vec<Pair>, Failure> {
+pub(crate) fn parse(bytes: &[u8], source: &str) -> Result<Vec<Pair>, Failure> {
     let mut pairs = Vec::new();
     for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
         let at_line = |what: &str| Failure::input(format!("{source}:{}: {what}", index + 1));

@@ -1,0 +1,134 @@
+//! What fuzzers call, with the feature `fuzzing`: every reader of files, and matching itself, on any bytes.
+//!
+//! A reader may refuse a file but not panic, and what it reads keeps what it promises; `fuzz/README.md` says how to run
+//! them. Whatever goes wrong is a panic.
+
+mod tiny;
+
+use std::path::{Component, Path};
+
+use bp_core::depth_map;
+
+use crate::{
+    compare::{Comparison, page},
+    export::{Format, export},
+    files::{Geometry, PixelLimit, Raster, image_of, map_of, mask_of},
+    gate,
+    matching::listed_pairs,
+    record::parse,
+    report,
+};
+
+/// The most pixels that a file may hold here, so that none takes long.
+const LIMIT: PixelLimit = PixelLimit { pixels: 1 << 16 };
+
+/// What messages call the bytes.
+const NAME: &str = "bytes";
+
+/// Something that takes any bytes, and tells whether it took them for what it reads.
+pub type Target = fn(&[u8]) -> bool;
+
+/// All targets, each by the name of its folder in `fuzz/corpus`.
+pub const TARGETS: [(&str, Target); 8] = [
+    ("image", image),
+    ("map", map),
+    ("mask", mask),
+    ("calibration", calibration),
+    ("pair_list", pair_list),
+    ("record", record),
+    ("baseline", baseline),
+    ("tiny_match", tiny_match),
+];
+
+/// Reads an image: PNG, PNM, TIFF, JPEG or PFM.
+///
+/// # Panics
+/// Where it is larger than allowed.
+pub fn image(bytes: &[u8]) -> bool {
+    let Ok(image) = image_of(Path::new(NAME), bytes, LIMIT) else { return false };
+    assert!(image.pixels().len() as u64 <= LIMIT.pixels, "{} pixels", image.size());
+    true
+}
+
+/// Reads a map: PFM, NPY, TIFF, PNG or PNM.
+///
+/// # Panics
+/// Where a map is another one after it was written and read again.
+pub fn map(bytes: &[u8]) -> bool {
+    let Ok(map) = map_of(Path::new(NAME), bytes, None, LIMIT) else { return false };
+    for encoded in Raster::disparities(&map).floats() {
+        match map_of(Path::new(NAME), &encoded, None, LIMIT) {
+            Ok(again) => assert!(again == map, "{map:?} became {again:?}"),
+            Err(failure) => panic!("{map:?}: {failure}"),
+        }
+    }
+    true
+}
+
+/// Reads a mask.
+///
+/// # Panics
+/// Where there is not one value a pixel.
+pub fn mask(bytes: &[u8]) -> bool {
+    let Ok((size, values)) = mask_of(Path::new(NAME), bytes, LIMIT) else { return false };
+    assert_eq!(values.len(), size.pixels());
+    true
+}
+
+/// Reads a calibration, and makes depths of a map by it.
+///
+/// # Panics
+/// Where a depth is negative or no number.
+pub fn calibration(bytes: &[u8]) -> bool {
+    let Ok(geometry) = Geometry::parse(Path::new(NAME), bytes) else { return false };
+    let size = geometry.file.as_ref().and_then(|(_, size)| *size);
+    if let Ok(calibration) = geometry.of(size.unwrap_or(tiny::MAP)) {
+        let depths = depth_map(&tiny::map(), &calibration);
+        assert!(depths.iter().all(|&depth| depth >= 0.0), "{depths:?} by {calibration:?}");
+    }
+    true
+}
+
+/// Reads a list of pairs.
+///
+/// # Panics
+/// Where a name leads out of the output's folder.
+pub fn pair_list(bytes: &[u8]) -> bool {
+    let Ok(pairs) = listed_pairs(bytes, NAME) else { return false };
+    for name in pairs.iter().map(|pair| &pair.name) {
+        let inside = name.components().all(|part| matches!(part, Component::Normal(_)));
+        assert!(inside && name.file_name().is_some(), "{}", name.display());
+    }
+    true
+}
+
+/// Reads a record, and makes of it all that is made of records.
+///
+/// # Panics
+/// Where that goes wrong.
+pub fn record(bytes: &[u8]) -> bool {
+    let path = Path::new(NAME);
+    let Some(record) = std::str::from_utf8(bytes).ok().and_then(|text| parse(path, text).ok()) else { return false };
+    Format::ALL.into_iter().for_each(|format| drop(export(&record, format)));
+    // It may be refused, in words.
+    drop(report::pages_without_maps(&record));
+    let twice = [(path, record.clone()), (path, record)];
+    if let Ok(comparison) = Comparison::new(&twice) {
+        assert!(!page(&comparison).is_empty());
+    }
+    true
+}
+
+/// Reads a file of baselines, of times or of instructions.
+pub fn baseline(bytes: &[u8]) -> bool {
+    std::str::from_utf8(bytes).is_ok_and(|text| gate::is_baseline(Path::new(NAME), text))
+}
+
+/// Matches a tiny pair that is drawn from the bytes with everything else: size, model, settings, what is done
+/// afterwards, and a memory limit.
+///
+/// # Panics
+/// Where backends differ in a label or a message, tiles in a label that they promise, or a map in what it promises.
+pub fn tiny_match(bytes: &[u8]) -> bool {
+    tiny::run(bytes)
+}

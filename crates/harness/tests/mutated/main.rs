@@ -1,0 +1,83 @@
+//! Broken files and tiny pairs: whatever bytes come, readers refuse them or read them, in bounded time and memory.
+//!
+//! The same functions as in `fuzz/`, without a fuzzer: the seeds there, and the same thousands of mutations of them on
+//! every run.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+mod mutations;
+
+use std::{
+    fs,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use fastrand::Rng;
+use harness::fuzzing::{TARGETS, Target};
+use mutations::mutated;
+
+/// Mutations of each target's seeds; of those that take milliseconds, fewer.
+const MUTATIONS: usize = 10_000;
+const FEWER: (usize, [&str; 2]) = (1500, ["record", "tiny_match"]);
+
+/// Longest that bytes may take. They take milliseconds: only what takes longer again when the machine did something
+/// else the first time counts.
+const LONGEST: Duration = Duration::from_secs(2);
+
+/// Most memory that the test may ever hold, where the system tells: a file is allowed 65536 pixels here. Address space
+/// is not counted: the decoder of TIFFs reserves up to 256 MiB on a directory's word, and finds the file too short.
+const MOST_KIB: u64 = 128 << 10;
+
+/// The seeds of a target, in the order of their names.
+fn seeds(target: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths.iter().map(|path| fs::read(path).unwrap()).collect()
+}
+
+/// Whether a target takes the bytes for what it reads, and how long that takes.
+fn run(target: Target, bytes: &[u8]) -> (bool, Duration) {
+    let start = Instant::now();
+    let taken = target(bytes);
+    (taken, start.elapsed())
+}
+
+/// The most KiB that this process ever held.
+fn most_kib() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().trim_end_matches(" kB").parse().ok()
+}
+
+/// What is wrong with how a target takes some bytes.
+fn wrong(target: Target, bytes: &[u8]) -> Option<String> {
+    let Ok((_, took)) = catch_unwind(AssertUnwindSafe(|| run(target, bytes))) else { return Some("panicked".into()) };
+    if took > LONGEST && run(target, bytes).1 > LONGEST {
+        return Some(format!("took {took:?}"));
+    }
+    most_kib().filter(|&most| most > MOST_KIB).map(|most| format!("took {most} KiB"))
+}
+
+/// One test, since memory is that of the whole process.
+#[test]
+fn any_bytes_are_read_or_refused() {
+    for (name, target) in TARGETS {
+        let seeds = seeds(name);
+        let taken = seeds.iter().filter(|seed| target(seed)).count();
+        assert!(2 * taken > seeds.len(), "{name}: {taken} of {} seeds are what they should be", seeds.len());
+        let mut random = Rng::with_seed(1);
+        let start = Instant::now();
+        let count = if FEWER.1.contains(&name) { FEWER.0 } else { MUTATIONS };
+        for i in 0..count {
+            let bytes = mutated(&seeds, &mut random);
+            if let Some(what) = wrong(target, &bytes) {
+                let path = std::env::temp_dir().join(format!("bp-{name}-{i}"));
+                fs::write(&path, &bytes).unwrap();
+                panic!("{name}: mutation {i} {what}; it is {}", path.display());
+            }
+        }
+        println!("{name}: {count} in {:?}, at most {:?} KiB so far", start.elapsed(), most_kib());
+    }
+}
