@@ -11,9 +11,10 @@ OLD, NEW = "middlebury2001-2003", "middlebury2006"
 OLD_FILES = ("imL.png", "imR.png", "groundtruth.png", "--mask", "nonocc.png")
 NEW_FILES = ("view1.png", "view5.png", "disp1.png", "--ground-truth-right", "disp5.png")
 OLD_PAIRS = {"tsukuba": (16, f"{OLD}/tsukuba", OLD_FILES), "cones": (64, f"{OLD}/cones", OLD_FILES)}
-# The thesis's six, at half size.
-SIX = {name: (112, f"{NEW}/{name}", NEW_FILES)
-       for name in ("Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books")}
+# The thesis's six, at half size, and at a third.
+NAMES = ("Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books")
+SIX = {name: (112, f"{NEW}/{name}", NEW_FILES) for name in NAMES}
+THIRDS = {name: (80, f"{NEW}-thirdsize/{name}", NEW_FILES) for name in NAMES}
 
 
 def parser(description):
@@ -47,11 +48,12 @@ class Pair:
 
     def errors(self, path):
         report = bp("evaluate", path, *self.truth)
-        one = report["thresholds_px"].index(1)
+        half, one = map(report["thresholds_px"].index, (0.5, 1))
         figures = {}
         for region in ("all", "visible"):
             errors = report[region]
-            figures |= {f"bad_{region}": errors["bad_or_unanswered"][one], f"rmse_{region}": errors["rmse"]}
+            figures |= {f"bad_{region}": errors["bad_or_unanswered"][one], f"rmse_{region}": errors["rmse"],
+                        f"bad_half_{region}": errors["bad_or_unanswered"][half]}
         return figures | {"answered": 100 * report["all"]["answered"] / report["all"]["known"]}
 
 

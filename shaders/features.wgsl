@@ -1,26 +1,38 @@
-// What the profile compares, of every pixel of one image: its grey value, its census code, its colour, or its grey value
-// with what lies beside it.
+// What the profile compares, of every pixel of one image: its grey value, its census code or those of its channels, its
+// colour, or its grey value with what lies beside it.
 
 @group(0) @binding(2) var<storage, read_write> values: array<u32>;
 
-// The grey value so many columns aside, where border columns are repeated outward.
+// The column so many aside, where border columns are repeated outward.
+fn aside(x: u32, dx: i32) -> u32 {
+    return u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1));
+}
+
 fn grey_aside(x: u32, dx: i32, row: u32) -> u32 {
-    return grey(u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1)), row);
+    return grey(aside(x, dx), row);
+}
+
+// What the census transform compares: each channel, or the grey value.
+fn lightness(x: u32, row: u32) -> vec3<u32> {
+    if PROFILE == CENSUS_RGB {
+        return colour(x, row);
+    }
+    return vec3(grey(x, row), 0u, 0u);
 }
 
 // A bit for each neighbour up to so many columns and rows away, in row order, from the highest bit: whether it is lighter
-// (Zabih and Woodfill 1994).
+// (Zabih and Woodfill 1994). Of channels the codes follow each other.
 fn census(x: u32, row: u32, reach: i32) -> u32 {
-    let centre = grey(x, row);
-    var code = 0u;
+    let centre = lightness(x, row);
+    var codes = vec3(0u);
     for (var dy = -reach; dy <= reach; dy++) {
         for (var dx = -reach; dx <= reach; dx++) {
             if dx != 0 || dy != 0 {
-                code = 2 * code + u32(grey_aside(x, dx, u32(i32(row) + dy)) > centre);
+                codes = 2 * codes + vec3<u32>(lightness(aside(x, dx), u32(i32(row) + dy)) > centre);
             }
         }
     }
-    return code;
+    return codes.x | (codes.y << 8) | (codes.z << 16);
 }
 
 // Grey value and horizontal gradient.
@@ -42,7 +54,7 @@ fn value(x: u32, row: u32) -> u32 {
         case THESIS: {
             return grey(x, row);
         }
-        case CENSUS: {
+        case CENSUS, CENSUS_RGB: {
             return census(x, row, 1);
         }
         case CENSUS_5X5: {

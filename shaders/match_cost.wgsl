@@ -51,11 +51,8 @@ fn compare(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
         case THESIS: {
             return (7 * min(difference(a, b), vec4(15u)) + 5) / 10;
         }
-        case CENSUS: {
-            return min(countOneBits(a ^ b), vec4(6u));
-        }
-        case CENSUS_5X5: {
-            return min(countOneBits(a ^ b), vec4(20u));
+        case CENSUS, CENSUS_5X5, CENSUS_RGB: {
+            return min(countOneBits(a ^ b), vec4(LARGEST_COST));
         }
         case GRADIENT: {
             return gradient_difference(a, b);

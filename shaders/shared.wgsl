@@ -63,6 +63,7 @@ const MRF: u32 = 2;
 const CENSUS_5X5: u32 = 3;
 const GRADIENT: u32 = 4;
 const BIRCHFIELD_TOMASI: u32 = 5;
+const CENSUS_RGB: u32 = 6;
 override PROFILE: u32 = THESIS;
 
 const LEFT: u32 = 0;

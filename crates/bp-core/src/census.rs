@@ -12,27 +12,36 @@ const HALF_LENGTH: usize = 10;
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    compare_window(image, (x, y), 1) as u8
+    compare_window(image, (x, y), 1, grey) as u8
 }
 
-/// The same with the 24 neighbours in a window of 5x5 pixels, in as many bits.
+/// The same of a colour channel, 0 for red to 2 for blue, in place of grey values.
+///
+/// # Panics
+/// Where (x, y) lies outside, or `channel` is above 2.
+#[must_use]
+pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
+    compare_window(image, (x, y), 1, |colour| colour[channel]) as u8
+}
+
+/// As [`code`], with the 24 neighbours in a window of 5x5 pixels, in as many bits.
 ///
 /// # Panics
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
-    compare_window(image, (x, y), 2)
+    compare_window(image, (x, y), 2, grey)
 }
 
-/// A bit for each neighbour at most `reach` columns and rows away.
-fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize) -> u32 {
-    let centre = image.grey(x, y);
+/// A bit for each neighbour at most `reach` columns and rows away, by a value of colours.
+fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
+    let centre = value(image.rgb(x, y));
     let last = image.size().width as isize - 1;
     let mut code = 0;
     for dy in -reach..=reach {
         let row = image.row_near(y as isize + dy);
         for dx in (-reach..=reach).filter(|&dx| (dx, dy) != (0, 0)) {
-            let neighbour = grey(row[(x as isize + dx).clamp(0, last) as usize]);
+            let neighbour = value(row[(x as isize + dx).clamp(0, last) as usize]);
             code = code << 1 | u32::from(neighbour > centre);
         }
     }
@@ -86,6 +95,13 @@ mod tests {
         assert_eq!(code(&image, 1, 1), 0b1000_1010);
         let flat = Image::from_grey(1, 1, &[5]).unwrap();
         assert_eq!(code(&flat, 0, 0), 0);
+    }
+
+    #[test]
+    fn channels_are_compared_apart() {
+        let image = Image::from_rgb(2, 1, vec![[0, 5, 9], [1, 5, 8]]).unwrap();
+        let codes = |x| [0, 1, 2].map(|channel| code_of_channel(&image, x, 0, channel));
+        assert_eq!([codes(0), codes(1)], [[0b0010_1001, 0, 0], [0, 0, 0b1001_0100]]);
     }
 
     #[test]

@@ -31,6 +31,7 @@ enum Planes {
     Census5x5([Vec<[u8; 3]>; 2]),
     Gradient([Vec<[u8; 2]>; 2]),
     BirchfieldTomasi([Vec<[u8; 3]>; 2]),
+    CensusRgb([Vec<[u8; 3]>; 2]),
 }
 
 /// The data cost of every pixel and label of a pair; allocated once, loaded with pair after pair.
@@ -55,6 +56,7 @@ impl DataCost {
             Profile::Census5x5 => Planes::Census5x5(planes(size)?),
             Profile::Gradient => Planes::Gradient(planes(size)?),
             Profile::BirchfieldTomasi => Planes::BirchfieldTomasi(planes(size)?),
+            Profile::CensusRgb => Planes::CensusRgb(planes(size)?),
         };
         Ok(Self { size, model, planes, seed: None })
     }
@@ -86,6 +88,7 @@ impl DataCost {
                 Planes::Census5x5(planes) => fill(&mut planes[side], view, features::census_5x5),
                 Planes::Gradient(planes) => fill(&mut planes[side], view, features::gradient),
                 Planes::BirchfieldTomasi(planes) => fill(&mut planes[side], view, features::half_samples),
+                Planes::CensusRgb(planes) => fill(&mut planes[side], view, features::census_rgb),
             }
         }
         Ok(())
@@ -112,9 +115,10 @@ impl DataCost {
         match &self.planes {
             Planes::Thesis(planes) | Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
             Planes::Gradient(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Mrf(planes) | Planes::Census5x5(planes) | Planes::BirchfieldTomasi(planes) => {
-                planes.iter().map(memory::bytes).sum()
-            }
+            Planes::Mrf(planes)
+            | Planes::Census5x5(planes)
+            | Planes::BirchfieldTomasi(planes)
+            | Planes::CensusRgb(planes) => planes.iter().map(memory::bytes).sum(),
         }
     }
 
@@ -127,6 +131,7 @@ impl DataCost {
             Planes::Census5x5([left, right]) => features::hamming_distance(left[l], right[r]).min(20),
             Planes::Gradient([left, right]) => features::gradient_difference(left[l], right[r]),
             Planes::BirchfieldTomasi([left, right]) => features::sampling_insensitive_difference(left[l], right[r]),
+            Planes::CensusRgb([left, right]) => features::hamming_distance(left[l], right[r]).min(18),
         }
     }
 }
@@ -164,7 +169,12 @@ mod tests {
 
     #[test]
     fn costs_outside_the_right_image_are_the_profiles() {
-        let halves = [(Profile::Census5x5, 10), (Profile::Gradient, 10), (Profile::BirchfieldTomasi, 15)];
+        let halves = [
+            (Profile::Census5x5, 10),
+            (Profile::Gradient, 10),
+            (Profile::BirchfieldTomasi, 15),
+            (Profile::CensusRgb, 9),
+        ];
         let wholes = [(Profile::Thesis, 11), (Profile::Census, 3), (Profile::Mrf, 765)];
         for (profile, expected) in wholes.into_iter().chain(halves) {
             let cost = cost(profile, &[9, 9], &[9, 9], None);
@@ -172,6 +182,14 @@ mod tests {
             assert_eq!(cost.at(1, 0, 1), 0);
         }
         assert_eq!(cost(Profile::Mrf, &[200], &[50], None).at(0, 0, 0), 450);
+    }
+
+    #[test]
+    fn census_codes_of_equal_channels_count_thrice() {
+        let views = [&[9, 9, 9, 0, 0], &[0, 9, 0, 9, 5]];
+        let [grey, rgb] = [Profile::Census, Profile::CensusRgb].map(|profile| cost(profile, views[0], views[1], None));
+        let found: Vec<_> = (0..5).map(|x| (grey.at(x, 0, 0), rgb.at(x, 0, 0))).collect();
+        assert_eq!(found, [(3, 9), (0, 0), (6, 18), (3, 9), (3, 9)]);
     }
 
     /// What strips of an image are matched by.

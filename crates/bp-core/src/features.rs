@@ -8,6 +8,11 @@ pub(crate) fn census_5x5(image: &Image, x: usize, y: usize) -> [u8; 3] {
     code
 }
 
+/// The 8 bits of the census code of each channel.
+pub(crate) fn census_rgb(image: &Image, x: usize, y: usize) -> [u8; 3] {
+    [0, 1, 2].map(|channel| census::code_of_channel(image, x, y, channel))
+}
+
 /// Grey value and horizontal gradient, half the difference of the neighbours, 128 where they are equal.
 pub(crate) fn gradient(image: &Image, x: usize, y: usize) -> [u8; 2] {
     let beside = |dx| u16::from(image.grey_near(x as isize + dx, y as isize));
@@ -32,7 +37,7 @@ pub(crate) fn sum_of_differences(left: [u8; 3], right: [u8; 3]) -> u16 {
     left.into_iter().zip(right).map(|(left, right)| difference(left, right)).sum()
 }
 
-/// Bits in which two of [`census_5x5`] differ.
+/// Bits in which two of [`census_5x5`] differ, or of [`census_rgb`].
 pub(crate) fn hamming_distance([a, b, c]: [u8; 3], [d, e, f]: [u8; 3]) -> u16 {
     (u32::from_be_bytes([0, a, b, c]) ^ u32::from_be_bytes([0, d, e, f])).count_ones() as u16
 }

@@ -30,12 +30,21 @@ pub enum Profile {
     /// distance of one image's grey value from the range of the other's around the match: from the least to the greatest
     /// of I(x) and the halves `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`; the smaller of both ways.
     BirchfieldTomasi,
+    /// `min(sum over R, G, B of the Hamming distances of 3x3 census codes, 18)`, see [`Profile::Census`].
+    CensusRgb,
 }
 
 impl Profile {
     /// All profiles.
-    pub const ALL: [Self; 6] =
-        [Self::Thesis, Self::Census, Self::Mrf, Self::Census5x5, Self::Gradient, Self::BirchfieldTomasi];
+    pub const ALL: [Self; 7] = [
+        Self::Thesis,
+        Self::Census,
+        Self::Mrf,
+        Self::Census5x5,
+        Self::Gradient,
+        Self::BirchfieldTomasi,
+        Self::CensusRgb,
+    ];
 
     /// The name used in options and records.
     #[must_use]
@@ -47,6 +56,7 @@ impl Profile {
             Self::Census5x5 => "census5x5",
             Self::Gradient => "gradient",
             Self::BirchfieldTomasi => "birchfield-tomasi",
+            Self::CensusRgb => "census-rgb",
         }
     }
 
@@ -56,7 +66,7 @@ impl Profile {
         match self {
             Self::Thesis | Self::Census => 1,
             Self::Gradient => 2,
-            Self::Mrf | Self::Census5x5 | Self::BirchfieldTomasi => 3,
+            Self::Mrf | Self::Census5x5 | Self::BirchfieldTomasi | Self::CensusRgb => 3,
         }
     }
 
@@ -69,6 +79,7 @@ impl Profile {
             Self::Mrf => 765,
             Self::Census5x5 | Self::Gradient => 20,
             Self::BirchfieldTomasi => 30,
+            Self::CensusRgb => 18,
         }
     }
 
@@ -77,7 +88,9 @@ impl Profile {
     pub fn out_of_range_cost(self) -> u16 {
         match self {
             Self::Thesis | Self::Mrf => self.max_cost(),
-            Self::Census | Self::Census5x5 | Self::Gradient | Self::BirchfieldTomasi => self.max_cost() / 2,
+            Self::Census | Self::Census5x5 | Self::Gradient | Self::BirchfieldTomasi | Self::CensusRgb => {
+                self.max_cost() / 2
+            }
         }
     }
 
@@ -90,6 +103,7 @@ impl Profile {
             Self::Census5x5 => (5, 20),
             Self::Gradient => (7, 50),
             Self::BirchfieldTomasi => (10, 60),
+            Self::CensusRgb => (4, 24),
         }
     }
 }

@@ -20,9 +20,9 @@ pub(crate) struct Features {
     right: Vec<u8>,
     /// 255 where the right image has a column, else 0: `[parity][lane]`, padded alike.
     inside: [Vec<u8>; 2],
-    /// Grey values of both images and of what lies around, see [`Image::grey_near`], `[height][width]` with [`APRON`] more
-    /// rows and columns on every side; for the profiles that look at neighbours.
-    grey: [Vec<u8>; 2],
+    /// Values of both images and of what lies around, see [`Image::grey_near`], `[height][plane][width]` with [`APRON`] more
+    /// rows and columns on every side; for the profiles that look at neighbours, see [`padded_planes`].
+    padded: [Vec<u8>; 2],
 }
 
 impl Features {
@@ -31,7 +31,7 @@ impl Features {
         let profile = model.profile();
         let lanes = layout::lanes(size);
         let rows = 2 * profile.channels() * size.height;
-        let grey = || memory::filled("grey values", grey_bytes(size, profile), 0);
+        let padded = || memory::filled("neighbours' values", padded_bytes(size, profile), 0);
         let inside = |parity: usize| {
             let nodes = (size.width + 1 - parity) / 2;
             let lane = |lane: usize| if (BLOCK..BLOCK + nodes).contains(&lane) { u8::MAX } else { 0 };
@@ -44,21 +44,21 @@ impl Features {
             left: memory::filled("images", rows * lanes, 0)?,
             right: memory::filled("images", rows * (lanes + 2 * BLOCK), 0)?,
             inside: [inside(0), inside(1)],
-            grey: [grey()?, grey()?],
+            padded: [padded()?, padded()?],
         })
     }
 
     /// Takes in another pair.
     pub(crate) fn load(&mut self, level: Level, pair: &StereoPair) {
-        let Self { profile, size, lanes, left, right, grey, .. } = self;
-        let [left_grey, right_grey] = grey;
+        let Self { profile, size, lanes, left, right, padded, .. } = self;
+        let [left_padded, right_padded] = padded;
         let right = (right.as_mut_slice(), *lanes + 2 * BLOCK, BLOCK);
-        let views = [(pair.left(), left_grey, (left.as_mut_slice(), *lanes, 0)), (pair.right(), right_grey, right)];
-        for (image, grey, (out, lanes, offset)) in views {
-            let rows = grey.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
-            rows.for_each(|(y, row)| dispatch!(level, simd => grey_row(simd, image, y, row)));
+        let views = [(pair.left(), left_padded, (left.as_mut_slice(), *lanes, 0)), (pair.right(), right_padded, right)];
+        for (image, padded, (out, lanes, offset)) in views {
+            let rows = padded.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
+            rows.for_each(|(index, row)| dispatch!(level, simd => pad_row(simd, *profile, image, index, row)));
             let rows = out.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
-            let view = View { profile: *profile, image, grey };
+            let view = View { profile: *profile, image, padded };
             rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows, (lanes, offset))));
         }
     }
@@ -81,7 +81,7 @@ impl Features {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        [&self.left, &self.right].into_iter().chain(&self.inside).chain(&self.grey).map(memory::bytes).sum()
+        [&self.left, &self.right].into_iter().chain(&self.inside).chain(&self.padded).map(memory::bytes).sum()
     }
 }
 
@@ -92,28 +92,37 @@ pub(crate) const MIN_ROWS: usize = 32;
 pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
     let (lanes, profile) = (layout::lanes(size), model.profile());
     let rows = 2 * profile.channels() * size.height;
-    (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * grey_bytes(size, profile)) as u64
+    (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * padded_bytes(size, profile)) as u64
 }
 
-fn grey_bytes(size: Size, profile: Profile) -> usize {
+fn padded_bytes(size: Size, profile: Profile) -> usize {
+    padded_planes(profile) * (size.height + 2 * APRON) * (size.width + 2 * APRON)
+}
+
+/// Planes of values whose neighbours are looked at: one of grey values, or one of each colour channel.
+fn padded_planes(profile: Profile) -> usize {
     match profile {
         Profile::Thesis | Profile::Mrf => 0,
-        Profile::Census | Profile::Census5x5 | Profile::Gradient | Profile::BirchfieldTomasi => {
-            (size.height + 2 * APRON) * (size.width + 2 * APRON)
-        }
+        Profile::Census | Profile::Census5x5 | Profile::Gradient | Profile::BirchfieldTomasi => 1,
+        Profile::CensusRgb => 3,
     }
 }
 
-/// Fills the given row of [`Features::grey`].
+/// Fills the given row of [`Features::padded`].
 #[inline(always)]
-fn grey_row<S: Simd>(simd: S, image: &Image, index: usize, row: &mut [u8]) {
+fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row: &mut [u8]) {
     let width = image.size().width;
-    let pixels = image.row_near(index as isize - APRON as isize);
+    let (y, plane) = (index / padded_planes(profile), index % padded_planes(profile));
+    let pixels = image.row_near(y as isize - APRON as isize);
     let (before, rest) = row.split_at_mut(APRON);
     let (own, after) = rest.split_at_mut(width);
+    let values = own.iter_mut().zip(pixels);
     simd.vectorize(
         #[inline(always)]
-        || own.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+        || match profile {
+            Profile::CensusRgb => values.for_each(|(out, pixel)| *out = pixel[plane]),
+            _ => values.for_each(|(out, &pixel)| *out = grey(pixel)),
+        },
     );
     before.fill(own[0]);
     after.fill(own[width - 1]);
@@ -136,8 +145,8 @@ const CENSUS_5X5: [Neighbours; 3] = [
 struct View<'a> {
     profile: Profile,
     image: &'a Image,
-    /// See [`Features::grey`].
-    grey: &'a [u8],
+    /// See [`Features::padded`].
+    padded: &'a [u8],
 }
 
 impl View<'_> {
@@ -160,29 +169,30 @@ impl View<'_> {
                         every_second(even, pixels, |pixel| pixel[channel]);
                         every_second(odd, &pixels[1..], |pixel| pixel[channel]);
                     }
-                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, (x, y), out)),
-                    Profile::Census5x5 => deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], (x, y), out)),
+                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, 0, (x, y), out)),
+                    Profile::Census5x5 => deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], 0, (x, y), out)),
                     Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, (x, y), out)),
                     Profile::BirchfieldTomasi => deal(even, odd, |x, out| self.half_samples(channel, (x, y), out)),
+                    Profile::CensusRgb => deal(even, odd, |x, out| self.census(&CENSUS, channel, (x, y), out)),
                 },
             );
         }
     }
 
-    /// Grey values around consecutive pixels from (x, y) on, so many columns and rows after the first of
-    /// [`Features::grey`] that lies [`APRON`] before.
+    /// Values of a plane around consecutive pixels from (x, y) on, so many columns and rows after the first of
+    /// [`Features::padded`] that lies [`APRON`] before.
     #[inline(always)]
-    fn near(&self, (x, y): (usize, usize), (dx, dy): (usize, usize), columns: usize) -> &[u8] {
+    fn near(&self, plane: usize, (x, y): (usize, usize), (dx, dy): (usize, usize), columns: usize) -> &[u8] {
         let row = self.image.size().width + 2 * APRON;
-        &self.grey[(y + dy) * row + x + dx..][..columns]
+        &self.padded[((y + dy) * padded_planes(self.profile) + plane) * row + x + dx..][..columns]
     }
 
-    /// A byte of the census codes of pixels from (x, y) on, see [`bp_core::census`].
+    /// A byte of the census codes of pixels from (x, y) on, see [`bp_core::census`], by the values of a plane.
     #[inline(always)]
-    fn census(&self, neighbours: &Neighbours, at: (usize, usize), codes: &mut [u8]) {
-        let middle = self.near(at, (APRON, APRON), codes.len());
+    fn census(&self, neighbours: &Neighbours, plane: usize, at: (usize, usize), codes: &mut [u8]) {
+        let middle = self.near(plane, at, (APRON, APRON), codes.len());
         for &offset in neighbours {
-            let neighbours = self.near(at, offset, codes.len());
+            let neighbours = self.near(plane, at, offset, codes.len());
             for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
                 // Older bits leave at the top: what was there before is gone after eight.
                 *code = *code << 1 | u8::from(neighbour > middle);
@@ -221,7 +231,7 @@ impl View<'_> {
     /// Grey values of the left neighbours of pixels from `at` on, of those, and of the right neighbours.
     #[inline(always)]
     fn row_near(&self, at: (usize, usize), columns: usize) -> [&[u8]; 3] {
-        [APRON - 1, APRON, APRON + 1].map(|dx| self.near(at, (dx, APRON), columns))
+        [APRON - 1, APRON, APRON + 1].map(|dx| self.near(0, at, (dx, APRON), columns))
     }
 }
 

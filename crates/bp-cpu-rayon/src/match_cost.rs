@@ -137,7 +137,7 @@ impl Row<'_> {
     fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
         // A closure, since a function that is handed over may be called where it should be inlined.
         macro_rules! compared_by {
-            ($cost:ident) => {
+            ($cost:expr) => {
                 self.strip(
                     simd,
                     plane,
@@ -150,9 +150,10 @@ impl Row<'_> {
         }
         match self.matching.plan.model().profile() {
             Profile::Census => compared_by!(hamming_distance),
-            Profile::Census5x5 => compared_by!(hamming_distance_5x5),
+            Profile::Census5x5 => compared_by!(hamming_distance_of_24::<S, 20>),
             Profile::Gradient => compared_by!(gradient_difference),
             Profile::BirchfieldTomasi => compared_by!(sampling_insensitive_difference),
+            Profile::CensusRgb => compared_by!(hamming_distance_of_24::<S, 18>),
             // The costs of mrf are wide.
             Profile::Thesis | Profile::Mrf => compared_by!(truncated_difference),
         }
@@ -250,14 +251,14 @@ fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1])
     (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
 }
 
-/// [`Profile::Census5x5`].
+/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: of 24 bits, `MOST` at most.
 #[inline(always)]
-fn hamming_distance_5x5<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
+fn hamming_distance_of_24<S: Simd, const MOST: u8>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
     let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
     // Added bit by bit first, to a sum and a carry that counts twice: that leaves two vectors of bits to count.
     let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
     let twice = carry.count_ones();
-    (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, 20))
+    (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, MOST))
 }
 
 /// [`Profile::Thesis`], from a table.

@@ -17,7 +17,7 @@ fn matching_allocates_nothing() {
     let mut matchers = Vec::new();
     for profile in Profile::ALL {
         for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
-            let model = Model::new(profile, 17).unwrap();
+            let model = Model::new(profile, 17).unwrap().with_weak_edges((profile != Profile::Mrf).then_some(10));
             let settings = algorithm.settings(pairs[0].size(), 6, 2, schedule);
             let plan = Plan::new(pairs[0].size(), model, settings).unwrap();
             matchers.push(pool.install(|| Matcher::new(device.as_ref(), plan)).unwrap());

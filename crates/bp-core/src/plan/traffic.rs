@@ -72,4 +72,19 @@ mod tests {
         );
         assert_eq!(moved(Schedule::Sweep, 1, 1), None);
     }
+
+    /// Counted by hand: a grey value is written once a node, read by the coarser grid, and read by every step.
+    #[test]
+    fn weak_edges_cost_a_byte_a_node() {
+        let size = Size { width: 4, height: 2 };
+        let settings = crate::Algorithm::Bp.settings(size, 1, 1, Schedule::Sync);
+        let plan = |weak_edges| {
+            let model = Model::new(Profile::Thesis, 3).unwrap().with_weak_edges(weak_edges);
+            Plan::new(size, model, Settings { grids: 2, steps: 3, ..settings }).unwrap()
+        };
+        let (with, without) = (plan(Some(10)), plan(None));
+        let moved = with.moved_bytes().unwrap().into_iter().zip(without.moved_bytes().unwrap());
+        assert_eq!(moved.map(|(with, without)| with - without).collect::<Vec<_>>(), [8, 8 + 2, 0, 3 * (8 + 2), 0]);
+        assert_eq!(with.bytes() - without.bytes(), 8 + 2);
+    }
 }

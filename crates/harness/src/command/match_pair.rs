@@ -20,12 +20,12 @@ use crate::{
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     plan::check_options(&args.plan)?;
-    let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truth_options =
         args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
     if args.ground_truth.is_none() && truth_options {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
+    let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let confidence = args.finish.confidence.clone();
     let outputs = Outputs { confidence, ..Outputs::of(Some(&args.output), &args.outputs) };
@@ -53,9 +53,10 @@ pub(crate) fn planned(
 ) -> Result<(Plan, Vec<String>), Failure> {
     let range = labels::range(args, size, survey, outputs);
     let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
-    outputs.check_model(making, plan.model(), size)?;
     let warnings = warnings::of(survey, &plan, files, range.is_none());
+    // Told first: exchanged images may be why the outputs cannot hold what is asked for.
     warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
+    outputs.check_model(making, plan.model(), size)?;
     Ok((plan, warnings))
 }
 
