@@ -3,7 +3,7 @@
 use std::{fs, io};
 
 use bp_core::DeviceKind;
-use bytesize::ByteSize;
+
 use sha2::{Digest, Sha256};
 use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 
@@ -41,19 +41,9 @@ pub(crate) fn kind(machine: &Machine) -> String {
     slug(&format!("{} {} cores", processor(machine), machine.cores))
 }
 
-/// Refuses what would not fit into the memory that is allowed, or that this machine has available now, before anything
-/// is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
+/// Refuses what would not fit into the memory that this machine has available now, before anything is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
 /// have, memory of its own.
-pub(crate) fn check_memory(
-    kind: DeviceKind,
-    needed: u64,
-    allowed: Option<ByteSize>,
-    advice: &str,
-) -> Result<(), Failure> {
-    if let Some(ByteSize(allowed)) = allowed.filter(|allowed| needed > allowed.as_u64()) {
-        let what = format!("{needed} bytes are needed and --max-memory allows {allowed}; {advice}");
-        return Err(Failure::out_of_memory(what));
-    }
+pub(crate) fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
     let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
     let Some(Memory { available, .. }) = memory().filter(|_| shares) else { return Ok(()) };
     if needed <= available {

@@ -10,7 +10,8 @@ use crate::{DisparityMap, Error, memory};
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
     let mut seen = memory::filled("surfaces", pixels, false)?;
-    let mut surface = Vec::new();
+    // Room for a surface of all pixels: none is pushed twice.
+    let mut surface = memory::filled("surfaces", pixels, 0)?;
     Ok(map.replaced(|values| {
         for start in 0..pixels {
             if seen[start] || !values[start].is_finite() {

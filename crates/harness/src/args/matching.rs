@@ -122,7 +122,7 @@ pub(crate) struct PlanArgs {
     pub(crate) truncation: Option<u8>,
     /// Weak edges: half slope and truncation where neighbouring grey values of the left image differ by more than N.
     /// [default: no edge is weak]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=254))]
     pub(crate) edge_threshold: Option<u8>,
 }
 

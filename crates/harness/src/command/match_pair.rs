@@ -20,6 +20,9 @@ use crate::{
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     plan::check_options(&args.plan)?;
+    if args.finish.fill.is_some() && args.finish.check.is_none() && args.finish.speckle.is_none() {
+        return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
+    }
     let truth_options =
         args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
     if args.ground_truth.is_none() && truth_options {

@@ -209,7 +209,7 @@ fn decode(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<DynamicImage, 
 
 /// Fails where a file takes more memory to read than there is.
 pub(super) fn check_room(path: &Path, needed: u64) -> Result<(), Failure> {
-    machine::check_memory(DeviceKind::Processor, needed, None, &format!("{} is too large", path.display()))?;
+    machine::check_memory(DeviceKind::Processor, needed, &format!("{} is too large", path.display()))?;
     // A decoder that gets no memory, below `ulimit -v` say, ends the program.
     if Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX)).is_err() {
         return Err(Failure::out_of_memory(format!("{}: {needed} bytes are needed to read it", path.display())));

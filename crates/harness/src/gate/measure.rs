@@ -168,7 +168,7 @@ fn prepare(runner: &Runner, planned: &Planned, problem: &Problem) -> Result<Matc
     let device = runner.opened.device.as_ref();
     let prepared = runner.run(|| {
         let needed = device.planned_bytes(&plan);
-        machine::check_memory(runner.opened.info.kind, needed, None, "a full run needs more than --quick")?;
+        machine::check_memory(runner.opened.info.kind, needed, "a full run needs more than --quick")?;
         Ok(Matcher::new(device, plan)?)
     });
     prepared.map_err(|failure: Failure| failure.of(&runner.name))

@@ -19,7 +19,7 @@ use summary::Summary;
 
 use super::{Making, pairs};
 use crate::{
-    args::{Also, FinishArgs, MatchArgs, OutputArgs},
+    args::{Also, FinishArgs, Labels, MatchArgs, OutputArgs},
     command::print_json,
     failure::Failure,
     files, interrupt,
@@ -48,7 +48,8 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
         let ran = threads::run_on(args.plan.threads, || run::run(args, &making, &due, &settings));
         ran.inspect_err(|failure| {
             if failure.is_interrupted() {
-                note("the same command goes on with the pairs that are not complete");
+                let again = if args.many.force { "the same command without --force" } else { "the same command" };
+                note(&format!("{again} goes on with the pairs that are not complete"));
             }
         })?;
     }
@@ -71,6 +72,9 @@ fn check_options(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points,confidence")));
     }
     let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
+    if args.many.warm_start.is_some() && args.plan.labels == Some(Labels::Auto) {
+        return Err(Failure::usage("--warm-start needs the same labels for all frames: give --labels a number"));
+    }
     let both_views = args.finish.check.is_some() || args.many.also.contains(&Also::Confidence);
     if args.many.warm_start.is_some() && (swept || both_views) {
         let what = "--warm-start needs messages of the frame before, which the schedule sweep does not keep";

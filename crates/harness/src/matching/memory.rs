@@ -31,6 +31,9 @@ const RIGHT: u64 = 6;
 const FINISHING: u64 = 8;
 const CONFIDENCE: u64 = 20;
 
+/// Bytes a pixel of what finding surfaces takes.
+const SPECKLE: u64 = 9;
+
 /// How a plan is tiled, and what it takes.
 pub(crate) struct Fitted {
     /// The tiles.
@@ -88,6 +91,7 @@ impl Beside {
         let finish = &args.finish;
         let right = if finish.needs_right() { RIGHT } else { 0 };
         let finishing = if finish.confidence.is_some() { CONFIDENCE } else { FINISHING };
+        let finishing = finishing.max(if finish.speckle.is_some() { SPECKLE } else { 0 });
         Self {
             held: PROGRAM + a_pixel(PAIR + truth + right),
             finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),

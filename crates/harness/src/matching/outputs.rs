@@ -1,6 +1,10 @@
 //! The files that are made of a map.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 use bp_core::{Calibration, DisparityMap, Image, Model, Size, depth_map, points};
 
@@ -160,7 +164,11 @@ fn write_map(
     content: &Content<'_>,
     calibration: Option<&Calibration>,
 ) -> Result<(), Failure> {
-    raster.write(path)?;
+    // What is told of the map before it must not stand beside the new one, even where this ends in between.
+    match fs::remove_file(sidecar_of(path)) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(Failure::writing(&sidecar_of(path), &error)),
+        _ => raster.write(path)?,
+    }
     let origin = Origin { plan: content.plan, calibration, inputs: content.inputs };
     if making.sidecar { write_sidecar(path, raster, &origin) } else { Ok(()) }
 }

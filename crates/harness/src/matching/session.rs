@@ -118,14 +118,16 @@ fn take_samples(
         tiled.free_tiles();
         Ok::<_, Failure>((times, tiled.disparities()))
     };
-    let mut last = finished(&args.finish, pair, &mut solve)?;
-    let mut samples = vec![last.sample];
-    for _ in 1..args.repeat {
-        last = finished(&args.finish, pair, &mut solve)?;
-        samples.push(last.sample);
+    let mut samples = Vec::new();
+    // Only one answer is in memory at a time.
+    loop {
+        let answer = finished(&args.finish, pair, &mut solve)?;
+        samples.push(answer.sample);
+        if samples.len() >= args.repeat as usize {
+            bar.finish();
+            return Ok((samples, answer));
+        }
     }
-    bar.finish();
-    Ok((samples, last))
 }
 
 fn hash_messages(tiled: &mut Tiled) -> Result<String, Failure> {

@@ -180,7 +180,7 @@ fn solve(
 ) -> Result<Solved, Failure> {
     device.recover()?;
     let plan = planned.plan(scene.pair.size(), run.labels, run.k)?;
-    machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), None, "--quick needs less")?;
+    machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), "--quick needs less")?;
     let start = Instant::now();
     let mut matcher = Matcher::new(device.device.as_ref(), plan)?;
     let prepare_ms = 1000.0 * start.elapsed().as_secs_f64();

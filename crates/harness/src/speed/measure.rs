@@ -128,7 +128,7 @@ impl Turns<'_> {
         self.work.bar.message(format!("{} {}", self.name, opened.name));
         opened.recover()?;
         let planned = opened.device.planned_bytes(&self.plan);
-        machine::check_memory(opened.info.kind, planned, None, "--quick needs less")?;
+        machine::check_memory(opened.info.kind, planned, "--quick needs less")?;
         let start = Instant::now();
         let mut matcher = Matcher::new(opened.device.as_ref(), self.plan.clone())?;
         let prepare_ms = milliseconds(start.elapsed());

@@ -4,6 +4,7 @@ use std::{
     collections::{BTreeSet, HashMap, HashSet},
     ffi::OsString,
     fs,
+    io::ErrorKind,
     path::{Display, Path, PathBuf},
     time::{Duration, SystemTime},
 };
@@ -143,7 +144,13 @@ pub(super) fn clear_leftovers(args: &MatchArgs, jobs: &[Job], shard: Shard) -> R
             };
             let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
             if is(&own) || (is(".bp-") && is_old()) {
-                fs::remove_file(entry.path()).map_err(|error| Failure::writing(&entry.path(), &error))?;
+                // Another shard, started together with this one, may have been faster.
+                match fs::remove_file(entry.path()) {
+                    Err(error) if error.kind() != ErrorKind::NotFound => {
+                        return Err(Failure::writing(&entry.path(), &error));
+                    }
+                    _ => {}
+                }
             }
         }
     }
