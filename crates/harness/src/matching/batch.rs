@@ -72,6 +72,10 @@ fn check_options(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points,confidence")));
     }
     let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
+    // Clap does not ask for --video where --pairs stands in its place.
+    if args.many.warm_start.is_some() && args.many.pairs.is_some() {
+        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
+    }
     if args.many.warm_start.is_some() && args.plan.labels == Some(Labels::Auto) {
         return Err(Failure::usage("--warm-start needs the same labels for all frames: give --labels a number"));
     }
