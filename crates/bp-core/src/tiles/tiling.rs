@@ -201,9 +201,11 @@ impl Tiling {
     pub fn likeness(&self) -> Likeness {
         let swept = self.plan.settings().schedule == Schedule::Sweep;
         let unit = exact_rows(&self.plan);
+        // A known match fixes costs on both sides of its cut, of which one may be another strip's.
+        let seeded = self.plan.settings().cut.is_some_and(|cut| cut.seed_start);
         match self.rows.iter().all(|rows| rows.all.start.is_multiple_of(unit)) {
             _ if self.is_whole() => Likeness::Same,
-            true if swept && self.columns.len() == 1 => Likeness::Same,
+            true if swept && self.columns.len() == 1 && !seeded => Likeness::Same,
             false if swept => Likeness::Rough,
             _ => Likeness::Near,
         }
