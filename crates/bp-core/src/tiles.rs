@@ -1,10 +1,12 @@
 //! Pairs of any size in limited memory: matched tile by tile, one tile at a time.
 
+mod tile;
 mod tiling;
 
 use std::{ops::ControlFlow, time::Instant};
 
-pub use tiling::{HALO, Likeness, Needed, Span, Tile, Tiling};
+pub use tile::{Span, Tile};
+pub use tiling::{HALO, Likeness, Needed, Tiling};
 
 use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 

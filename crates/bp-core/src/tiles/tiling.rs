@@ -1,8 +1,7 @@
 //! Which tiles a plan is cut into, known before anything runs.
 
-use std::ops::Range;
-
-use crate::{BAND_ROWS, Cut, Error, Plan, Schedule, Settings, Size, StereoPair, image::APRON};
+use super::tile::{Span, Tile, distinct, spans};
+use crate::{BAND_ROWS, Error, Plan, Schedule, Size};
 
 /// Tiles begin at multiples of so many columns and rows, so that nodes of up to five grids have the same children and the
 /// same colour as in the whole image.
@@ -11,71 +10,12 @@ const ALIGN: usize = 32;
 /// Columns, and rows where those beyond are wanted too, that a tile is matched with on either side of what is kept of it.
 pub const HALO: usize = 96;
 
-/// Of the columns or rows of an image: those that a tile matches, and those of them whose answer is kept.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Span {
-    /// All that are matched.
-    pub all: Range<usize>,
-    /// What is kept. The spans of an image share all its columns, or rows, among them.
-    pub kept: Range<usize>,
-}
-
-/// A part of an image that is matched by itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Tile {
-    /// Its columns.
-    pub columns: Span,
-    /// Its rows.
-    pub rows: Span,
-}
-
-impl Tile {
-    /// Pixels that are matched.
-    #[must_use]
-    pub fn size(&self) -> Size {
-        Size { width: self.columns.all.len(), height: self.rows.all.len() }
-    }
-
-    /// The plan of the tile: the whole image's, with the cut where the tile meets it.
-    ///
-    /// # Errors
-    /// None for a tile of that plan's [`Tiling`].
-    pub fn plan(&self, whole: &Plan) -> Result<Plan, Error> {
-        let cut = whole.settings().cut.and_then(|cut| self.cut(cut));
-        Plan::new(self.size(), *whole.model(), Settings { cut, ..*whole.settings() })
-    }
-
-    fn cut(&self, Cut { x, y, seed_start }: Cut) -> Option<Cut> {
-        let inside = |span: &Span, at: usize| span.all.contains(&at).then(|| at - span.all.start);
-        let (x, y) = (inside(&self.columns, x), inside(&self.rows, y));
-        let seed_start = seed_start && x.is_some() && y.is_some();
-        (x.is_some() || y.is_some()).then(|| Cut { x: x.unwrap_or(0), y: y.unwrap_or(0), seed_start })
-    }
-
-    /// A copy of the tile's part of a pair.
-    ///
-    /// # Panics
-    /// Where the tile lies outside.
-    #[must_use]
-    pub fn pair(&self, pair: &StereoPair) -> StereoPair {
-        let strip = pair.strip(self.rows.all.clone());
-        if self.columns.all.len() == pair.size().width { strip } else { strip.columns(self.columns.all.clone()) }
-    }
-
-    /// Bytes of such copies, of the tile and of the rows that it is cut from.
-    fn pair_bytes(&self, image: Size) -> u64 {
-        let width = self.columns.all.len();
-        let columns = if width == image.width { width } else { width + image.width };
-        2 * 3 * (columns * (self.rows.all.len() + 2 * APRON)) as u64
-    }
-}
-
 /// How near the answer of tiles is to the whole image's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
     /// The same to the bit: there is one tile, or strips under [`Schedule::Sweep`] that begin at multiples of as many rows
     /// as a band of the coarsest grid covers. On every grid bands depend on those that cover them on coarser ones, and on
-    /// no others.
+    /// no others. Not so with a known match, which fixes costs on both sides of a cut that may be a seam.
     Same,
     /// Only what lies farther off than the halo was not heard of.
     Near,
@@ -201,7 +141,6 @@ impl Tiling {
     pub fn likeness(&self) -> Likeness {
         let swept = self.plan.settings().schedule == Schedule::Sweep;
         let unit = exact_rows(&self.plan);
-        // A known match fixes costs on both sides of its cut, of which one may be another strip's.
         let seeded = self.plan.settings().cut.is_some_and(|cut| cut.seed_start);
         match self.rows.iter().all(|rows| rows.all.start.is_multiple_of(unit)) {
             _ if self.is_whole() => Likeness::Same,
@@ -247,22 +186,6 @@ impl Tiling {
 
 /// Tells how many bytes a device needs for a plan, or why it cannot run it.
 pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
-
-/// The parts of `len` columns or rows of which so many are kept each, with so many more before and after where there are
-/// any.
-fn spans(len: usize, kept: usize, (before, after): (usize, usize)) -> Vec<Span> {
-    let span = |start: usize| {
-        let end = (start + kept).min(len);
-        Span { all: start.saturating_sub(before)..(end + after).min(len), kept: start..end }
-    };
-    (0..len).step_by(kept).map(span).collect()
-}
-
-/// One span of each length.
-fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {
-    let first = |index: usize| spans.iter().position(|span| span.all.len() == spans[index].all.len()) == Some(index);
-    spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)
-}
 
 /// Rows that a band of the coarsest grid covers.
 fn exact_rows(plan: &Plan) -> usize {
@@ -315,7 +238,7 @@ fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Model, Profile};
+    use crate::{Algorithm, Cut, Model, Profile, Settings};
 
     fn plan((width, height): (usize, usize), labels: usize, algorithm: Algorithm) -> Plan {
         let size = Size { width, height };
@@ -418,5 +341,16 @@ mod tests {
         assert!(cuts.contains(&(64, 64, cut(36, 0, false))));
         assert!(cuts.contains(&(0, 0, cut(0, 50, false))));
         assert!(cuts.contains(&(0, 64, None)));
+    }
+    #[test]
+    fn a_known_match_on_a_seam_is_not_promised_to_be_the_whole_images() {
+        let size = Size { width: 3, height: 192 };
+        let seeded = |seed_start| {
+            let cut = Some(Cut { x: 1, y: 96, seed_start });
+            let settings = Settings { grids: 1, cut, ..Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep) };
+            let plan = Plan::new(size, Model::new(Profile::Census, 4).unwrap(), settings).unwrap();
+            Tiling::cut(plan, Size { width: 3, height: 32 }, 0).likeness()
+        };
+        assert_eq!([true, false].map(seeded), [Likeness::Near, Likeness::Same]);
     }
 }

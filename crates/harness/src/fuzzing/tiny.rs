@@ -12,8 +12,8 @@ use bp_core::{
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 
-/// Most data costs of a pair, so that thousands are matched in a second.
-const VOLUME: usize = 12_000;
+/// Most data costs of a pair, so that hundreds are matched in a second though every comparison is watched.
+const VOLUME: usize = 4096;
 
 /// Size of [`map`].
 pub(super) const MAP: Size = Size { width: 6, height: 1 };
