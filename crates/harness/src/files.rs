@@ -15,7 +15,7 @@ mod tiff;
 use std::{
     fs,
     io::{BufWriter, Write},
-    path::Path,
+    path::{Path, PathBuf},
     sync::OnceLock,
 };
 
@@ -97,11 +97,15 @@ fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
 
 /// Fails where writing `output` would overwrite `other`.
 pub(crate) fn check_distinct(other: &Path, output: &Path) -> Result<(), Failure> {
-    let meant = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
-    if meant(other) != meant(output) {
+    if resolved(other) != resolved(output) {
         return Ok(());
     }
     Err(Failure::usage(format!("{}: the same file is named twice and would be overwritten", output.display())))
+}
+
+/// The path of a file without links and steps up, as far as there is one; by it, two names of a file are known as such.
+pub(crate) fn resolved(path: &Path) -> PathBuf {
+    path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned())
 }
 
 /// Writes text as [`write_whole`] does.

@@ -41,15 +41,22 @@ pub(crate) fn kind(machine: &Machine) -> String {
     slug(&format!("{} {} cores", processor(machine), machine.cores))
 }
 
-/// Refuses what would not fit into the memory that this machine has available now, before anything is allocated. Where the system does not tell how much that is, allocating will; so it will where a device has, or may
-/// have, memory of its own.
+/// Refuses what would not fit into [`available_memory`], before anything is allocated. Where that is not known,
+/// allocating will.
 pub(crate) fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
-    let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
-    let Some(Memory { available, .. }) = memory().filter(|_| shares) else { return Ok(()) };
-    if needed <= available {
-        return Ok(());
+    match available_memory(kind) {
+        Some(available) if needed > available => {
+            Err(Failure::out_of_memory(format!("{needed} bytes are needed and {available} available; {advice}")))
+        }
+        _ => Ok(()),
     }
-    Err(Failure::out_of_memory(format!("{needed} bytes are needed and {available} available; {advice}")))
+}
+
+/// Bytes of this machine's memory that a device of a kind can have now; `None` where the system does not tell, or the
+/// device has, or may have, memory of its own.
+pub(crate) fn available_memory(kind: DeviceKind) -> Option<u64> {
+    let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
+    memory().filter(|_| shares).map(|memory| memory.available)
 }
 
 /// Main memory in bytes.

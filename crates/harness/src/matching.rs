@@ -17,5 +17,5 @@ pub(crate) use finishing::Sample;
 pub(crate) use outputs::{Content, Making, Outputs};
 #[cfg(feature = "fuzzing")]
 pub(crate) use pairs::parse as listed_pairs;
-pub(crate) use report::{Report, text};
+pub(crate) use report::{Report, Tiles, text};
 pub(crate) use session::{Answer, Session};

@@ -71,6 +71,11 @@ impl Also {
 }
 
 impl ManyArgs {
+    /// Whether there may be more than one pair.
+    pub(crate) fn is_given(&self) -> bool {
+        self.pairs.is_some() || self.video.is_some()
+    }
+
     /// How many pairs in turn depend on the first of them: they are done together or not at all.
     pub(crate) fn chain(&self) -> usize {
         self.warm_start.unwrap_or(1) as usize

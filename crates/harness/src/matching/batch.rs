@@ -39,7 +39,7 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     interrupt::listen()?;
     files::name_temporary(&format!(".bp-{}-", shard.file_part()));
     job::clear_leftovers(args, &jobs, shard)?;
-    let settings = record::settings_sha256(args);
+    let settings = record::settings_sha256(args, &making);
     let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
@@ -64,23 +64,37 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     summary.outcome(&told)
 }
 
-/// Refuses options that are for one pair, and warm starts from messages that are not there.
+/// Refuses options that are for one pair, and folders that no record can name.
 fn check_options(args: &MatchArgs) -> Result<(), Failure> {
     let OutputArgs { picture, depth, points, .. } = &args.outputs;
     if [picture, depth, points, &args.finish.confidence].into_iter().any(Option::is_some) {
         let what = "--picture, --depth, --points and --confidence name one file";
         return Err(Failure::usage(format!("{what}: of many pairs take --also picture,depth,points,confidence")));
     }
+    for folder in [Some(&args.output), args.many.pairs.as_ref()].into_iter().flatten() {
+        if std::path::absolute(folder).is_ok_and(|folder| folder.to_str().is_none()) {
+            let what = "is no name in UTF-8, as the records of many pairs hold it";
+            return Err(Failure::usage(format!("{} {what}; rename it", folder.display())));
+        }
+    }
+    check_warm_start(args)
+}
+
+/// Refuses warm starts where there are no messages to start from.
+fn check_warm_start(args: &MatchArgs) -> Result<(), Failure> {
+    if args.many.warm_start.is_none() {
+        return Ok(());
+    }
     let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
     // Clap does not ask for --video where --pairs stands in its place.
-    if args.many.warm_start.is_some() && args.many.pairs.is_some() {
+    if args.many.pairs.is_some() {
         return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
     }
-    if args.many.warm_start.is_some() && args.plan.labels == Some(Labels::Auto) {
+    if args.plan.labels == Some(Labels::Auto) {
         return Err(Failure::usage("--warm-start needs the same labels for all frames: give --labels a number"));
     }
     let both_views = args.finish.check.is_some() || args.many.also.contains(&Also::Confidence);
-    if args.many.warm_start.is_some() && (swept || both_views) {
+    if swept || both_views {
         let what = "--warm-start needs messages of the frame before, which the schedule sweep does not keep";
         let advice = "take --algorithm cfbp --half-steps 10, say, and neither --check nor --also confidence";
         return Err(Failure::usage(format!("{what}, and matching both views overwrites: {advice}")));

@@ -1,6 +1,6 @@
 //! What a match takes of memory, known before it begins, and how its plan is tiled to keep within.
 
-use bp_core::{DeviceKind, Error, Plan, Schedule, Size, Tiling};
+use bp_core::{Error, Plan, Schedule, Size, Tiling};
 
 use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, note};
 
@@ -19,6 +19,12 @@ const WRITING: u64 = 8;
 
 /// Bytes a pixel of labels, which are there until the map is to be written.
 const LABELS: u64 = 2;
+
+/// Bytes a pixel of a pair that is read while another is matched: one image, the other one decoded and copied, its file.
+const READING: u64 = 12;
+
+/// Bytes a pixel of a confidence.
+const TRUST: u64 = 4;
 
 /// Bytes a pixel of depths.
 const DEPTH: u64 = 4;
@@ -92,8 +98,11 @@ impl Beside {
         let right = if finish.needs_right() { RIGHT } else { 0 };
         let finishing = if finish.confidence.is_some() { CONFIDENCE } else { FINISHING };
         let finishing = finishing.max(if finish.speckle.is_some() { SPECKLE } else { 0 });
+        // Of many pairs, the next one is read and the last one is written meanwhile; they count as this one's size.
+        let trust = if finish.confidence.is_some() { TRUST } else { 0 };
+        let others = if args.many.is_given() { READING + PAIR + MAP + trust + depth + WRITING } else { 0 };
         Self {
-            held: PROGRAM + a_pixel(PAIR + truth + right),
+            held: PROGRAM + a_pixel(PAIR + truth + right + others),
             finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),
         }
     }
@@ -120,12 +129,7 @@ struct Limit {
 impl Limit {
     /// The lower one of `--max-memory` and, unless the device has memory of its own, of what is held and what is free.
     fn of(args: &MatchArgs, opened: &Opened, held: u64) -> Self {
-        let shares = matches!(
-            opened.info.kind,
-            DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser
-        );
-        let there_is =
-            machine::memory().filter(|_| shares).map_or(u64::MAX, |memory| memory.available.saturating_add(held));
+        let there_is = machine::available_memory(opened.info.kind).map_or(u64::MAX, |free| free.saturating_add(held));
         match args.max_memory.map(|allowed| allowed.as_u64()).filter(|&allowed| allowed <= there_is) {
             Some(bytes) => Self { bytes, reason: format!("--max-memory allows {bytes}") },
             None => Self { bytes: there_is, reason: format!("there are {there_is}") },

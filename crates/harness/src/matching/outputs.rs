@@ -71,6 +71,13 @@ impl Making {
         Ok(Self { picture, sidecar: !args.no_sidecar, geometry: read.or(given) })
     }
 
+    /// The same, wherever a calibration was read from.
+    pub(crate) fn unnamed(&self) -> Self {
+        let unnamed = |(_, size)| (PathBuf::new(), size);
+        let geometry = self.geometry.clone().map(|read| Geometry { file: read.file.map(unnamed), ..read });
+        Self { geometry, ..self.clone() }
+    }
+
     /// The geometry of images of some size, where an option gives one.
     fn calibration(&self, size: Size) -> Result<Option<Calibration>, Failure> {
         self.geometry.as_ref().map(|geometry| geometry.of(size)).transpose()

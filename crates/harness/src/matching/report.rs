@@ -3,7 +3,7 @@
 use std::{fmt::Write as _, path::PathBuf, time::Duration};
 
 use bp_core::{Errors, Stage, StereoPair, Tiling};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Answer, Sample};
 use crate::{
@@ -42,7 +42,7 @@ pub(crate) struct Report {
 }
 
 /// What a pair was cut into.
-#[derive(Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Tiles {
     /// Beside each other.
     columns: usize,
@@ -52,14 +52,14 @@ pub(crate) struct Tiles {
     width: usize,
     height: usize,
     /// How near the answer is to the whole image's.
-    answer: &'static str,
+    answer: String,
 }
 
 impl Tiles {
     /// What is told of a tiling.
     pub(crate) fn of(tiling: &Tiling) -> Option<Self> {
         let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
-        let answer = tiling.likeness().name();
+        let answer = tiling.likeness().name().to_owned();
         (!tiling.is_whole()).then_some(Self { columns, rows, width: size.width, height: size.height, answer })
     }
 }

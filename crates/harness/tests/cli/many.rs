@@ -54,11 +54,11 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     let folder = Folder::new();
     place(
         &folder,
-        &["in/a/view1.png", "in/a/view5.png", "in/b/im0.png", "in/b/im1.png", "in/c/imL.png", "in/c/imR.png"],
+        &["in/a/view1.png", "in/a/view5.png", "in/b/im0.png", "in/b/IM1.PNG", "in/c/imL.png", "in/c/imR.png"],
     );
     place(
         &folder,
-        &["in/d/im2.png", "in/d/im6.png", "in/d/im0.png", "in/d/im1.png", "in/e/left.png", "in/e/right.png"],
+        &["in/d/im2.png", "in/d/im6.png", "in/d/im0.png", "in/d/im1.png", "in/e/Left.PNG", "in/e/right.png"],
     );
     place(&folder, &["in/k/image_2/f2.png", "in/k/image_3/f2.png", "in/k/image_2/f10.png", "in/k/image_3/f10.png"]);
     place(&folder, &["in/k/image_0/f2.png", "in/k/image_1/f2.png", "in/k/image_2/f3.png"]);
@@ -66,7 +66,7 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     let output = folder.run(&format!("match --pairs in --output in/out {TINY}"));
     assert!(output.status.success(), "{}", text(&output.stderr));
     let expected =
-        ["a/view1", "b/im0", "c/imL", "d/im2", "e/left", "k/image_0/f2", "k/image_2/f10", "k/image_2/f2", "v/left/1"];
+        ["a/view1", "b/im0", "c/imL", "d/im2", "e/Left", "k/image_0/f2", "k/image_2/f10", "k/image_2/f2", "v/left/1"];
     assert_eq!(names(&folder.path("in/out")), expected);
     let told = text(&output.stderr);
     for words in ["image_2/f3.png", "l/view5.png has no view1.png", "m/left has no folder right"] {
@@ -81,6 +81,25 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     assert_eq!(fs::read(folder.path("alone.pfm")).unwrap(), fs::read(folder.path("in/out/d/im2.pfm")).unwrap());
     fs::create_dir(folder.path("empty")).unwrap();
     folder.fails("match --pairs empty --output out", 3, &["empty", "no pair"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_no_record_can_hold_are_passed_over() {
+    use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+    let folder = Folder::new();
+    place(&folder, &["in/a/left.png", "in/a/right.png", "in/b/left.png", "in/b/right.png"]);
+    let odd = folder.path("in").join(OsStr::from_bytes(b"\xff"));
+    if fs::rename(folder.path("in/b"), &odd).is_err() {
+        return; // Some file systems hold no such names.
+    }
+    let output = folder.run(&format!("match --pairs in --output out {TINY}"));
+    let told = text(&output.stderr);
+    assert!(output.status.success() && told.contains("no name in UTF-8"), "{told}");
+    assert_eq!(names(&folder.path("out")), ["a/left"]);
+    let mut inside = folder.command(&format!("match --pairs {} --output out {TINY}", folder.path("in").display()));
+    let output = inside.current_dir(&odd).output().unwrap();
+    assert!(output.status.code() == Some(2) && text(&output.stderr).contains("rename it"), "{}", text(&output.stderr));
 }
 
 #[test]
@@ -164,6 +183,16 @@ fn only_what_changed_is_done_again() {
     assert_eq!((done(""), done("")), (2, 0));
     fs::write(folder.path("out/records/left/2.json"), "{").unwrap();
     assert_eq!((done(""), done("--slope 3"), done("--slope 3"), done("--slope 3 --also picture")), (1, 3, 0, 3));
+    // The contents of a calibration count, not its name.
+    let calibration = |focal: u32| {
+        let cam = format!("cam0=[{focal} 0 10; 0 {focal} 9; 0 0 1]\ncam1=[{focal} 0 10; 0 {focal} 9; 0 0 1]\n");
+        fs::write(folder.path("calib.txt"), cam + "doffs=0\nbaseline=60\n").unwrap();
+    };
+    let with = |file: &str| done(&format!("--slope 3 --also picture,depth --calib {file}"));
+    calibration(100);
+    assert_eq!((with("calib.txt"), with("./calib.txt")), (3, 0));
+    calibration(101);
+    assert_eq!((with("calib.txt"), done("--slope 3 --also picture")), (3, 3));
     fs::rename(folder.path("out"), folder.path("moved")).unwrap();
     fs::rename(folder.path("moved"), folder.path("out")).unwrap();
     assert_eq!(done("--slope 3 --also picture"), 0);

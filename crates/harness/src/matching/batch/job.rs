@@ -13,7 +13,7 @@ use super::{Shard, record::PairRecord, summary};
 use crate::{
     args::{Also, MatchArgs},
     failure::Failure,
-    files::{MapFormat, create_folder},
+    files::{MapFormat, create_folder, resolved},
     matching::{Making, Outputs, pairs::Pair},
 };
 
@@ -64,15 +64,20 @@ impl Job {
         Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
     }
 
+    /// The two images.
+    pub(super) fn images(&self) -> [&Path; 2] {
+        [&self.pair.left, &self.pair.right]
+    }
+
     /// The files that the outputs are made of, the images first.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        [&self.pair.left, &self.pair.right].into_iter().chain(&self.calibration).map(PathBuf::as_path).collect()
+        self.images().into_iter().chain(self.calibration.as_deref()).collect()
     }
 
     /// Whether nothing is to be done.
     pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
         let record = PairRecord::read(&self.record);
-        record.is_some_and(|record| record.is_current(settings_sha256, &self.inputs(), &self.paths))
+        record.is_some_and(|record| record.is_current(settings_sha256, &self.images(), &self.paths))
     }
 
     /// Fails where an output cannot be written.
@@ -93,10 +98,9 @@ impl Job {
 
 /// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.
 fn check_apart(args: &MatchArgs, jobs: &[Job]) -> Result<(), Failure> {
-    let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned());
-    let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(whole).collect();
+    let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(resolved).collect();
     let files = || jobs.iter().flat_map(|job| job.files().map(move |path| (job.pair.left.display(), path)));
-    if let Some((_, path)) = files().find(|(_, path)| inputs.contains(&whole(path))) {
+    if let Some((_, path)) = files().find(|(_, path)| inputs.contains(&resolved(path))) {
         let what = format!("{} would be overwritten, which is read", path.display());
         return Err(Failure::usage(format!("{what}; choose another --output")));
     }

@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    args::{ManyArgs, MatchArgs, PlanArgs},
+    args::{MakingArgs, ManyArgs, MatchArgs, OutputArgs, PlanArgs},
     failure::Failure,
     files::{hex, write_text},
+    matching::{Making, Tiles},
     record,
 };
 
@@ -46,6 +47,8 @@ pub(super) struct Done {
     pub(super) backend: String,
     pub(super) device: record::Device,
     pub(super) settings: record::Settings,
+    /// None where the pair was matched as a whole.
+    pub(super) tiles: Option<Tiles>,
     pub(super) energy: record::Energy,
     pub(super) warnings: Vec<String>,
     pub(super) times: PairTimes,
@@ -72,7 +75,7 @@ pub(super) struct PairRecord {
     pub(super) right: PathBuf,
     /// Of all settings that outputs depend on; see [`settings_sha256`].
     pub(super) settings_sha256: String,
-    /// The images and the calibration, where they could be read.
+    /// The images, where they could be read.
     pub(super) inputs: Vec<FileState>,
     /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
     pub(super) elapsed_ms: f64,
@@ -100,7 +103,7 @@ impl PairRecord {
     }
 
     /// Whether its outputs are still what these inputs and settings give.
-    pub(super) fn is_current(&self, settings_sha256: &str, inputs: &[&Path], outputs: &[PathBuf]) -> bool {
+    pub(super) fn is_current(&self, settings_sha256: &str, inputs: &[&Path; 2], outputs: &[PathBuf]) -> bool {
         fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
             then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
         }
@@ -144,18 +147,20 @@ impl FileState {
 }
 
 /// SHA-256 of the program's version and of all options but those that change no output: where files lie, which device
-/// computes, and what is told.
-pub(super) fn settings_sha256(args: &MatchArgs) -> String {
+/// computes, and what is told. Of a calibration it has what was read: the file may be another by now.
+pub(super) fn settings_sha256(args: &MatchArgs, making: &Making) -> String {
     let ManyArgs { format, also, warm_start, .. } = args.many.clone();
+    let unnamed = MakingArgs { calib: None, ..args.outputs.making.clone() };
     let of_output = MatchArgs {
         left: None,
         right: None,
         output: PathBuf::new(),
         json: false,
         max_megapixels: 0,
+        outputs: OutputArgs { making: unnamed, ..args.outputs.clone() },
         many: ManyArgs { format, also, warm_start, ..ManyArgs::default() },
         plan: PlanArgs { backend: String::new(), device: None, threads: None, ..args.plan.clone() },
         ..args.clone()
     };
-    hex(&Sha256::digest(format!("{} {of_output:?}", env!("CARGO_PKG_VERSION"))))
+    hex(&Sha256::digest(format!("{} {of_output:?} {:?}", env!("CARGO_PKG_VERSION"), making.unnamed())))
 }

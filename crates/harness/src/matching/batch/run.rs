@@ -68,7 +68,7 @@ fn read_all<'a>(jobs: &[&'a Job], limit: PixelLimit, to: &SyncSender<Read<'a>>) 
     for &job in jobs {
         let start = Instant::now();
         // Before they are read: whatever is written to them after this is noticed.
-        let inputs: io::Result<Vec<FileState>> = job.inputs().into_iter().map(FileState::of).collect();
+        let inputs: io::Result<Vec<FileState>> = job.images().into_iter().map(FileState::of).collect();
         let pair = read_pair(&job.pair.left, &job.pair.right, limit).and_then(|pair| {
             let survey = Survey::of(&pair)?;
             Ok((pair, survey))
@@ -94,16 +94,15 @@ fn solve_all<'a>(
         session.starts_warm = last_chain == Some(job.chain);
         let done = pair.and_then(|read| match_one(args, making, &mut session, job, read, read_ms));
         last_chain = if done.is_ok() { Some(job.chain) } else { last_chain };
-        if let Err(failure) = &done {
-            if failure.is_interrupted() {
-                break;
-            }
-            if failure.is_device_lost() {
-                session = Session::open(args)?;
-            }
+        if done.as_ref().is_err_and(Failure::is_interrupted) {
+            break;
         }
+        let is_lost = done.as_ref().is_err_and(Failure::is_device_lost);
         if to.send(Matched { job, inputs, done }).is_err() {
             break;
+        }
+        if is_lost {
+            session = Session::open(args)?;
         }
     }
     interrupt::check()
@@ -118,8 +117,7 @@ fn match_one(
     read_ms: f64,
 ) -> Result<(Done, Answer, StereoPair), Failure> {
     let start = Instant::now();
-    let files = [job.pair.left.as_path(), &job.pair.right];
-    let (plan, warnings) = planned(&args.plan, files, pair.size(), &survey, (&job.outputs, making))?;
+    let (plan, warnings) = planned(&args.plan, job.images(), pair.size(), &survey, (&job.outputs, making))?;
     let answer = session.solve(&pair, plan)?;
     let times = PairTimes { read_ms, match_ms: milliseconds_since(start), ..PairTimes::default() };
     Ok((done(session, &pair, &answer, warnings, times), answer, pair))
@@ -135,6 +133,7 @@ fn done(session: &Session<'_>, pair: &StereoPair, answer: &Answer, warnings: Vec
         backend: session.opened().name.clone(),
         device: record::Device::from(&session.opened().info),
         settings: answer.settings.clone(),
+        tiles: answer.tiles.clone(),
         energy: answer.energy.into(),
         warnings,
         times: PairTimes { solve_ms, ..times },

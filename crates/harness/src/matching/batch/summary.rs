@@ -12,7 +12,7 @@ use super::{
     job::Job,
     record::{Done, Outcome, PairRecord, PairTimes},
 };
-use crate::{args::MatchArgs, failure::Failure, files::write_text, record};
+use crate::{args::MatchArgs, failure::Failure, files::write_text, matching::Tiles, record};
 
 /// What `--json` prints and summary.json holds.
 #[derive(Serialize)]
@@ -26,6 +26,8 @@ pub(super) struct Summary {
     failures: Vec<Failed>,
     /// Of every size of images, in the order in which they first came.
     settings: Vec<record::Settings>,
+    /// Those of pairs that were not matched as a whole.
+    tiles: Vec<Tiles>,
     devices: Vec<record::Device>,
     /// Sums over all pairs.
     times: PairTimes,
@@ -58,7 +60,8 @@ impl Summary {
         let read = |job: &Job| PairRecord::read(&job.record).ok_or_else(|| missing(job));
         let records = jobs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let done: Vec<&Done> = records.iter().filter_map(PairRecord::done).collect();
-        let sum = |time: fn(&PairTimes) -> f64| done.iter().map(|done| time(&done.times)).sum::<f64>();
+        // From 0: the sum of no numbers is -0, and is written so.
+        let sum = |time: fn(&PairTimes) -> f64| done.iter().fold(0.0, |sum, done| sum + time(&done.times));
         let times = PairTimes {
             read_ms: sum(|times| times.read_ms),
             solve_ms: sum(|times| times.solve_ms),
@@ -74,6 +77,7 @@ impl Summary {
             skipped,
             failures: records.iter().filter_map(Failed::of).collect(),
             settings: distinct(done.iter().map(|done| &done.settings)),
+            tiles: distinct(done.iter().filter_map(|done| done.tiles.as_ref())),
             devices: distinct(done.iter().map(|done| &done.device)),
             times,
             total_ms,

@@ -1,7 +1,8 @@
 //! Pairs that lie below a folder in a known layout.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
+    ffi::OsStr,
     path::{Path, PathBuf},
 };
 
@@ -18,11 +19,14 @@ const IN_ONE_FOLDER: [[&str; 2]; 5] =
 /// Folders beside one another that hold images of equal names.
 const IN_TWO_FOLDERS: [[&str; 2]; 3] = [["left", "right"], ["image_2", "image_3"], ["image_0", "image_1"]];
 
-/// Endings of images, in the order in which one of several is taken.
+/// Endings of images, in the order in which one of several is taken; a `.pfm` in such folders is a disparity map.
 const ENDINGS: [&str; 8] = ["png", "ppm", "pgm", "pnm", "tif", "tiff", "jpg", "jpeg"];
 
-/// Images by their folders, both relative to where the search began.
-type Folders = BTreeMap<PathBuf, BTreeSet<String>>;
+/// Images by their folders, which are relative to where the search began.
+type Folders = BTreeMap<PathBuf, Images>;
+
+/// Names of files by these names in lower case, by which they are searched: cameras write VIEW1.PNG.
+type Images = BTreeMap<String, String>;
 
 /// The pairs below `root`, but not in `output`, in the natural order of their names.
 pub(super) fn search(root: &Path, output: &Path) -> Result<Found, Failure> {
@@ -54,33 +58,38 @@ fn images(root: &Path, output: &Path, notes: &mut Vec<String>) -> Folders {
             }
         };
         let below = entry.path().strip_prefix(root).unwrap_or(entry.path());
-        if let (true, Some(folder), Some(name)) = (entry.file_type().is_file(), below.parent(), below.file_name()) {
-            let name = name.to_string_lossy().into_owned();
-            if ending(&name).is_some() {
-                folders.entry(folder.to_owned()).or_default().insert(name);
-            }
+        if !entry.file_type().is_file() || !below.extension().is_some_and(is_ending) {
+            continue;
+        }
+        let (Some(folder), Some(name), Some(_)) =
+            (below.parent(), below.file_name().and_then(OsStr::to_str), below.to_str())
+        else {
+            notes.push(format!("passed over: {} is no name in UTF-8, as records hold it", entry.path().display()));
+            continue;
+        };
+        let images = folders.entry(folder.to_owned()).or_default();
+        if let Some(other) = images.insert(name.to_lowercase(), name.to_owned()) {
+            notes.push(format!("passed over: {other} beside {}", entry.path().display()));
         }
     }
     folders
 }
 
-fn ending(name: &str) -> Option<&str> {
-    let (_, ending) = name.rsplit_once('.')?;
-    ENDINGS.contains(&ending).then_some(ending)
+fn is_ending(ending: &OsStr) -> bool {
+    ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// The one pair of a folder whose images are called as in a known data set.
-fn in_one_folder(folder: &Path, images: &BTreeSet<String>, found: &mut Found) {
+fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
     let all =
         IN_ONE_FOLDER.iter().flat_map(|layout| ENDINGS.map(|ending| layout.map(|name| format!("{name}.{ending}"))));
-    let (present, absent): (Vec<_>, Vec<_>) =
-        all.partition(|[left, right]| images.contains(left) && images.contains(right));
-    let path = |name: &str| folder.join(name);
-    let Some((taken @ [left, right], others)) = present.split_first() else {
+    let actual = |name: &String| images.get(&name.to_lowercase()).map(|actual| folder.join(actual));
+    let (present, absent): (Vec<_>, Vec<_>) = all.partition(|names| names.iter().all(|name| actual(name).is_some()));
+    let Some((taken, others)) = present.split_first() else {
         for [left, right] in absent {
             for (here, missing) in [(&left, &right), (&right, &left)] {
-                if images.contains(here) {
-                    found.notes.push(format!("passed over: {} has no {missing} beside it", path(here).display()));
+                if let Some(here) = actual(here) {
+                    found.notes.push(format!("passed over: {} has no {missing} beside it", here.display()));
                 }
             }
         }
@@ -88,9 +97,11 @@ fn in_one_folder(folder: &Path, images: &BTreeSet<String>, found: &mut Found) {
     };
     for other in others {
         let [taken, other] = [taken, other].map(|names| names.join(" and "));
-        found.notes.push(format!("{}: {taken} are taken as its pair, not {other}", path("").display()));
+        found.notes.push(format!("{}: {taken} are taken as its pair, not {other}", folder.join("").display()));
     }
-    found.pairs.push(Pair { name: path(left).with_extension(""), left: path(left), right: path(right) });
+    if let [Some(left), Some(right)] = taken.each_ref().map(actual) {
+        found.pairs.push(Pair { name: left.with_extension(""), left, right });
+    }
 }
 
 /// The pairs of a folder and the one beside it, where they are called as in a known data set.
@@ -99,30 +110,31 @@ fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
         let Some(side) = layout.iter().position(|&name| folder.file_name().is_some_and(|own| own == name)) else {
             continue;
         };
-        let other = layout[1 - side];
+        let (images, other) = (&folders[folder], layout[1 - side]);
         let Some(partners) = folders.get(&folder.with_file_name(other)) else {
             found.notes.push(format!("passed over: {} has no folder {other} with images beside it", folder.display()));
             continue;
         };
-        let lonely = folders[folder].difference(partners).map(|image| folder.join(image));
-        found.notes.extend(
-            lonely.map(|image| format!("passed over: {} has no image of its name in {other}", image.display())),
-        );
+        let lonely = images.iter().filter(|(name, _)| !partners.contains_key(*name));
+        found.notes.extend(lonely.map(|(_, image)| {
+            format!("passed over: {} has no image of its name in {other}", folder.join(image).display())
+        }));
         if side == 0 {
-            pairs_of_equal_names(folder, &folder.with_file_name(other), folders[folder].intersection(partners), found);
+            pairs_of_equal_names((folder, images), (&folder.with_file_name(other), partners), found);
         }
     }
 }
 
-fn pairs_of_equal_names<'a>(folder: &Path, other: &Path, names: impl Iterator<Item = &'a String>, found: &mut Found) {
+fn pairs_of_equal_names((folder, images): (&Path, &Images), (other, partners): (&Path, &Images), found: &mut Found) {
     let mut taken = BTreeMap::new();
-    for image in names {
+    for (key, image) in images {
+        let Some(partner) = partners.get(key) else { continue };
         let name = folder.join(image).with_extension("");
         if let Some(first) = taken.insert(name.clone(), image) {
             let (first, image) = (folder.join(first), folder.join(image));
             found.notes.push(format!("passed over: {} beside {}", image.display(), first.display()));
             continue;
         }
-        found.pairs.push(Pair { name, left: folder.join(image), right: other.join(image) });
+        found.pairs.push(Pair { name, left: folder.join(image), right: other.join(partner) });
     }
 }
