@@ -2,9 +2,15 @@
 //! so; with it, missing data is a failure.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use std::{collections::BTreeMap, path::PathBuf, process::Command};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use serde_json::Value;
+use walkdir::WalkDir;
 
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("BP_DATA").map(PathBuf::from);
@@ -32,7 +38,7 @@ fn outside_energies_are_reproduced_and_bp_is_no_worse() {
             ((row.scene.clone(), row.method.clone()), [energy.total, energy.data, energy.smoothness])
         })
         .collect();
-    let csv = std::fs::read_to_string(data.join("mrf-benchmark/energies.csv")).unwrap();
+    let csv = fs::read_to_string(data.join("mrf-benchmark/energies.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.trim().split(',').collect()).collect();
     assert_eq!(rows.len(), 24);
     for row in rows {
@@ -109,4 +115,42 @@ fn no_data_file_is_wrong_and_none_that_is_run_on_is_missing() {
     let lines: Vec<_> = text.lines().filter(needed).collect();
     assert_eq!(lines.len(), 2 * 6 * 4 + 3 * 6);
     assert!(lines.iter().all(|line| line.ends_with("as listed")), "{lines:#?}");
+}
+
+/// No alarm about any real pair, and one about each that is exchanged or whose right image lies a row too high.
+#[test]
+fn wrong_pairs_are_told_and_no_others() {
+    let Some(data) = data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let alarms = |pairs: &Path, output: &str| {
+        let mut match_all = Command::new(env!("CARGO_BIN_EXE_bp"));
+        match_all.args(["match", "--labels", "auto", "--json", "--pairs"]).arg(pairs).arg("--output").arg(at(output));
+        let found = match_all.output().unwrap();
+        let told = String::from_utf8(found.stderr).unwrap();
+        assert!(found.status.success(), "{told}");
+        let warnings: Vec<String> = told.lines().filter(|line| line.contains("warning")).map(str::to_owned).collect();
+        (serde_json::from_slice::<Value>(&found.stdout).unwrap()["pairs"].as_u64().unwrap(), warnings)
+    };
+    let (pairs, warnings) = alarms(&data, "real");
+    assert!(pairs >= 20 && warnings.is_empty(), "{pairs}: {warnings:#?}");
+    let records = WalkDir::new(at("real/records")).sort_by_file_name().into_iter().map(Result::unwrap);
+    let records = records.filter(|entry| entry.file_type().is_file()).map(|entry| fs::read(entry.path()).unwrap());
+    let (mut exchanged, mut moved) = (String::new(), String::new());
+    for (index, record) in records.enumerate() {
+        let record: Value = serde_json::from_slice(&record).unwrap();
+        let [left, right] = ["left", "right"].map(|side| record[side].as_str().unwrap());
+        exchanged += &format!("{right}\t{left}\t{index}\n");
+        let (image, high) = (image::open(right).unwrap(), at(&format!("{index}.png")));
+        let mut lower = image.clone();
+        image::imageops::replace(&mut lower, &image, 0, -1);
+        lower.save(&high).unwrap();
+        moved += &format!("{left}\t{}\t{index}\n", high.display());
+    }
+    for (name, list, words) in [("exchanged", exchanged, "look exchanged"), ("moved", moved, "do not correspond")] {
+        fs::write(at("list"), list).unwrap();
+        let (found, warnings) = alarms(&at("list"), name);
+        let told = warnings.iter().filter(|warning| warning.contains(words)).count() as u64;
+        assert!(found == pairs && told == pairs, "{told} of {pairs} {name}: {warnings:#?}");
+    }
 }

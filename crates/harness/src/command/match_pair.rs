@@ -9,7 +9,7 @@ use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair, survey::Survey};
 
 use super::{evaluate, print_json};
 use crate::{
-    args::{MatchArgs, PlanArgs},
+    args::{Labels, MatchArgs, PlanArgs},
     failure::Failure,
     files::{PixelLimit, read_image},
     interrupt,
@@ -39,6 +39,11 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let pair = read_pair(left, right, limit)?;
     let survey = Survey::of(&pair)?;
     let (plan, warnings) = planned(&args.plan, [left, right], pair.size(), &survey, (&outputs, &making))?;
+    if args.plan.labels == Some(Labels::Auto) {
+        let (model, labels) = (plan.model(), plan.model().labels());
+        let (low, high) = (model.min_disparity(), model.disparity(labels as u16 - 1));
+        note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
+    }
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
     interrupt::listen()?;
     let outputs = (&outputs, &making);

@@ -6,12 +6,9 @@ use bp_core::{
 };
 
 use super::Outputs;
-use crate::{
-    args::{Labels, PlanArgs},
-    note,
-};
+use crate::args::{Labels, PlanArgs};
 
-/// The labels that the options ask for; what auto takes is told on standard error. `None` where auto finds none: the
+/// The labels that the options ask for. `None` where auto finds none: the
 /// default is [`default`].
 pub(crate) fn range(args: &PlanArgs, size: Size, survey: &Survey, outputs: &Outputs) -> Option<DisparityRange> {
     let min_disparity = args.min_disparity.unwrap_or(0);
@@ -20,10 +17,7 @@ pub(crate) fn range(args: &PlanArgs, size: Size, survey: &Survey, outputs: &Outp
         (None, _) => Some(default(args, size)),
         (Some(Labels::Auto), None) => None,
         (Some(Labels::Auto), Some(seen)) => {
-            let range = seen.range().starting_at(args.min_disparity.unwrap_or_else(|| first(seen, outputs)));
-            let (labels, low, high) = (range.labels, range.min_disparity, range.max_disparity());
-            note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
-            Some(range)
+            Some(seen.range().starting_at(args.min_disparity.unwrap_or_else(|| first(seen, outputs))))
         }
     }
 }
