@@ -5,7 +5,7 @@ use std::{fs, io};
 use bp_core::DeviceKind;
 
 use sha2::{Digest, Sha256};
-use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
+use sysinfo::{CpuRefreshKind, MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, RefreshKind, System};
 
 use crate::{
     failure::Failure,
@@ -62,15 +62,25 @@ pub(crate) fn available_memory(kind: DeviceKind) -> Option<u64> {
 /// Main memory in bytes.
 pub(crate) struct Memory {
     pub(crate) total: u64,
-    /// What can be had now.
+    /// What this process can have now.
     pub(crate) available: u64,
 }
 
 /// This machine's memory, where the system tells.
 pub(crate) fn memory() -> Option<Memory> {
     let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
-    let system = System::new_with_specifics(what).ok()?;
-    Some(Memory { total: system.total_memory(), available: system.available_memory() })
+    let mut system = System::new_with_specifics(what).ok()?;
+    let allowed = left_to_group(&mut system).unwrap_or(u64::MAX);
+    Some(Memory { total: system.total_memory(), available: system.available_memory().min(allowed) })
+}
+
+/// Bytes that the control group of this process, a container or a cluster's job, has left: of what is used, files that are
+/// cached do not count, as the system gives them up. `None` where there is no limit.
+fn left_to_group(system: &mut System) -> Option<u64> {
+    let own = sysinfo::get_current_pid().ok()?;
+    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, ProcessRefreshKind::nothing());
+    let limits = system.process(own)?.cgroup_limits()?;
+    Some(limits.total_memory.saturating_sub(limits.rss))
 }
 
 /// The running program.

@@ -68,7 +68,7 @@ impl Summary {
             match_ms: sum(|times| times.match_ms),
             write_ms: sum(|times| times.write_ms),
         };
-        let total_ms = records.iter().map(|record| record.elapsed_ms).sum();
+        let total_ms = records.iter().fold(0.0, |sum, record| sum + record.elapsed_ms);
         let rate = |ms: f64| (ms > 0.0 && !done.is_empty()).then(|| 1000.0 * done.len() as f64 / ms);
         Ok(Self {
             shard: (!shard.is_all()).then(|| shard.to_string()),
