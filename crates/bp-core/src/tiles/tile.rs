@@ -32,7 +32,7 @@ impl Tile {
     /// The plan of the tile: the whole image's, with the cut where the tile meets it.
     ///
     /// # Errors
-    /// None for a tile of that plan's [`Tiling`].
+    /// None for a tile of that plan's [`crate::Tiling`].
     pub fn plan(&self, whole: &Plan) -> Result<Plan, Error> {
         let cut = whole.settings().cut.and_then(|cut| self.cut(cut));
         Plan::new(self.size(), *whole.model(), Settings { cut, ..*whole.settings() })

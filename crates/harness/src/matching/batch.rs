@@ -15,7 +15,7 @@ use std::{io::Write as _, path::PathBuf};
 
 use bp_core::{Algorithm, Schedule};
 pub(crate) use shard::Shard;
-use summary::Summary;
+use summary::{Failed, Summary};
 
 use super::{Making, pairs};
 use crate::{
@@ -38,22 +38,15 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     let jobs = job::jobs(args, &making, &found.pairs, shard)?;
     interrupt::listen()?;
     files::name_temporary(&format!(".bp-{}-", shard.file_part()));
+    let _lock = shard.lock(&args.output.join(job::RECORDS))?;
     job::clear_leftovers(args, &jobs, shard)?;
     let settings = record::settings_sha256(args, &making);
     let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
     due.iter().try_for_each(|job| job.check(&making))?;
-    if !due.is_empty() {
-        let ran = threads::run_on(args.plan.threads, || run::run(args, &making, &due, &settings));
-        ran.inspect_err(|failure| {
-            if failure.is_interrupted() {
-                let again = if args.many.force { "the same command without --force" } else { "the same command" };
-                note(&format!("{again} goes on with the pairs that are not complete"));
-            }
-        })?;
-    }
-    let summary = Summary::of(args, shard, &jobs, jobs.len() - due.len())?;
+    let failures = match_due(args, &making, &due, &settings)?;
+    let summary = Summary::of(args, shard, &jobs, jobs.len() - due.len(), failures)?;
     let told = summary::path(&args.output, shard);
     summary.write(&told)?;
     if args.json {
@@ -62,6 +55,20 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
         write!(std::io::stdout(), "{}", summary.text())?
     }
     summary.outcome(&told)
+}
+
+/// Matches what is to be done; tells which pairs have failed.
+fn match_due(args: &MatchArgs, making: &Making, due: &[&Job], settings_sha256: &str) -> Result<Vec<Failed>, Failure> {
+    if due.is_empty() {
+        return Ok(Vec::new());
+    }
+    let ran = threads::run_on(args.plan.threads, || run::run(args, making, due, settings_sha256));
+    ran.inspect_err(|failure| {
+        if failure.is_interrupted() {
+            let again = if args.many.force { "the same command without --force" } else { "the same command" };
+            note(&format!("{again} goes on with the pairs that are not complete"));
+        }
+    })
 }
 
 /// Refuses options that are for one pair, and folders that no record can name.

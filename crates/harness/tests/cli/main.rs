@@ -7,6 +7,7 @@ mod manners;
 mod many;
 mod outputs;
 mod recorded;
+mod resumed;
 mod running;
 mod speed;
 mod survey;

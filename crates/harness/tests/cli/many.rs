@@ -1,12 +1,9 @@
-//! Many pairs: what is found, what is done again, what is told.
+//! Many pairs: which are found, what they are called, what is told.
 
 use std::{
     collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
-    process::Stdio,
-    thread::sleep,
-    time::{Duration, Instant},
 };
 
 use serde_json::Value;
@@ -14,10 +11,10 @@ use serde_json::Value;
 use crate::folder::{Folder, text};
 
 /// Options that make matching tiny pairs quick.
-const TINY: &str = "--labels 12 --threads 1";
+pub(super) const TINY: &str = "--labels 12 --threads 1";
 
 /// Copies the folder's pair to these places.
-fn place(folder: &Folder, images: &[&str]) {
+pub(super) fn place(folder: &Folder, images: &[&str]) {
     for image in images {
         let to = folder.path(image);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
@@ -28,7 +25,7 @@ fn place(folder: &Folder, images: &[&str]) {
 }
 
 /// All files below a folder, relative to it.
-fn files(folder: &Path) -> BTreeSet<PathBuf> {
+pub(super) fn files(folder: &Path) -> BTreeSet<PathBuf> {
     let below = |entry: fs::DirEntry| {
         let name = PathBuf::from(entry.file_name());
         if entry.path().is_dir() {
@@ -40,12 +37,12 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
     fs::read_dir(folder).unwrap().flat_map(|entry| below(entry.unwrap())).collect()
 }
 
-fn maps(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+pub(super) fn maps(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let is_map = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "pfm");
     files(folder).into_iter().filter(is_map).map(|path| (path.clone(), fs::read(folder.join(path)).unwrap())).collect()
 }
 
-fn names(folder: &Path) -> Vec<String> {
+pub(super) fn names(folder: &Path) -> Vec<String> {
     maps(folder).into_iter().map(|(path, _)| path.with_extension("").display().to_string()).collect()
 }
 
@@ -113,6 +110,7 @@ fn lists_name_maps_and_broken_lines_are_told_by_number() {
         "a b/left.pfm.json",
         "x/y.pfm.json",
         "a b/left.picture.png",
+        "records/1-of-1.lock",
         "records/a b/left.json",
         "records/x/y.json",
         "summary.json",
@@ -155,159 +153,6 @@ fn outputs_that_would_collide_are_refused_before_the_work() {
         "--pairs list --confidence c.pfm",
     ] {
         folder.fails(&format!("match --output out {options}"), 2, &["--"]);
-    }
-}
-
-#[test]
-fn only_what_changed_is_done_again() {
-    let folder = Folder::new();
-    place(
-        &folder,
-        &["in/left/1.png", "in/right/1.png", "in/left/2.png", "in/right/2.png", "in/left/3.png", "in/right/3.png"],
-    );
-    let done = |options: &str| {
-        let report = folder.json(&format!("match --pairs in --output out --json {TINY} {options}"));
-        let written = fs::read_to_string(folder.path("out/summary.json")).unwrap();
-        assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), report);
-        3 - report["skipped"].as_u64().unwrap()
-    };
-    assert_eq!((done(""), done(""), done("--backend scalar"), done("--force")), (3, 0, 0, 3));
-    fs::copy(folder.path("truth.png"), folder.path("in/right/2.png")).unwrap();
-    assert_eq!((done(""), done("")), (1, 0));
-    // As `touch` does: the same contents.
-    let bytes = fs::read(folder.path("in/left/1.png")).unwrap();
-    fs::write(folder.path("in/left/1.png"), bytes).unwrap();
-    assert_eq!(done(""), 0);
-    fs::remove_file(folder.path("out/left/1.pfm")).unwrap();
-    fs::write(folder.path("out/left/3.pfm"), "").unwrap();
-    assert_eq!((done(""), done("")), (2, 0));
-    fs::write(folder.path("out/records/left/2.json"), "{").unwrap();
-    assert_eq!((done(""), done("--slope 3"), done("--slope 3"), done("--slope 3 --also picture")), (1, 3, 0, 3));
-    // The contents of a calibration count, not its name.
-    let calibration = |focal: u32| {
-        let cam = format!("cam0=[{focal} 0 10; 0 {focal} 9; 0 0 1]\ncam1=[{focal} 0 10; 0 {focal} 9; 0 0 1]\n");
-        fs::write(folder.path("calib.txt"), cam + "doffs=0\nbaseline=60\n").unwrap();
-    };
-    let with = |file: &str| done(&format!("--slope 3 --also picture,depth --calib {file}"));
-    calibration(100);
-    assert_eq!((with("calib.txt"), with("./calib.txt")), (3, 0));
-    calibration(101);
-    assert_eq!((with("calib.txt"), done("--slope 3 --also picture")), (3, 3));
-    fs::rename(folder.path("out"), folder.path("moved")).unwrap();
-    fs::rename(folder.path("moved"), folder.path("out")).unwrap();
-    assert_eq!(done("--slope 3 --also picture"), 0);
-}
-
-#[test]
-fn a_pair_that_fails_is_told_recorded_and_tried_again() {
-    let folder = Folder::new();
-    fs::write(
-        folder.path("list"),
-        "left.png right.png a\nleft.png wide.png b\nno.png right.png c\nright.png left.png d\n",
-    )
-    .unwrap();
-    let run = format!("match --pairs list --output out {TINY}");
-    let output = folder.run(&run);
-    assert_eq!(output.status.code(), Some(3));
-    let told = text(&output.stderr);
-    for words in ["b: left.png and wide.png", "c: no.png", "2 of 4 pairs failed", "summary.json"] {
-        assert!(told.contains(words), "{told}");
-    }
-    let summary: Value = serde_json::from_slice(&fs::read(folder.path("out/summary.json")).unwrap()).unwrap();
-    assert_eq!((&summary["done"], &summary["failures"][0]["name"]), (&2.into(), &"b".into()));
-    assert!(summary["pairs_per_second"].as_f64().unwrap() > 0.0);
-    assert_eq!(names(&folder.path("out")), ["a", "d"]);
-    fs::copy(folder.path("left.png"), folder.path("no.png")).unwrap();
-    fs::copy(folder.path("right.png"), folder.path("wide.png")).unwrap();
-    let report = folder.json(&format!("{run} --json"));
-    assert_eq!(
-        (&report["done"], &report["skipped"], &report["failures"]),
-        (&4.into(), &2.into(), &Value::Array(vec![]))
-    );
-    // A map of before is not left to be taken for the answer to what fails now.
-    fs::write(folder.path("no.png"), "broken").unwrap();
-    assert_eq!(folder.run(&run).status.code(), Some(3));
-    assert_eq!(names(&folder.path("out")), ["a", "b", "d"]);
-}
-
-#[test]
-fn shards_share_all_pairs_in_one_folder() {
-    let folder = Folder::new();
-    let list: String = (0..7).map(|index| format!("left.png right.png p{index}\n")).collect();
-    fs::write(folder.path("list"), list).unwrap();
-    let shards: Vec<_> = (1..=3)
-        .map(|shard| {
-            folder
-                .command(&format!("match --pairs list --output out --json --shard {shard}/3 {TINY}"))
-                .stdout(Stdio::null())
-                .spawn()
-                .unwrap()
-        })
-        .collect();
-    assert!(shards.into_iter().all(|mut shard| shard.wait().unwrap().success()));
-    let count = |name: &str| {
-        let summary: Value = serde_json::from_slice(&fs::read(folder.path(name)).unwrap()).unwrap();
-        summary["done"].as_u64().unwrap()
-    };
-    assert_eq!([1, 2, 3].map(|shard| count(&format!("out/summary-{shard}-of-3.json"))), [3, 2, 2]);
-    let whole = folder.json(&format!("match --pairs list --output out --json {TINY}"));
-    assert_eq!((&whole["done"], &whole["skipped"]), (&7.into(), &7.into()));
-}
-
-/// Pairs that take a while, so that there is something to interrupt.
-fn slow(folder: &Folder, pairs: usize) -> String {
-    let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
-    for (name, shift) in [("l.pgm", 0), ("r.pgm", 3)] {
-        image::GrayImage::from_fn(160, 120, |x, y| image::Luma([noise(x + shift, y)])).save(folder.path(name)).unwrap();
-    }
-    let list: String = (0..pairs).map(|index| format!("l.pgm r.pgm p{index}\n")).collect();
-    fs::write(folder.path("list"), list).unwrap();
-    "match --pairs list --labels 16 --algorithm cfbp --threads 1".to_owned()
-}
-
-fn wait_for(what: impl Fn() -> bool) {
-    let start = Instant::now();
-    while !what() && start.elapsed() < Duration::from_secs(60) {
-        sleep(Duration::from_millis(1));
-    }
-}
-
-#[test]
-fn a_batch_that_is_killed_goes_on_and_ends_as_if_it_had_not_been() {
-    let folder = Folder::new();
-    let run = slow(&folder, 8);
-    assert!(folder.run(&format!("{run} --output whole")).status.success());
-    for done in [0, 1, 3, 5] {
-        let mut child = folder.command(&format!("{run} --output out")).stdout(Stdio::null()).spawn().unwrap();
-        wait_for(|| folder.path(&format!("out/records/p{done}.json")).exists());
-        child.kill().unwrap();
-        child.wait().unwrap();
-    }
-    fs::write(folder.path("out/.bp-1-of-1-left"), "half").unwrap();
-    let report = folder.json(&format!("{run} --output out --json"));
-    assert!(report["skipped"].as_u64().unwrap() >= 5, "{report}");
-    assert_eq!(report["done"], 8);
-    assert_eq!(maps(&folder.path("out")), maps(&folder.path("whole")));
-    assert_eq!(files(&folder.path("out")), files(&folder.path("whole")));
-}
-
-#[cfg(unix)]
-#[test]
-fn a_signal_ends_a_batch_between_pairs_without_a_trace() {
-    let folder = Folder::new();
-    let run = slow(&folder, 200);
-    for signal in ["INT", "TERM"] {
-        let child = folder.command(&format!("{run} --output out")).stderr(Stdio::piped()).spawn().unwrap();
-        let before = maps(&folder.path("")).len();
-        wait_for(|| folder.path("out").exists() && maps(&folder.path("out")).len() > before + 2);
-        let kill = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
-        assert!(kill.success());
-        let output = child.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
-        assert!(text(&output.stderr).contains("the same command goes on"), "{}", text(&output.stderr));
-        let found = files(&folder.path("out"));
-        let maps = maps(&folder.path("out")).len();
-        assert!(maps > 0 && maps < 200 && found.len() == 3 * maps, "{found:?}");
     }
 }
 
@@ -367,13 +212,20 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
         [4, 3]
     );
     assert_eq!(maps(&folder.path("shared")), whole);
+    // The frames after one that is gone start from another one's messages.
+    fs::rename(folder.path("v/left/1.png"), folder.path("v/left_1.png")).unwrap();
+    assert_eq!(run("warm", "--warm-start=3")["skipped"], 0);
+    run("anew", "--warm-start=3");
+    fs::remove_file(folder.path("warm/1.pfm")).unwrap();
+    assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
+    fs::rename(folder.path("v/left_1.png"), folder.path("v/left/1.png")).unwrap();
     // A frame that fails at the head of a chain leaves no way for another chain's messages to come in.
     fs::write(folder.path("v/left/3.png"), "broken").unwrap();
     let broken = "match --video v/left/%d.png v/right/%d.png --warm-start=3 --algorithm cfbp --half-steps 1 --slope 9 --truncation 60 --labels 12";
-    for output in ["warm", "anew"] {
+    for output in ["warm", "broken"] {
         assert_eq!(folder.run(&format!("{broken} --output {output}")).status.code(), Some(3));
     }
-    assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
+    assert_eq!(maps(&folder.path("warm")), maps(&folder.path("broken")));
     for options in ["", "--algorithm cfbp --check left-right", "--algorithm cfbp --also confidence"] {
         let run = format!("match --video l%d r%d --output no --warm-start {options}");
         folder.fails(&run, 2, &["--warm-start", "cfbp", "--check"]);

@@ -9,7 +9,11 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use super::{Shard, record::PairRecord, summary};
+use super::{
+    Shard,
+    record::{FileState, PairRecord},
+    summary,
+};
 use crate::{
     args::{Also, MatchArgs},
     failure::Failure,
@@ -18,7 +22,7 @@ use crate::{
 };
 
 /// The folder of the records, in that of the outputs.
-const RECORDS: &str = "records";
+pub(super) const RECORDS: &str = "records";
 
 /// After how long nobody can be writing to a temporary file any more.
 const ABANDONED: Duration = Duration::from_hours(1);
@@ -33,6 +37,8 @@ pub(super) struct Job {
     pub(super) record: PathBuf,
     /// Which of the pairs that are done together it belongs to.
     pub(super) chain: usize,
+    /// The one among them before it, whose messages its own start from, by its name.
+    pub(super) follows: Option<PathBuf>,
 }
 
 /// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
@@ -40,7 +46,7 @@ pub(super) struct Job {
 pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
     // An ending that stands for no format is the fault of none of the pairs.
     MapFormat::of(&Path::new("NAME").with_added_extension(&args.many.format))?;
-    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, making, index, pair)).collect();
+    let jobs: Vec<Job> = (0..pairs.len()).map(|index| Job::new(args, making, pairs, index)).collect();
     check_apart(args, &jobs)?;
     let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
     folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
@@ -48,7 +54,8 @@ pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Sha
 }
 
 impl Job {
-    fn new(args: &MatchArgs, making: &Making, index: usize, pair: &Pair) -> Self {
+    fn new(args: &MatchArgs, making: &Making, pairs: &[Pair], index: usize) -> Self {
+        let (pair, chain) = (&pairs[index], args.many.chain());
         let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
         let also = |what: Also, ending: &str| args.many.also.contains(&what).then(|| named(ending));
         let outputs = Outputs {
@@ -60,8 +67,9 @@ impl Job {
         };
         let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
         let paths = outputs.paths(making);
-        let (calibration, chain) = (args.outputs.making.calib.clone(), index / args.many.chain());
-        Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
+        let follows = (!index.is_multiple_of(chain)).then(|| pairs[index - 1].name.clone());
+        let calibration = args.outputs.making.calib.clone();
+        Self { pair: pair.clone(), calibration, outputs, paths, record, chain: index / chain, follows }
     }
 
     /// The two images.
@@ -76,8 +84,11 @@ impl Job {
 
     /// Whether nothing is to be done.
     pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
-        let record = PairRecord::read(&self.record);
-        record.is_some_and(|record| record.is_current(settings_sha256, &self.images(), &self.paths))
+        PairRecord::read(&self.record).is_some_and(|record| {
+            record.settings_sha256 == settings_sha256
+                && record.follows == self.follows
+                && record.is_of(&self.images(), &self.paths)
+        })
     }
 
     /// Fails where an output cannot be written.
@@ -85,15 +96,36 @@ impl Job {
         self.outputs.check(making, &self.inputs())
     }
 
-    /// Removes what an earlier success has left: the outputs of a pair that fails now would be taken for its own.
-    pub(super) fn remove_outputs(&self) {
-        // One that is not there is as good as removed, and one that cannot be is told where it is written next.
-        self.paths.iter().for_each(|path| drop(fs::remove_file(path)));
+    /// Removes what an earlier command has written of it and this one does not: beside the new map it would be taken for
+    /// the map's.
+    pub(super) fn remove_others(&self) {
+        let Some(earlier) = PairRecord::read(&self.record) else { return };
+        self.earlier_outputs(&earlier).filter(|path| !self.paths.contains(path)).for_each(remove);
+    }
+
+    /// Removes what an earlier command has made of other images than these, which failed now: it would be taken for
+    /// theirs.
+    pub(super) fn remove_stale(&self, images: &[FileState]) {
+        let Some(earlier) = PairRecord::read(&self.record) else { return };
+        if !images.is_empty() && !earlier.is_of_contents(images) {
+            self.earlier_outputs(&earlier).chain([self.record.clone()]).for_each(remove);
+        }
+    }
+
+    /// The outputs that a record tells of, where they are now: all of a pair are in one folder, which may have been moved.
+    fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = PathBuf> {
+        let names = earlier.done.outputs.iter().filter_map(|state| state.path.file_name());
+        names.filter_map(|name| Some(self.paths.first()?.with_file_name(name))).collect::<Vec<_>>().into_iter()
     }
 
     fn files(&self) -> impl Iterator<Item = &Path> {
         self.paths.iter().map(PathBuf::as_path).chain([self.record.as_path()])
     }
+}
+
+/// A file that is not there is as good as removed, and one that cannot be is told where it is written next.
+fn remove(path: PathBuf) {
+    drop(fs::remove_file(path));
 }
 
 /// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.

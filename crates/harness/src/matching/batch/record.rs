@@ -21,21 +21,11 @@ use crate::{
 /// A file as it was when a pair was done.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct FileState {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     bytes: u64,
     /// Nanoseconds since 1970, where the file system tells.
     modified_ns: Option<u64>,
     sha256: String,
-}
-
-/// What came of a pair.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Outcome {
-    /// Its outputs.
-    Done(Box<Done>),
-    /// Why there are none.
-    Failed(String),
 }
 
 /// What was done.
@@ -67,19 +57,21 @@ pub(super) struct PairTimes {
     pub(super) write_ms: f64,
 }
 
-/// The record of a pair.
+/// The record of a pair that is done.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PairRecord {
     pub(super) name: PathBuf,
     pub(super) left: PathBuf,
     pub(super) right: PathBuf,
+    /// The frame whose messages its own started from, by its name.
+    pub(super) follows: Option<PathBuf>,
     /// Of all settings that outputs depend on; see [`settings_sha256`].
     pub(super) settings_sha256: String,
-    /// The images, where they could be read.
+    /// The images.
     pub(super) inputs: Vec<FileState>,
     /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
     pub(super) elapsed_ms: f64,
-    pub(super) outcome: Outcome,
+    pub(super) done: Done,
 }
 
 impl PairRecord {
@@ -94,21 +86,17 @@ impl PairRecord {
         write_text(path, &(text + "\n"))
     }
 
-    /// What was done, where it was.
-    pub(super) fn done(&self) -> Option<&Done> {
-        match &self.outcome {
-            Outcome::Done(done) => Some(done),
-            Outcome::Failed(_) => None,
-        }
-    }
-
-    /// Whether its outputs are still what these inputs and settings give.
-    pub(super) fn is_current(&self, settings_sha256: &str, inputs: &[&Path; 2], outputs: &[PathBuf]) -> bool {
+    /// Whether its images and outputs are still these files, as they were.
+    pub(super) fn is_of(&self, images: &[&Path; 2], outputs: &[PathBuf]) -> bool {
         fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
             then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
         }
-        let done = self.done().filter(|_| self.settings_sha256 == settings_sha256);
-        done.is_some_and(|done| same(&self.inputs, inputs) && same(&done.outputs, outputs))
+        same(&self.inputs, images) && same(&self.done.outputs, outputs)
+    }
+
+    /// Whether it tells of images with these contents.
+    pub(super) fn is_of_contents(&self, images: &[FileState]) -> bool {
+        self.inputs.iter().map(|state| &state.sha256).eq(images.iter().map(|state| &state.sha256))
     }
 }
 

@@ -11,7 +11,8 @@ use bp_core::{StereoPair, survey::Survey};
 
 use super::{
     job::Job,
-    record::{Done, FileState, Outcome, PairRecord, PairTimes},
+    record::{Done, FileState, PairRecord, PairTimes},
+    summary::Failed,
 };
 use crate::{
     args::MatchArgs,
@@ -38,8 +39,13 @@ struct Matched<'a> {
     done: Result<(Done, Answer, StereoPair), Failure>,
 }
 
-/// Matches and writes all jobs; a pair that fails is recorded, and the others go on.
-pub(super) fn run(args: &MatchArgs, making: &Making, jobs: &[&Job], settings_sha256: &str) -> Result<(), Failure> {
+/// Matches and writes all jobs; where a pair fails, the others go on.
+pub(super) fn run(
+    args: &MatchArgs,
+    making: &Making,
+    jobs: &[&Job],
+    settings_sha256: &str,
+) -> Result<Vec<Failed>, Failure> {
     let bar = ProgressBar::new(jobs.len() as u64);
     // Nothing waits in the channels: at most three pairs are in memory.
     let (read, to_match) = sync_channel(0);
@@ -48,12 +54,13 @@ pub(super) fn run(args: &MatchArgs, making: &Making, jobs: &[&Job], settings_sha
     let begun = Instant::now();
     let result = thread::scope(|scope| {
         scope.spawn(move || read_all(jobs, limit, &read));
-        let writer =
-            scope.spawn(|| Writer { bar: &bar, making, settings_sha256, last: begun, failed: 0 }.write_all(to_write));
+        let writer = scope.spawn(|| {
+            Writer { bar: &bar, making, settings_sha256, last: begun, failed: Vec::new() }.write_all(to_write)
+        });
         let solved = solve_all(args, making, to_match, matched);
         let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         // Where writing fails, matching ends for want of a writer.
-        written.and(solved)
+        written.and_then(|failed| solved.map(|()| failed))
     });
     bar.finish();
     result
@@ -146,41 +153,44 @@ struct Writer<'a> {
     making: &'a Making,
     settings_sha256: &'a str,
     last: Instant,
-    failed: usize,
+    failed: Vec<Failed>,
 }
 
 impl Writer<'_> {
-    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<(), Failure> {
+    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<Vec<Failed>, Failure> {
         for (index, Matched { job, inputs, done }) in from.into_iter().enumerate() {
-            let outcome = match done {
-                Ok((done, answer, pair)) => Outcome::Done(Box::new(self.write(job, done, &answer, &pair)?)),
-                Err(failure) => {
-                    self.failed += 1;
-                    tell(&format!("{}: {failure}", job.pair.name.display()));
-                    job.remove_outputs();
-                    Outcome::Failed(failure.to_string())
+            match done {
+                Ok((done, answer, pair)) => {
+                    job.remove_others();
+                    let done = self.write(job, done, &answer, &pair)?;
+                    self.record(job, inputs, done)?;
                 }
-            };
-            self.record(job, inputs, outcome)?;
-            let failed = if self.failed > 0 { format!(", {} failed", self.failed) } else { String::new() };
+                Err(failure) => {
+                    tell(&format!("{}: {failure}", job.pair.name.display()));
+                    job.remove_stale(&inputs);
+                    self.failed.push(Failed::new(&job.pair, &failure));
+                }
+            }
+            let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
             self.bar.message(format!("{} pairs{failed}", index + 1));
             // Stopping is for the thread that matches; what it has handed over is still written.
             let _ = self.bar.update(index as u64 + 1);
         }
-        Ok(())
+        Ok(self.failed)
     }
 
-    fn record(&mut self, job: &Job, inputs: Vec<FileState>, outcome: Outcome) -> Result<(), Failure> {
+    fn record(&mut self, job: &Job, inputs: Vec<FileState>, done: Done) -> Result<(), Failure> {
         let elapsed_ms = milliseconds_since(self.last);
         self.last = Instant::now();
         let record = PairRecord {
             name: job.pair.name.clone(),
             left: job.pair.left.clone(),
             right: job.pair.right.clone(),
+            follows: job.follows.clone(),
             settings_sha256: self.settings_sha256.to_owned(),
             inputs,
             elapsed_ms,
-            outcome,
+            done,
         };
         record.write(&job.record)
     }

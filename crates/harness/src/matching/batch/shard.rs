@@ -1,6 +1,13 @@
 //! Which part of the pairs a process matches.
 
-use std::{fmt, str::FromStr};
+use std::{
+    fmt,
+    fs::{File, TryLockError},
+    path::Path,
+    str::FromStr,
+};
+
+use crate::{failure::Failure, files::create_folder};
 
 /// One of several processes that share the pairs; by default the only one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +33,23 @@ impl Shard {
     /// How files of its own are told apart.
     pub(super) fn file_part(self) -> String {
         format!("{}-of-{}", self.index + 1, self.count)
+    }
+
+    /// Fails where another process matches this shard: each would take the other's temporary files for leftovers. The
+    /// system ends the lock with the process, however that ends.
+    pub(super) fn lock(self, folder: &Path) -> Result<File, Failure> {
+        create_folder(folder)?;
+        let path = folder.join(format!("{}.lock", self.file_part()));
+        let file = File::options().create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(|error| Failure::writing(&path, &error))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let advice = "wait until it has ended, name another --output, or share the pairs by --shard";
+                Err(Failure::other(format!("{}: another bp match is at work there; {advice}", path.display())))
+            }
+            // Some file systems have no locks.
+            Err(TryLockError::Error(_)) | Ok(()) => Ok(file),
+        }
     }
 
     /// Whether there is no other.

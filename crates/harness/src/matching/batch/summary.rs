@@ -1,6 +1,7 @@
 //! What came of all pairs, computed from their records, so that it covers what earlier commands have done.
 
 use std::{
+    collections::HashSet,
     fmt::Write as _,
     path::{Path, PathBuf},
 };
@@ -10,9 +11,15 @@ use serde::Serialize;
 use super::{
     Shard,
     job::Job,
-    record::{Done, Outcome, PairRecord, PairTimes},
+    record::{Done, PairRecord, PairTimes},
 };
-use crate::{args::MatchArgs, failure::Failure, files::write_text, matching::Tiles, record};
+use crate::{
+    args::MatchArgs,
+    failure::Failure,
+    files::write_text,
+    matching::{Tiles, pairs::Pair},
+    record,
+};
 
 /// What `--json` prints and summary.json holds.
 #[derive(Serialize)]
@@ -31,7 +38,7 @@ pub(super) struct Summary {
     devices: Vec<record::Device>,
     /// Sums over all pairs.
     times: PairTimes,
-    /// The whole time, start-up and failures included.
+    /// The whole time, start-up and failures before the last pair that is done included.
     total_ms: f64,
     median_solve_ms: Option<f64>,
     pairs_per_second: Option<f64>,
@@ -40,8 +47,9 @@ pub(super) struct Summary {
     output: PathBuf,
 }
 
+/// A pair that could not be matched, and why.
 #[derive(Serialize)]
-struct Failed {
+pub(super) struct Failed {
     name: PathBuf,
     left: PathBuf,
     right: PathBuf,
@@ -54,12 +62,20 @@ pub(super) fn path(output: &Path, shard: Shard) -> PathBuf {
 }
 
 impl Summary {
-    /// The summary of a shard's pairs.
-    pub(super) fn of(args: &MatchArgs, shard: Shard, jobs: &[Job], skipped: usize) -> Result<Self, Failure> {
+    /// The summary of a shard's pairs, of which these have failed just now.
+    pub(super) fn of(
+        args: &MatchArgs,
+        shard: Shard,
+        jobs: &[Job],
+        skipped: usize,
+        failures: Vec<Failed>,
+    ) -> Result<Self, Failure> {
         let missing = |job: &Job| Failure::other(format!("{} is not there any more", job.record.display()));
         let read = |job: &Job| PairRecord::read(&job.record).ok_or_else(|| missing(job));
-        let records = jobs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        let done: Vec<&Done> = records.iter().filter_map(PairRecord::done).collect();
+        let failed: HashSet<&Path> = failures.iter().map(|failed| failed.name.as_path()).collect();
+        let succeeded = jobs.iter().filter(|job| !failed.contains(job.pair.name.as_path()));
+        let records = succeeded.map(read).collect::<Result<Vec<_>, _>>()?;
+        let done: Vec<&Done> = records.iter().map(|record| &record.done).collect();
         // From 0: the sum of no numbers is -0, and is written so.
         let sum = |time: fn(&PairTimes) -> f64| done.iter().fold(0.0, |sum, done| sum + time(&done.times));
         let times = PairTimes {
@@ -75,7 +91,7 @@ impl Summary {
             pairs: jobs.len(),
             done: done.len(),
             skipped,
-            failures: records.iter().filter_map(Failed::of).collect(),
+            failures,
             settings: distinct(done.iter().map(|done| &done.settings)),
             tiles: distinct(done.iter().filter_map(|done| done.tiles.as_ref())),
             devices: distinct(done.iter().map(|done| &done.device)),
@@ -126,10 +142,10 @@ impl Summary {
 }
 
 impl Failed {
-    fn of(record: &PairRecord) -> Option<Self> {
-        let Outcome::Failed(failure) = &record.outcome else { return None };
-        let PairRecord { name, left, right, .. } = record.clone();
-        Some(Self { name, left, right, failure: failure.clone() })
+    /// What is told of a pair that has failed.
+    pub(super) fn new(pair: &Pair, failure: &Failure) -> Self {
+        let Pair { name, left, right } = pair.clone();
+        Self { name, left, right, failure: failure.to_string() }
     }
 }
 
