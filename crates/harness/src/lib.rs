@@ -16,6 +16,7 @@ mod files;
 #[cfg(feature = "fuzzing")]
 pub mod fuzzing;
 mod gate;
+mod heap;
 mod interrupt;
 mod machine;
 mod matching;

@@ -12,13 +12,14 @@ use crate::{
     args::{Labels, MatchArgs, PlanArgs},
     failure::Failure,
     files::{PixelLimit, read_image},
-    interrupt,
+    heap, interrupt,
     matching::{self, Content, Making, Outputs, Report, Session, batch, labels, plan, warnings},
     note, threads,
 };
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
+    heap::return_large_buffers();
     plan::check_options(&args.plan)?;
     if args.finish.fill.is_some() && args.finish.check.is_none() && args.finish.speckle.is_none() {
         return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
