@@ -53,6 +53,8 @@ pub struct Survey {
     pub exchanged: bool,
     /// By how many rows corresponding rows are apart, where another offset than 0 is clearly better somewhere.
     pub rows: Option<RowOffsets>,
+    /// Whether both images are the same.
+    pub identical: bool,
     /// Whether there was enough to look at, and yet hardly any match: these are no two views of one scene.
     pub unlike: bool,
 }
@@ -71,6 +73,7 @@ impl Survey {
         let best = best.filter(|_| count >= LEAST_MATCHES && matched >= LEAST_SHARE);
         let negative = best.map_or(0, |best| best.found().filter(|&(_, _, disparity)| disparity < 0).count());
         Ok(Self {
+            identical: pair.left() == pair.right(),
             matched,
             seen: best.and_then(|best| SeenDisparities::of(best, factor)),
             exchanged: best.is_some() && negative as f64 >= NEARLY_ALL * count as f64,

@@ -30,7 +30,9 @@ pub(crate) use maps::{map_of, mask_of};
 pub(crate) use maps::{read_map, read_mask};
 pub(crate) use picture::{Picture, encode_picture};
 pub(crate) use ply::write_points;
-pub(crate) use sidecar::{Origin, sidecar_of, write_sidecar};
+pub(crate) use sidecar::{Origin, remove_sidecar, sidecar_of, write_sidecar};
+
+use serde::Serialize;
 
 use crate::failure::Failure;
 
@@ -95,12 +97,12 @@ fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
         .map_err(|error| Failure::writing(path, &error))
 }
 
-/// Fails where writing `output` would overwrite `other`.
-pub(crate) fn check_distinct(other: &Path, output: &Path) -> Result<(), Failure> {
+/// Fails where writing `output` would overwrite `other`; `what` says so in words.
+pub(crate) fn check_distinct(other: &Path, output: &Path, what: &str) -> Result<(), Failure> {
     if resolved(other) != resolved(output) {
         return Ok(());
     }
-    Err(Failure::usage(format!("{}: the same file is named twice and would be overwritten", output.display())))
+    Err(Failure::usage(format!("{} {what}; give another output", output.display())))
 }
 
 /// The path of a file without links and steps up, as far as there is one; by it, two names of a file are known as such.
@@ -111,6 +113,17 @@ pub(crate) fn resolved(path: &Path) -> PathBuf {
 /// Writes text as [`write_whole`] does.
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_whole(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Writes a value as JSON that people can read, as [`write_whole`] does.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Failure> {
+    write_text(path, &json_text(path, value)?)
+}
+
+/// The text of such a file.
+pub(crate) fn json_text(path: &Path, value: &impl Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| Failure::writing(path, &error))?;
+    Ok(text + "\n")
 }
 
 /// Writes a new file, whole or not at all; one that is there already stays as it is.
@@ -130,5 +143,8 @@ pub(crate) fn check_new(path: &Path) -> Result<(), Failure> {
 
 /// Creates a folder and those above it.
 pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
+    if path.exists() && !path.is_dir() {
+        return Err(Failure::writing(path, &"a file is there, where a folder is needed"));
+    }
     fs::create_dir_all(path).map_err(|error| Failure::writing(path, &error))
 }

@@ -28,8 +28,8 @@ pub(crate) struct FinishArgs {
     #[arg(long)]
     pub(crate) subpixel: bool,
     /// Also write how far the map can be trusted, from 0 to 1: the share of 9 x 9 pixels that agree with their middle
-    /// and with the right image's map. .pfm, .tif and .npy as 32-bit floats, .png 65535 times them. Matches the right
-    /// image too.
+    /// and with the right image's map, as matched; 0 where --check or --speckle made the disparity unknown, filled or
+    /// not. .pfm, .tif and .npy as 32-bit floats, .png 65535 times them. Matches the right image too.
     #[arg(long, value_name = "MAP")]
     pub(crate) confidence: Option<PathBuf>,
 }

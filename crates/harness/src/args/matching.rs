@@ -34,10 +34,10 @@ pub(crate) struct MatchArgs {
     pub(crate) max_megapixels: u32,
     /// Keep within so much memory, images and answer included: larger pairs are matched strip by strip or tile by tile.
     /// Bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024). [default: what is free]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", value_parser = memory)]
     pub(crate) max_memory: Option<ByteSize>,
-    /// Match the pair so many times and tell the time of each: the first ones are slower, a video is like the
-    /// later ones.
+    /// Match the pair so many times and tell the median time and the range (--json: each): the first ones are slower, a
+    /// video is like the later ones.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000), conflicts_with = "many")]
     pub(crate) repeat: u32,
     /// Ground truth of the left image: errors are measured where it is given.
@@ -82,7 +82,7 @@ pub(crate) struct PlanArgs {
     pub(crate) threads: Option<u16>,
     /// Number of labels; the largest disparity is the least plus labels - 1. auto takes labels and least disparity from
     /// a coarse look at the images. [default: a quarter of the width, rounded up to a multiple of 16]
-    #[arg(long, value_name = "N|auto", value_parser = labels)]
+    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = labels)]
     pub(crate) labels: Option<Labels>,
     /// Disparity of the first label in pixels; may be negative. [default: 0; with --labels auto what the images need]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
@@ -115,14 +115,15 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_parser = named(&[true, false], switch))]
     pub(crate) seed_start: Option<bool>,
     /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(crate) slope: Option<u8>,
     /// Truncation K of the smoothness cost. [default: the profile's]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
+    #[arg(long, value_name = "K", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
     pub(crate) truncation: Option<u8>,
     /// Weak edges: half slope and truncation where neighbouring grey values of the left image differ by more than N.
     /// [default: no edge is weak]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=254))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=254))]
     pub(crate) edge_threshold: Option<u8>,
 }
 
@@ -133,6 +134,11 @@ pub(crate) enum Labels {
     Auto,
     /// So many.
     Count(u16),
+}
+
+fn memory(text: &str) -> Result<ByteSize, String> {
+    let whole_or_with_unit = text.parse().ok().filter(|_| text.starts_with(|c: char| c.is_ascii_digit()));
+    whole_or_with_unit.ok_or_else(|| "must be a number of bytes, or such as 512M, 2G, 512MiB, 2GiB".to_owned())
 }
 
 fn labels(text: &str) -> Result<Labels, String> {
@@ -159,7 +165,7 @@ pub(crate) struct TruthArgs {
     #[arg(long, value_name = "MAP")]
     pub(crate) mask: Option<PathBuf>,
     /// What stored ground truth is divided by to give pixels; 0 is unknown. [default: floats 1, 8 bits 1, 16 bits 256]
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) scale: Option<f32>,
 }
 
@@ -171,7 +177,7 @@ pub(crate) struct EvaluateArgs {
     /// Ground truth, in the same formats.
     pub(crate) truth: PathBuf,
     /// What the map's stored values are divided by to give pixels; 0 is unanswered. [default: as for --scale]
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
     /// Print JSON.
     #[arg(long)]

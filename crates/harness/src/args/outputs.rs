@@ -31,9 +31,9 @@ pub(crate) struct OutputArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct MakingArgs {
-    /// Colours of the picture; unknown pixels are black.
-    #[arg(long, default_value = Colours::ALL[0].name(), value_parser = named(&Colours::ALL, Colours::name))]
-    pub(crate) colours: Colours,
+    /// Colours of the picture; unknown pixels are black. [default: viridis]
+    #[arg(long, value_parser = named(&Colours::ALL, Colours::name))]
+    pub(crate) colours: Option<Colours>,
     /// Leave out the bar with the disparities of the colours, so that the picture has the map's size.
     #[arg(long)]
     pub(crate) no_colour_bar: bool,
@@ -44,10 +44,10 @@ pub(crate) struct MakingArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["focal", "baseline", "doffs", "principal_point"])]
     pub(crate) calib: Option<PathBuf>,
     /// In place of --calib: focal length in pixels of these images.
-    #[arg(long, value_name = "PX", requires = "baseline", value_parser = positive_double)]
+    #[arg(long, value_name = "PX", requires = "baseline", allow_negative_numbers = true, value_parser = positive_double)]
     pub(crate) focal: Option<f64>,
     /// In place of --calib: distance of the cameras in millimetres.
-    #[arg(long, value_name = "MM", requires = "focal", value_parser = positive_double)]
+    #[arg(long, value_name = "MM", requires = "focal", allow_negative_numbers = true, value_parser = positive_double)]
     pub(crate) baseline: Option<f64>,
     /// Column of the right principal point less that of the left one, in pixels of these images; added to disparities
     /// before they give depth. [default: 0]
@@ -65,7 +65,7 @@ pub(crate) struct ConvertArgs {
     pub(crate) map: PathBuf,
     /// What the map's stored values are divided by to give pixels; 0 is unknown where they are whole numbers.
     /// [default: floats 1, 8 bits 1, 16 bits 256]
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
     /// The disparity map to write: the ending says in which format, as for bp match.
     #[arg(long, short, value_name = "MAP")]

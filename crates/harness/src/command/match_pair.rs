@@ -29,11 +29,15 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     if args.ground_truth.is_none() && truth_options {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
+    // Clap does not ask for --video where --pairs or two images stand in its place.
+    if args.many.warm_start.is_some() && args.many.video.is_none() {
+        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
+    }
     let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let confidence = args.finish.confidence.clone();
     let outputs = Outputs { confidence, ..Outputs::of(Some(&args.output), &args.outputs) };
-    let making = Making::of(&args.outputs.making)?;
+    let making = Making::of(&args.outputs)?;
     let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
     let limit = PixelLimit::megapixels(args.max_megapixels);
@@ -62,7 +66,7 @@ pub(crate) fn planned(
 ) -> Result<(Plan, Vec<String>), Failure> {
     let range = labels::range(args, size, survey, outputs);
     let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
-    let warnings = warnings::of(survey, &plan, files, range.is_none());
+    let warnings = warnings::of(args, survey, &plan, files, range.is_none());
     // Told first: exchanged images may be why the outputs cannot hold what is asked for.
     warnings.iter().for_each(|warning| note(&format!("warning: {warning}")));
     outputs.check_model(making, plan.model(), size)?;

@@ -11,7 +11,7 @@ use crate::{
     args::SpeedArgs,
     backends,
     failure::Failure,
-    files::{check_new, check_writable, create_folder, write_new},
+    files::{check_new, check_writable, create_folder, json_text, write_new},
     interrupt, note,
     speed::{self, CHART_NAMES, Outcome, Speed, charts},
     threads,
@@ -70,8 +70,7 @@ impl Files {
     }
 
     fn write(&self, speed: &Speed, page: &str) -> Result<(), Failure> {
-        let json = serde_json::to_string_pretty(speed).map_err(|error| Failure::writing(&self.record, &error))?;
-        write_new(&self.record, json + "\n")?;
+        write_new(&self.record, json_text(&self.record, speed)?)?;
         for chart in charts(speed) {
             let [text, picture] = self.chart(chart.name);
             let svg = chart.plot.svg().map_err(|error| Failure::writing(&text, &error))?;

@@ -6,15 +6,24 @@ use bp_core::{DisparityMap, Size};
 use image::ImageFormat;
 
 use super::{
-    PixelLimit,
+    PixelLimit, Quantity,
     images::{decoded, read_limited, stored_grey},
-    npy, pfm, tiff,
+    npy, pfm,
+    sidecar::{sidecar_of, told_quantity},
+    tiff,
 };
 use crate::failure::Failure;
 
 /// Reads a map. Stored whole numbers are divided by `scale`, by default 256 where they have 16 bits and 1 where they have
 /// 8; 0 is unknown. Floats are divided by `scale` where that is given; what is not finite is unknown.
+///
+/// A sidecar beside it that says it holds something else is believed.
 pub(crate) fn read_map(path: &Path, scale: Option<f32>, limit: PixelLimit) -> Result<DisparityMap, Failure> {
+    if let Some(quantity) = told_quantity(path).filter(|told| told != Quantity::Disparity.name()) {
+        let sidecar = sidecar_of(path);
+        let what = format!("it holds {quantity}, as {} tells, and disparities are needed", sidecar.display());
+        return Err(Failure::reading(path, &what));
+    }
     map_of(path, &read_limited(path, limit)?, scale, limit)
 }
 

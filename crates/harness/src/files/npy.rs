@@ -4,7 +4,7 @@ use std::{io::Write, path::Path};
 
 use bp_core::Size;
 
-use super::PixelLimit;
+use super::{PixelLimit, images::check_room};
 use crate::failure::Failure;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -54,6 +54,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<(Siz
     if data.len() != needed {
         return Err(failed(&format!("{} bytes of values where {size} pixels need {needed}", data.len())));
     }
+    check_room(path, 4 * size.pixels() as u64)?;
     Ok((size, data.chunks_exact(value.bytes).map(|bytes| value.read(bytes)).collect()))
 }
 

@@ -4,7 +4,7 @@ use std::{io::Write, path::Path};
 
 use bp_core::{DisparityMap, Size};
 
-use super::PixelLimit;
+use super::{PixelLimit, images::check_room};
 use crate::failure::Failure;
 
 /// What a file holds.
@@ -57,8 +57,11 @@ pub(super) fn parse(path: &Path, bytes: &[u8], limit: PixelLimit) -> Result<Pfm,
         let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
         if order < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
+    check_room(path, needed as u64)?;
     let rows = data.chunks_exact(4 * channels * size.width).rev();
-    Ok(Pfm { size, channels, values: rows.flat_map(|row| row.chunks_exact(4).map(value)).collect() })
+    let mut values = Vec::with_capacity(channels * size.pixels());
+    values.extend(rows.flat_map(|row| row.chunks_exact(4).map(value)));
+    Ok(Pfm { size, channels, values })
 }
 
 /// The four words of a PFM header, and what follows the one white space after them.

@@ -63,7 +63,8 @@ fn beside(left: &Pixels, right: &Pixels) -> Pixels {
             .get(begin..begin + picture.width as usize)
             .map_or_else(|| vec![[255; 3]; picture.width as usize], Vec::from)
     };
-    let colours = (0..height).flat_map(|y| [row(left, y), row(right, y)]).flatten().collect();
+    let mut colours = Vec::with_capacity(width as usize * height as usize);
+    colours.extend((0..height).flat_map(|y| [row(left, y), row(right, y)]).flatten());
     Pixels { width, height, colours }
 }
 

@@ -1,21 +1,44 @@
 //! What a map's file does not say of itself, as JSON beside it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use bp_core::Calibration;
 use serde::Serialize;
+use serde_json::Value;
 
-use super::{MapFormat, Raster, write_text};
+use super::{MapFormat, Raster, write_json};
 use crate::{failure::Failure, record};
 
 /// Version of the sidecar; changes with every change of meaning.
 const SCHEMA_VERSION: u32 = 1;
+
+/// What the program is called in it, before its version.
+const PROGRAM: &str = "bp ";
 
 /// The sidecar's path: the map's, and `.json`.
 pub(crate) fn sidecar_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".json");
     name.into()
+}
+
+/// What a map's sidecar says it holds; `None` where there is no sidecar of this program.
+pub(crate) fn told_quantity(path: &Path) -> Option<String> {
+    let sidecar: Value = serde_json::from_slice(&fs::read(sidecar_of(path)).ok()?).ok()?;
+    let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
+    Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
+}
+
+/// Removes the sidecar of a map, but not a file of somebody else's that has its name.
+pub(crate) fn remove_sidecar(path: &Path) -> Result<(), Failure> {
+    if told_quantity(path).is_none() {
+        return Ok(());
+    }
+    let sidecar = sidecar_of(path);
+    fs::remove_file(&sidecar).map_err(|error| Failure::writing(&sidecar, &error))
 }
 
 /// Where a map comes from.
@@ -97,7 +120,7 @@ pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_
     };
     let sidecar = Sidecar {
         schema_version: SCHEMA_VERSION,
-        program: format!("bp {}", env!("CARGO_PKG_VERSION")),
+        program: format!("{PROGRAM}{}", env!("CARGO_PKG_VERSION")),
         quantity: raster.quantity.name(),
         unit: raster.quantity.unit(),
         format: format.name(),
@@ -112,6 +135,5 @@ pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_
         plan: origin.plan,
         inputs: origin.inputs.iter().map(|path| path.display().to_string()).collect(),
     };
-    let text = serde_json::to_string_pretty(&sidecar).map_err(|error| Failure::writing(path, &error))?;
-    write_text(&sidecar_of(path), &(text + "\n"))
+    write_json(&sidecar_of(path), &sidecar)
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
     failure::Failure,
-    files::{create_folder, write_text},
+    files::{create_folder, write_json},
 };
 
 /// Version of the files; changes with every change of meaning.
@@ -51,6 +51,5 @@ pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, F
 pub(super) fn write(path: &Path, baseline: &impl Serialize) -> Result<(), Failure> {
     create_folder(path.parent().unwrap_or(Path::new(".")))?;
     let file = Versioned { schema_version: SCHEMA_VERSION, baseline };
-    let json = serde_json::to_string_pretty(&file).map_err(|error| Failure::writing(path, &error))?;
-    write_text(path, &(json + "\n"))
+    write_json(path, &file)
 }

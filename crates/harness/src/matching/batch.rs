@@ -34,7 +34,7 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     let found = pairs::find(args)?;
     found.notes.iter().for_each(|line| note(line));
     let shard = args.many.shard.unwrap_or_default();
-    let making = Making::of(&args.outputs.making)?;
+    let making = Making::of(&args.outputs)?;
     let jobs = job::jobs(args, &making, &found.pairs, shard)?;
     interrupt::listen()?;
     files::name_temporary(&format!(".bp-{}-", shard.file_part()));
@@ -93,10 +93,6 @@ fn check_warm_start(args: &MatchArgs) -> Result<(), Failure> {
         return Ok(());
     }
     let swept = args.plan.algorithm() == Algorithm::Sweep || args.plan.schedule == Some(Schedule::Sweep);
-    // Clap does not ask for --video where --pairs stands in its place.
-    if args.many.pairs.is_some() {
-        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
-    }
     if args.plan.labels == Some(Labels::Auto) {
         return Err(Failure::usage("--warm-start needs the same labels for all frames: give --labels a number"));
     }
@@ -113,7 +109,12 @@ fn check_warm_start(args: &MatchArgs) -> Result<(), Failure> {
 fn as_for_one(args: &MatchArgs) -> MatchArgs {
     let file = |what| args.many.also.contains(&what).then(PathBuf::new);
     MatchArgs {
-        outputs: OutputArgs { depth: file(Also::Depth), points: file(Also::Points), ..args.outputs.clone() },
+        outputs: OutputArgs {
+            picture: file(Also::Picture),
+            depth: file(Also::Depth),
+            points: file(Also::Points),
+            ..args.outputs.clone()
+        },
         finish: FinishArgs { confidence: file(Also::Confidence), ..args.finish.clone() },
         ..args.clone()
     }

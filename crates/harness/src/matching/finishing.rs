@@ -28,7 +28,7 @@ impl Sample {
 /// A map that is done.
 pub(super) struct Finished {
     pub(super) map: DisparityMap,
-    /// See [`maps::confidence`]; where it was asked for.
+    /// See [`maps::confidence`], 0 where the check or speckles made the disparity unknown; where it was asked for.
     pub(super) confidence: Option<Vec<f32>>,
     pub(super) sample: Sample,
 }
@@ -50,8 +50,13 @@ pub(super) fn finished<E: From<Error>>(
     let right = args.needs_right().then(|| matched(&pair.mirrored())).transpose()?.map(DisparityMap::mirrored);
     let left = matched(pair)?;
     let trust = right.as_ref().filter(|_| args.confidence.is_some());
-    let confidence = trust.map(|right| maps::confidence(&left, right)).transpose()?;
+    let mut confidence = trust.map(|right| maps::confidence(&left, right)).transpose()?;
     let finish: Finish = args.finish();
-    let map = finish.apply(left, right.as_ref())?;
+    let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
+    let judged = judge.apply(left, right.as_ref())?;
+    for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
+        *trust = 0.0;
+    }
+    let map = Finish { check: false, speckles: None, ..finish }.apply(judged, None)?;
     Ok(Finished { map, confidence, sample: Sample { matching, finishing: start.elapsed() - matching.total } })
 }

@@ -1,6 +1,6 @@
 //! What a match takes of memory, known before it begins, and how its plan is tiled to keep within.
 
-use bp_core::{Error, Plan, Schedule, Size, Tiling};
+use bp_core::{Error, Likeness, Plan, Schedule, Size, Tiling};
 
 use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, note};
 
@@ -74,9 +74,16 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         if args.messages_hash {
             return Err(Failure::out_of_memory("--messages-hash needs the whole image in memory at once"));
         }
+        if args.many.warm_start.is_some() {
+            let advice = "match without it, or allow more --max-memory";
+            return Err(Failure::out_of_memory(format!(
+                "--warm-start needs the whole image in memory at once; {advice}"
+            )));
+        }
         let bytes = |bytes| format!("{} bytes are needed", beside.peak(bytes));
         let whole = needed(plan).map_or_else(|error| error.to_string(), bytes);
-        note(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
+        let grade = if tiling.likeness() == Likeness::Same { "" } else { "warning: " };
+        note(&format!("{grade}for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
     }
     Ok(Fitted { tiling, peak_bytes })
 }
@@ -122,7 +129,7 @@ fn described(tiling: &Tiling) -> String {
 /// How many bytes the program may hold.
 struct Limit {
     bytes: u64,
-    /// Who says so.
+    /// Who says so, up to advice.
     reason: String,
 }
 
@@ -131,14 +138,14 @@ impl Limit {
     fn of(args: &MatchArgs, opened: &Opened, held: u64) -> Self {
         let there_is = machine::available_memory(opened.info.kind).map_or(u64::MAX, |free| free.saturating_add(held));
         match args.max_memory.map(|allowed| allowed.as_u64()).filter(|&allowed| allowed <= there_is) {
-            Some(bytes) => Self { bytes, reason: format!("--max-memory allows {bytes}") },
-            None => Self { bytes: there_is, reason: format!("there are {there_is}") },
+            Some(bytes) => Self { bytes, reason: format!("--max-memory allows {bytes}: raise it, or") },
+            None => Self { bytes: there_is, reason: format!("there are {there_is}:") },
         }
     }
 
     fn refuse(&self, plan: &Plan, needed: u64) -> Failure {
         let sweep = if plan.settings().schedule == Schedule::Sweep { "" } else { ", --algorithm sweep" };
         let advice = format!("fewer --labels{sweep} or smaller images need less");
-        Failure::out_of_memory(format!("at least {needed} bytes are needed and {}; {advice}", self.reason))
+        Failure::out_of_memory(format!("at least {needed} bytes are needed and {} {advice}", self.reason))
     }
 }

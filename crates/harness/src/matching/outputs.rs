@@ -1,19 +1,15 @@
 //! The files that are made of a map.
 
-use std::{
-    fs,
-    io::ErrorKind,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use bp_core::{Calibration, DisparityMap, Image, Model, Size, depth_map, points};
 
 use crate::{
-    args::{MakingArgs, OutputArgs},
+    args::OutputArgs,
     failure::Failure,
     files::{
-        Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
-        check_writable, sidecar_of, write_points, write_sidecar,
+        Colours, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
+        check_writable, remove_sidecar, sidecar_of, write_points, write_sidecar,
     },
     note, record,
 };
@@ -58,7 +54,9 @@ pub(crate) struct Content<'a> {
 
 impl Making {
     /// What the options ask for.
-    pub(crate) fn of(args: &MakingArgs) -> Result<Self, Failure> {
+    pub(crate) fn of(outputs: &OutputArgs) -> Result<Self, Failure> {
+        check_used(outputs)?;
+        let args = &outputs.making;
         let given = args.focal.zip(args.baseline).map(|(focal, baseline)| Geometry {
             focal,
             baseline,
@@ -67,7 +65,7 @@ impl Making {
             file: None,
         });
         let read = args.calib.as_deref().map(Geometry::read).transpose()?;
-        let picture = Picture { colours: args.colours, bar: !args.no_colour_bar };
+        let picture = Picture { colours: args.colours.unwrap_or(Colours::ALL[0]), bar: !args.no_colour_bar };
         Ok(Self { picture, sidecar: !args.no_sidecar, geometry: read.or(given) })
     }
 
@@ -98,9 +96,10 @@ impl Outputs {
         let outputs = self.paths(making);
         for (index, output) in outputs.iter().enumerate() {
             check_writable(output)?;
-            for other in inputs.iter().copied().chain(outputs[..index].iter().map(PathBuf::as_path)) {
-                check_distinct(other, output)?;
-            }
+            inputs.iter().try_for_each(|input| check_distinct(input, output, "is read, and would be overwritten"))?;
+            let others = outputs[..index].iter();
+            let twice = "would be written twice (beside a map goes MAP.json)";
+            others.clone().try_for_each(|other| check_distinct(other, output, twice))?;
         }
         self.maps().try_for_each(|map| MapFormat::of(map).map(drop))?;
         self.picture.as_deref().map_or(Ok(()), |picture| check_ending(picture, "a picture", "png"))?;
@@ -163,6 +162,21 @@ impl Outputs {
     }
 }
 
+/// Refuses options of files that are not asked for.
+fn check_used(OutputArgs { picture, depth, points, making }: &OutputArgs) -> Result<(), Failure> {
+    if picture.is_none() && (making.colours.is_some() || making.no_colour_bar) {
+        let what = "--colours and --no-colour-bar are for a picture";
+        return Err(Failure::usage(format!("{what}: give --picture too (of many pairs, --also picture)")));
+    }
+    if depth.is_none() && points.is_none() && (making.calib.is_some() || making.focal.is_some()) {
+        let what = "--calib and --focal are for depth and points";
+        return Err(Failure::usage(format!(
+            "{what}: give --depth or --points too (of many pairs, --also depth,points)"
+        )));
+    }
+    Ok(())
+}
+
 /// Writes a map, and what tells of it.
 fn write_map(
     path: &Path,
@@ -172,10 +186,11 @@ fn write_map(
     calibration: Option<&Calibration>,
 ) -> Result<(), Failure> {
     // What is told of the map before it must not stand beside the new one, even where this ends in between.
-    match fs::remove_file(sidecar_of(path)) {
-        Err(error) if error.kind() != ErrorKind::NotFound => return Err(Failure::writing(&sidecar_of(path), &error)),
-        _ => raster.write(path)?,
+    remove_sidecar(path)?;
+    if raster.range().is_none() {
+        note(&format!("warning: {}: nothing is known of any pixel", path.display()));
     }
+    raster.write(path)?;
     let origin = Origin { plan: content.plan, calibration, inputs: content.inputs };
     if making.sidecar { write_sidecar(path, raster, &origin) } else { Ok(()) }
 }

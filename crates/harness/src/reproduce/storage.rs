@@ -9,7 +9,7 @@ use jiff::{Timestamp, Zoned};
 
 use crate::{
     failure::Failure,
-    files::{create_folder, write_text},
+    files::{create_folder, write_json},
     machine, note,
     record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
@@ -130,7 +130,6 @@ impl Storage {
     pub(crate) fn save(&mut self) -> Result<(), Failure> {
         self.record.updated = Timestamp::now().to_string();
         let path = self.folder.join(RECORD_FILE);
-        let json = serde_json::to_string_pretty(&self.record).map_err(|error| Failure::writing(&path, &error))?;
-        write_text(&path, &(json + "\n"))
+        write_json(&path, &self.record)
     }
 }

@@ -147,7 +147,7 @@ fn contradictory_options_are_usage_errors_that_name_them() {
     folder.fails("match left.png right.png --output a.jpg", 2, &["a.jpg", ".pfm"]);
     folder.fails("match left.png right.png --output a.png --picture b.jpg", 2, &["b.jpg", ".png"]);
     folder.fails("match left.png right.png --output a.png --picture ./a.png", 2, &["a.png", "twice"]);
-    folder.fails("match left.png right.png --output ./left.png", 2, &["left.png", "twice"]);
+    folder.fails("match left.png right.png --output ./left.png", 2, &["left.png", "overwritten"]);
     folder.fails("reproduce --quick --synthetic --backend scalar,scalar:0", 2, &["--backend", "twice"]);
     folder.fails("reproduce --quick --synthetic --backend scalar --threads 2", 2, &["--threads 2", "rayon"]);
     folder.fails(

@@ -55,7 +55,7 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     );
     place(
         &folder,
-        &["in/d/im2.png", "in/d/im6.png", "in/d/im0.png", "in/d/im1.png", "in/e/Left.PNG", "in/e/right.png"],
+        &["in/d/im2.png", "in/d/im6.png", "in/d/im0.png", "in/d/im1.png", "in/e/left.PNG", "in/e/right.png"],
     );
     place(&folder, &["in/k/image_2/f2.png", "in/k/image_3/f2.png", "in/k/image_2/f10.png", "in/k/image_3/f10.png"]);
     place(&folder, &["in/k/image_0/f2.png", "in/k/image_1/f2.png", "in/k/image_2/f3.png"]);
@@ -63,7 +63,7 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     let output = folder.run(&format!("match --pairs in --output in/out {TINY}"));
     assert!(output.status.success(), "{}", text(&output.stderr));
     let expected =
-        ["a/view1", "b/im0", "c/imL", "d/im2", "e/Left", "k/image_0/f2", "k/image_2/f10", "k/image_2/f2", "v/left/1"];
+        ["a/view1", "b/im0", "c/imL", "d/im2", "e/left", "k/image_0/f2", "k/image_2/f10", "k/image_2/f2", "v/left/1"];
     assert_eq!(names(&folder.path("in/out")), expected);
     let told = text(&output.stderr);
     for words in ["image_2/f3.png", "l/view5.png has no view1.png", "m/left has no folder right"] {

@@ -106,6 +106,7 @@ fn depth_is_focal_length_times_baseline_through_disparity() {
     for format in ["pfm", "tif", "npy"] {
         succeeds(&folder, &format!("convert map.pfm --depth depth.{format} {GEOMETRY}"));
     }
+    folder.fails("convert depth.tif -o no.pfm", 3, &["depth.tif", "holds depth", "depth.tif.json"]);
     succeeds(&folder, &format!("convert map.pfm --depth depth.png {GEOMETRY}"));
     let (disparities, depths) = (floats(&folder.path("map.pfm")), floats(&folder.path("depth.pfm")));
     for (disparity, depth) in disparities.into_iter().zip(depths.iter().copied()) {
@@ -114,6 +115,7 @@ fn depth_is_focal_length_times_baseline_through_disparity() {
         assert!(exact, "{disparity} px: {depth} mm");
     }
     for other in ["depth.tif", "depth.npy"] {
+        fs::remove_file(folder.path(&format!("{other}.json"))).unwrap();
         succeeds(&folder, &format!("convert {other} -o back.pfm"));
         assert_eq!(floats(&folder.path("back.pfm")), depths, "{other}");
     }
@@ -123,6 +125,8 @@ fn depth_is_focal_length_times_baseline_through_disparity() {
     assert_eq!((&told["unit"], &told["calibration"]["doffs_px"]), (&"mm".into(), &45.5.into()));
     let warning = succeeds(&folder, "convert map.pfm --depth far.png --focal 1870 --baseline 160 --doffs 10.5");
     assert!(warning.contains("far.png") && warning.contains("65535"), "{warning}");
+    let warning = succeeds(&folder, "convert map.pfm --depth none.pfm --focal 1870 --baseline 160 --doffs -999");
+    assert!(warning.contains("none.pfm: nothing is known"), "{warning}");
 }
 
 #[test]
@@ -171,6 +175,9 @@ fn geometry_that_cannot_be_used_is_told_before_the_work() {
         ("--depth d.pfm --focal 9 --baseline nan", ["--baseline", "above 0"]),
         ("--depth d.pfm --focal 9 --baseline 9 --principal-point 3", ["--principal-point", "comma"]),
         ("--depth d.pfm --focal 9 --baseline 9 --calib calib.txt", ["--calib", "--focal"]),
+        ("--focal 9 --baseline 9", ["--focal", "--depth or --points"]),
+        ("--colours jet", ["--colours", "--picture"]),
+        ("--depth d.pfm --focal -9 --baseline 9", ["--focal", "above 0"]),
         ("--depth d.jpg --focal 9 --baseline 9", ["d.jpg", ".pfm"]),
         ("--points p.pcd --focal 9 --baseline 9", ["p.pcd", ".ply"]),
         ("--depth a.pfm --focal 9 --baseline 9", ["a.pfm", "twice"]),

@@ -207,7 +207,7 @@ fn what_is_no_record_of_ours_is_refused_by_name() {
     }
     assert!(!text(&folder.run("export --format csv field.json").stderr).contains('\u{1b}'));
     folder.fails("export --format csv empty.json", 3, &["empty.json", "bp reproduce"]);
-    folder.fails("export --format csv empty.json --output ./empty.json", 2, &["empty.json", "twice"]);
+    folder.fails("export --format csv empty.json --output ./empty.json", 2, &["empty.json", "overwritten"]);
 }
 
 #[test]

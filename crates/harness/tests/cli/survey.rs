@@ -51,10 +51,20 @@ fn wrong_pairs_and_labels_are_told_with_what_to_do() {
         ("a.png other.png", ["hardly anything in a.png and other.png matches", "different scenes"]),
         ("a.png b.png --labels 6", ["disparities from about 9 to 9 px", "raise --labels"]),
         ("a.png b.png --min-disparity 12", ["reach from 12 to", "lower --min-disparity"]),
+        ("a.png b.png --min-disparity 12 --labels auto", ["lower --min-disparity", "or leave it to --labels auto"]),
+        ("a.png b.png --min-disparity -30 --labels 9", ["raise --min-disparity", "or take --labels auto"]),
+        ("a.png a.png", ["a.png and a.png are the same image", "nearer"]),
+        ("a.png b.png --labels 100", ["100 labels for images 90 pixels wide", "the last ones match nowhere"]),
+        (
+            "a.png b.png --labels 120 --min-disparity -100",
+            ["for images 90 pixels wide", "the first ones match nowhere"],
+        ),
         ("a.png other.png --labels auto", ["--labels auto: too little", "the default is taken"]),
     ] {
         let told = warnings(&folder, arguments);
         assert!(words.iter().all(|word| told.contains(word)), "{arguments}: {told}");
     }
-    assert_eq!(warnings(&folder, "b.png a.png --labels 20 --min-disparity -15").matches("labels").count(), 0);
+    for fine in ["b.png a.png --labels 20 --min-disparity -15", "a.png b.png --labels 100 --min-disparity -80"] {
+        assert_eq!(warnings(&folder, fine), "");
+    }
 }

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use crate::{
     args::{MakingArgs, ManyArgs, MatchArgs, OutputArgs, PlanArgs},
     failure::Failure,
-    files::{hex, write_text},
+    files::{hex, write_json},
     matching::{Making, Tiles},
     record,
 };
@@ -82,8 +82,7 @@ impl PairRecord {
 
     /// Writes it, whole or not at all.
     pub(super) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| Failure::writing(path, &error))?;
-        write_text(path, &(text + "\n"))
+        write_json(path, self)
     }
 
     /// Whether its images and outputs are still these files, as they were.

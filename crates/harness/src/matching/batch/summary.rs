@@ -16,7 +16,7 @@ use super::{
 use crate::{
     args::MatchArgs,
     failure::Failure,
-    files::write_text,
+    files::write_json,
     matching::{Tiles, pairs::Pair},
     record,
 };
@@ -106,8 +106,7 @@ impl Summary {
 
     /// Writes it.
     pub(super) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| Failure::writing(path, &error))?;
-        write_text(path, &(text + "\n"))
+        write_json(path, self)
     }
 
     /// The summary as text.
