@@ -230,6 +230,7 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
         let run = format!("match --video l%d r%d --output no --warm-start {options}");
         folder.fails(&run, 2, &["--warm-start", "cfbp", "--check"]);
     }
+    folder.fails("match left.png right.png -o no.pfm --warm-start", 2, &["--warm-start needs --video"]);
     let cold = "--output no --algorithm cfbp --half-steps 4 --warm-start";
     folder.fails(&format!("match --pairs . {cold}"), 2, &["--warm-start needs --video"]);
     folder.fails(&format!("match --video l%d r%d {cold} --labels auto"), 2, &["--labels a number"]);

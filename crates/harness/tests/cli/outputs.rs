@@ -255,3 +255,26 @@ fn floats_are_images_only_within_a_known_range() {
     folder.fails("match map.tif right.png -o a.pfm", 3, &["map.tif", "PFM"]);
     folder.fails("match map.npy right.png -o a.pfm", 3, &["map.npy", "known format"]);
 }
+
+#[test]
+fn only_sidecars_of_this_program_are_removed() {
+    let folder = Folder::new();
+    fs::write(folder.path("a.pfm.json"), "{\"mine\": 1}").unwrap();
+    succeeds(&folder, &format!("{MATCH} a.pfm --no-sidecar"));
+    assert_eq!(fs::read(folder.path("a.pfm.json")).unwrap(), b"{\"mine\": 1}");
+    succeeds(&folder, &format!("{MATCH} b.pfm"));
+    assert!(folder.path("b.pfm.json").exists());
+    succeeds(&folder, &format!("{MATCH} b.pfm --no-sidecar"));
+    assert!(!folder.path("b.pfm.json").exists());
+}
+
+#[test]
+fn what_the_check_made_unknown_is_not_trusted() {
+    let folder = Folder::new();
+    succeeds(&folder, &format!("{MATCH} holes.pfm --check left-right --fill off --confidence c.pfm"));
+    succeeds(&folder, &format!("{MATCH} filled.pfm --check left-right --median 3 --confidence same.pfm"));
+    let (map, trust) = (floats(&folder.path("holes.pfm")), floats(&folder.path("c.pfm")));
+    assert!(map.iter().any(|value| !value.is_finite()) && trust.iter().any(|&trust| trust > 0.9));
+    assert!(map.iter().zip(&trust).all(|(value, &trust)| value.is_finite() || trust == 0.0));
+    assert_eq!(floats(&folder.path("same.pfm")), trust);
+}

@@ -34,6 +34,15 @@ fn only_what_changed_is_done_again() {
     let bytes = fs::read(folder.path("in/left/1.png")).unwrap();
     fs::write(folder.path("in/left/1.png"), bytes).unwrap();
     assert_eq!(done(""), 0);
+    // As `cp --preserve` does: other contents of equal length and time.
+    let (path, times) = (folder.path("in/left/3.png"), fs::metadata(folder.path("in/left/3.png")).unwrap());
+    let other = fs::read(&path).unwrap().into_iter().rev().collect::<Vec<_>>();
+    let whole = fs::read(&path).unwrap();
+    for (contents, ended) in [(other, Some(3)), (whole, Some(0))] {
+        fs::write(&path, contents).unwrap();
+        fs::File::options().write(true).open(&path).unwrap().set_modified(times.modified().unwrap()).unwrap();
+        assert_eq!(folder.run(&format!("match --pairs in --output out {TINY}")).status.code(), ended);
+    }
     fs::remove_file(folder.path("out/left/1.pfm")).unwrap();
     fs::write(folder.path("out/left/3.pfm"), "").unwrap();
     assert_eq!((done(""), done("")), (2, 0));

@@ -27,6 +27,15 @@ fn a_memory_limit_is_kept_by_strips_then_by_tiles_or_refused() {
     let (told, report) = (text(&output.stderr), text(&output.stdout));
     assert!(told.contains("tiles of up to") && report.contains("nearly the whole image's answer"), "{told}{report}");
     folder.fails(&format!("{again} --messages-hash"), 6, &["--messages-hash"]);
+    // Tiles keep no messages for the next frame; of many pairs, the one read and the one written count too.
+    for (from, to) in [("high-left.png", "l1.png"), ("high-right.png", "r1.png")] {
+        fs::copy(folder.path(from), folder.path(to)).unwrap();
+    }
+    let video = "--algorithm cfbp --half-steps 2";
+    let limit = peak(&run(&format!("--output d.pfm {video}"))) + 20 * 430 * 600;
+    let video = format!("match --video l%d.png r%d.png --output video {video} --labels 8 --max-memory {limit}");
+    folder.json(&format!("{video} --json"));
+    folder.fails(&format!("{video} --warm-start"), 3, &["--warm-start needs the whole image"]);
     let words = ["at least", "--max-memory allows 99999", "--labels"];
     folder.fails("match high-left.png high-right.png --labels 8 -o c.pfm --max-memory 99999", 6, &words);
     folder.fails(

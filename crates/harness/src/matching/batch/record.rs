@@ -25,6 +25,8 @@ pub(super) struct FileState {
     bytes: u64,
     /// Nanoseconds since 1970, where the file system tells.
     modified_ns: Option<u64>,
+    /// The same of the last change in any way, which `cp --preserve` and `tar` do not set back.
+    changed_ns: Option<i128>,
     sha256: String,
 }
 
@@ -104,7 +106,7 @@ impl FileState {
     pub(super) fn of(path: &Path) -> io::Result<Self> {
         let path = std::path::absolute(path)?;
         let mut file = File::open(&path)?;
-        let (bytes, modified_ns) = Self::stamp(&file.metadata()?);
+        let (bytes, modified_ns, changed_ns) = Self::stamp(&file.metadata()?);
         let mut hash = Sha256::new();
         let mut part = vec![0; 1 << 16];
         loop {
@@ -113,23 +115,32 @@ impl FileState {
                 bytes => hash.update(&part[..bytes]),
             }
         }
-        Ok(Self { path, bytes, modified_ns, sha256: hex(&hash.finalize()) })
+        Ok(Self { path, bytes, modified_ns, changed_ns, sha256: hex(&hash.finalize()) })
     }
 
     /// Whether `path` holds the same. A file that was not written to since is not read again.
     fn is_still(&self, path: &Path) -> bool {
         let Ok(metadata) = fs::metadata(path) else { return false };
-        let (bytes, modified_ns) = Self::stamp(&metadata);
+        let (bytes, modified_ns, changed_ns) = Self::stamp(&metadata);
         let same_file = std::path::absolute(path).is_ok_and(|path| path == self.path);
-        let untouched = same_file && modified_ns.is_some() && modified_ns == self.modified_ns;
+        let same_times = (modified_ns, changed_ns) == (self.modified_ns, self.changed_ns);
+        let untouched = same_file && modified_ns.is_some() && same_times;
         let same_contents = || Self::of(path).is_ok_and(|now| now.sha256 == self.sha256);
         metadata.is_file() && bytes == self.bytes && (untouched || same_contents())
     }
 
-    fn stamp(metadata: &fs::Metadata) -> (u64, Option<u64>) {
+    /// Length and times of a file.
+    fn stamp(metadata: &fs::Metadata) -> (u64, Option<u64>, Option<i128>) {
+        #[cfg(unix)]
+        let changed_ns = {
+            use std::os::unix::fs::MetadataExt;
+            Some(i128::from(metadata.ctime()) * 1_000_000_000 + i128::from(metadata.ctime_nsec()))
+        };
+        #[cfg(not(unix))]
+        let changed_ns = None;
         let since = |time: SystemTime| time.duration_since(SystemTime::UNIX_EPOCH).ok();
         let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
-        (metadata.len(), metadata.modified().ok().and_then(since).and_then(nanoseconds))
+        (metadata.len(), metadata.modified().ok().and_then(since).and_then(nanoseconds), changed_ns)
     }
 }
 
