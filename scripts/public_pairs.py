@@ -1,9 +1,12 @@
-"""What scripts share that run `bp match` on the public pairs: pairs, runs, errors, tables."""
-import argparse, datetime, json, os, pathlib, platform, statistics, subprocess
+"""What scripts share that run `bp`: the program, the public pairs, runs, errors, tables."""
+import argparse, datetime, importlib.util, json, os, pathlib, platform, statistics, subprocess, sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 BP = TARGET / "release" / "bp"
+VENV = TARGET / "opencv-venv"
+BESIDE = ROOT.parent / "shared" / "data"
+DATA = pathlib.Path(os.environ.get("BP_DATA") or (BESIDE if BESIDE.is_dir() else "data"))
 TIMED = 3  # matches of each round, after one that is not timed
 
 # Pair: labels, then left, right, truth, and what tells the visible pixels, in the data folder.
@@ -19,11 +22,20 @@ THIRDS = {name: (80, f"{NEW}-thirdsize/{name}", NEW_FILES) for name in NAMES}
 
 def parser(description):
     made = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    beside = ROOT.parent / "shared" / "data"
-    data = os.environ.get("BP_DATA") or (beside if beside.is_dir() else "data")
-    made.add_argument("--data", default=data, type=pathlib.Path, help="data folder [BP_DATA, else %(default)s]")
+    made.add_argument("--data", default=DATA, type=pathlib.Path, help="data folder [BP_DATA, else %(default)s]")
     made.add_argument("--output", metavar="FILE.json", type=pathlib.Path, help="also write everything as JSON")
     return made
+
+
+def enter_venv(folder):
+    """Goes on in the virtual environment, made where it is missing."""
+    python = folder / "bin" / "python"
+    if pathlib.Path(sys.prefix).resolve() != folder.resolve():
+        if not python.exists():
+            subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+        os.execv(python, [python, *sys.argv])
+    if not all(importlib.util.find_spec(name) for name in ("cv2", "numpy")):
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "opencv-python-headless", "numpy"], check=True)
 
 
 def build():

@@ -94,7 +94,8 @@ fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     builder
         .prefix(TEMPORARY.get().map_or(".bp-", |prefix| prefix))
         .tempfile_in(folder)
-        .map_err(|error| Failure::writing(path, &error))
+        // Its own words name the temporary file.
+        .map_err(|error| Failure::writing(path, &error.kind()))
 }
 
 /// Fails where writing `output` would overwrite `other`; `what` says so in words.
