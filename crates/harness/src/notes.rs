@@ -5,13 +5,17 @@ use std::{
     io::{self, Write},
     sync::{
         Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
     },
 };
 
 use crate::interrupt;
 
+/// How many warnings are told: a video may have one for every frame.
+const MOST_WARNINGS: usize = 20;
+
 static QUIET: AtomicBool = AtomicBool::new(false);
+static WARNED: AtomicUsize = AtomicUsize::new(0);
 static NOTED: Mutex<Option<HashSet<String>>> = Mutex::new(None);
 
 /// Tells nothing but errors where `quiet`; logs what the environment variable RUST_LOG asks for, by default nothing.
@@ -49,10 +53,26 @@ pub(crate) fn tell(line: &str) {
     interrupt::beside_bar(|| drop(writeln!(io::stderr(), "{line}")));
 }
 
-/// Tells a note or warning, unless only errors are wanted; one that many pairs give rise to only once.
+/// Tells a note, unless only errors are wanted; one that many pairs give rise to only once.
 pub(crate) fn note(line: &str) {
-    let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
-    if !is_quiet() && noted.get_or_insert_default().insert(line.to_owned()) {
+    if is_new(line) && !is_quiet() {
         tell(line);
     }
+}
+
+/// Tells a warning likewise, and of many pairs only the first ones.
+pub(crate) fn warn(what: &str) {
+    if is_new(what) {
+        match WARNED.fetch_add(1, Ordering::Relaxed) {
+            ..MOST_WARNINGS => note(&format!("warning: {what}")),
+            MOST_WARNINGS => {
+                note("further warnings are not told; the records of pairs have those of images and labels")
+            }
+            _ => {}
+        }
+    }
+}
+
+fn is_new(line: &str) -> bool {
+    NOTED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default().insert(line.to_owned())
 }

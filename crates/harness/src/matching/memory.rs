@@ -2,7 +2,7 @@
 
 use bp_core::{Error, Likeness, Plan, Schedule, Size, Tiling};
 
-use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, note};
+use crate::{args::MatchArgs, backends::Opened, failure::Failure, machine, note, warn};
 
 /// What the program takes itself, with stacks of threads and what allocators keep.
 const PROGRAM: u64 = 16 << 20;
@@ -82,8 +82,8 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         }
         let bytes = |bytes| format!("{} bytes are needed", beside.peak(bytes));
         let whole = needed(plan).map_or_else(|error| error.to_string(), bytes);
-        let grade = if tiling.likeness() == Likeness::Same { "" } else { "warning: " };
-        note(&format!("{grade}for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
+        let tell = if tiling.likeness() == Likeness::Same { note } else { warn };
+        tell(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
     }
     Ok(Fitted { tiling, peak_bytes })
 }

@@ -11,7 +11,7 @@ use crate::{
         Colours, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
         check_writable, remove_sidecar, sidecar_of, write_points, write_sidecar,
     },
-    note, record,
+    record, warn,
 };
 
 /// Where the files of one map go.
@@ -188,7 +188,7 @@ fn write_map(
     // What is told of the map before it must not stand beside the new one, even where this ends in between.
     remove_sidecar(path)?;
     if raster.range().is_none() {
-        note(&format!("warning: {}: nothing is known of any pixel", path.display()));
+        warn(&format!("{}: nothing is known of any pixel", path.display()));
     }
     raster.write(path)?;
     let origin = Origin { plan: content.plan, calibration, inputs: content.inputs };
@@ -202,7 +202,7 @@ fn write_depth(path: &Path, making: &Making, content: &Content<'_>, calibration:
         let unknown = depths.iter_mut().filter(beyond).map(|depth| *depth = DisparityMap::UNKNOWN).count();
         if unknown > 0 {
             let what = "pixels are farther than the 65535 mm that a 16-bit PNG holds, and unknown there";
-            note(&format!("warning: {}: {unknown} {what}", path.display()));
+            warn(&format!("{}: {unknown} {what}", path.display()));
         }
     }
     let raster = Raster { size: content.map.size(), values: &depths, quantity: Quantity::Depth };

@@ -68,3 +68,18 @@ fn wrong_pairs_and_labels_are_told_with_what_to_do() {
         assert_eq!(warnings(&folder, fine), "");
     }
 }
+
+#[test]
+fn of_many_pairs_only_the_first_warnings_are_told_and_records_have_all() {
+    let folder = views();
+    let mut list = String::new();
+    for pair in 0..25 {
+        std::fs::copy(folder.path("b.png"), folder.path(&format!("b{pair}.png"))).unwrap();
+        list += &format!("b{pair}.png a.png\n");
+    }
+    std::fs::write(folder.path("list"), list).unwrap();
+    let told = text(&folder.run("match --pairs list --output out").stderr);
+    assert_eq!((told.matches("look exchanged").count(), told.matches("further warnings").count()), (20, 1), "{told}");
+    let last = std::fs::read_to_string(folder.path("out/records/b24.json")).unwrap();
+    assert!(last.contains("b24.png and a.png look exchanged"), "{last}");
+}
