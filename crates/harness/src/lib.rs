@@ -35,7 +35,7 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
-use notes::{note, tell, warn};
+use notes::{note, tell, warn, warn_of_pair};
 
 /// Runs the program; the exit codes are documented in `bp --help`.
 #[must_use]

@@ -11,7 +11,7 @@ use std::{
 
 use crate::interrupt;
 
-/// How many warnings are told: a video may have one for every frame.
+/// How many warnings of pairs are told: a video may have one for every frame.
 const MOST_WARNINGS: usize = 20;
 
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -55,24 +55,22 @@ pub(crate) fn tell(line: &str) {
 
 /// Tells a note, unless only errors are wanted; one that many pairs give rise to only once.
 pub(crate) fn note(line: &str) {
-    if is_new(line) && !is_quiet() {
+    let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
+    if !is_quiet() && noted.get_or_insert_default().insert(line.to_owned()) {
         tell(line);
     }
 }
 
-/// Tells a warning likewise, and of many pairs only the first ones.
+/// Tells a warning likewise.
 pub(crate) fn warn(what: &str) {
-    if is_new(what) {
-        match WARNED.fetch_add(1, Ordering::Relaxed) {
-            ..MOST_WARNINGS => note(&format!("warning: {what}")),
-            MOST_WARNINGS => {
-                note("further warnings are not told; the records of pairs have those of images and labels")
-            }
-            _ => {}
-        }
-    }
+    note(&format!("warning: {what}"));
 }
 
-fn is_new(line: &str) -> bool {
-    NOTED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default().insert(line.to_owned())
+/// Tells a warning that names its pair; of many pairs only the first ones.
+pub(crate) fn warn_of_pair(what: &str) {
+    match WARNED.fetch_add(1, Ordering::Relaxed) {
+        ..MOST_WARNINGS => warn(what),
+        MOST_WARNINGS => note("further warnings of images and labels are not told; the pairs' records have them"),
+        _ => {}
+    }
 }

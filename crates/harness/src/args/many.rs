@@ -34,7 +34,8 @@ pub(crate) struct ManyArgs {
     pub(crate) shard: Option<Shard>,
     /// Start the messages of each frame from those of the frame before, on the full grid alone: faster, and as accurate
     /// where little moves. Every N-th frame starts anew; from it to the next such one frames are matched or resumed
-    /// together. Needs --schedule sync or checkerboard, as --algorithm cfbp --half-steps 10 has, and one view: no --check, no --also confidence.
+    /// together. Needs --schedule sync or checkerboard, as --algorithm cfbp --half-steps 10 has, and one view: no
+    /// --check, no --also confidence.
     #[arg(long, value_name = "N", requires = "video", num_args = 0..=1, require_equals = true,
           default_missing_value = "30", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     pub(crate) warm_start: Option<u32>,

@@ -28,7 +28,7 @@ pub(crate) struct OutputArgs {
 }
 
 /// How files are made: the same for every pair.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct MakingArgs {
     /// Colours of the picture; unknown pixels are black. [default: viridis]

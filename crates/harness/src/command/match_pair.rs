@@ -14,7 +14,7 @@ use crate::{
     files::{PixelLimit, read_image},
     heap, interrupt,
     matching::{self, Content, Making, Outputs, Report, Session, batch, labels, plan, warnings},
-    note, threads, warn,
+    note, threads, warn_of_pair,
 };
 
 /// Runs the command.
@@ -68,7 +68,7 @@ pub(crate) fn planned(
     let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
     let warnings = warnings::of(args, survey, &plan, files, range.is_none());
     // Told first: exchanged images may be why the outputs cannot hold what is asked for.
-    warnings.iter().for_each(|warning| warn(warning));
+    warnings.iter().for_each(|warning| warn_of_pair(warning));
     outputs.check_model(making, plan.model(), size)?;
     Ok((plan, warnings))
 }

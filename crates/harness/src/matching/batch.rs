@@ -41,7 +41,7 @@ pub(crate) fn match_all(args: &MatchArgs) -> Result<(), Failure> {
     let _lock = shard.lock(&args.output.join(job::RECORDS))?;
     job::clear_leftovers(args, &jobs, shard)?;
     let settings = record::settings_sha256(args, &making);
-    let is_complete = |chain: &&[Job]| !args.many.force && chain.iter().all(|job| job.is_complete(&settings));
+    let is_complete = |chain: &&[Job]| !args.many.force && job::are_complete(chain, &settings);
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
     due.iter().try_for_each(|job| job.check(&making))?;

@@ -8,8 +8,7 @@ use bp_core::{
 use super::Outputs;
 use crate::args::{Labels, PlanArgs};
 
-/// The labels that the options ask for. `None` where auto finds none: the
-/// default is [`default`].
+/// The labels that the options ask for. `None` where auto finds none: the default is [`default`].
 pub(crate) fn range(args: &PlanArgs, size: Size, survey: &Survey, outputs: &Outputs) -> Option<DisparityRange> {
     let min_disparity = args.min_disparity.unwrap_or(0);
     match (args.labels, survey.seen) {

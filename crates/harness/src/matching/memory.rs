@@ -59,7 +59,7 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         let kept = if tile.image_size() == plan.image_size() { beside.finishing } else { 0 };
         Ok(opened.device.planned_bytes(tile).saturating_add(kept))
     };
-    let room = limit.bytes.saturating_sub(beside.held);
+    let room = limit.bytes.saturating_sub(beside.held + beside.coming);
     let tiling = match Tiling::within(plan, room, &needed) {
         Err(Error::OutOfMemory { needed, available, .. }) if available == Some(room) => {
             return Err(limit.refuse(plan, beside.peak(needed)));
@@ -90,8 +90,10 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
 
 /// Bytes that are needed beside those of tiles.
 struct Beside {
-    /// All the time.
+    /// Already now, and all the time.
     held: u64,
+    /// Soon, and at any time from then on.
+    coming: u64,
     /// Once the labels are there. Their energy needs less than what comes later.
     finishing: u64,
 }
@@ -109,14 +111,15 @@ impl Beside {
         let trust = if finish.confidence.is_some() { TRUST } else { 0 };
         let others = if args.many.is_given() { READING + PAIR + MAP + trust + depth + WRITING } else { 0 };
         Self {
-            held: PROGRAM + a_pixel(PAIR + truth + right + others),
+            held: PROGRAM + a_pixel(PAIR + truth),
+            coming: a_pixel(right + others),
             finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),
         }
     }
 
     /// Most bytes that are held, where tiles need so many.
     fn peak(&self, tiles: u64) -> u64 {
-        self.held.saturating_add(tiles.max(self.finishing))
+        (self.held + self.coming).saturating_add(tiles.max(self.finishing))
     }
 }
 

@@ -212,6 +212,22 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
         [4, 3]
     );
     assert_eq!(maps(&folder.path("shared")), whole);
+    // A chain whose first frame was another when it was begun is done again, though that frame is complete.
+    let (new, old) = (fs::read(folder.path("v/left/5.png")).unwrap(), fs::read(folder.path("v/left/0.png")).unwrap());
+    run("cut", "--warm-start=3");
+    let records: Vec<_> = [1, 2].map(|frame| format!("cut/records/{frame}.json")).into();
+    let kept: Vec<_> = records.iter().map(|record| fs::read(folder.path(record)).unwrap()).collect();
+    let maps_before: Vec<_> = [1, 2].map(|frame| fs::read(folder.path(&format!("cut/{frame}.pfm"))).unwrap()).into();
+    fs::write(folder.path("v/left/0.png"), new).unwrap();
+    run("cut", "--warm-start=3");
+    let anew = maps(&folder.path("cut"));
+    for ((record, kept), (frame, map)) in records.iter().zip(kept).zip([1, 2].into_iter().zip(maps_before)) {
+        fs::write(folder.path(record), kept).unwrap();
+        fs::write(folder.path(&format!("cut/{frame}.pfm")), map).unwrap();
+    }
+    assert_eq!(run("cut", "--warm-start=3")["skipped"], 4);
+    assert_eq!(maps(&folder.path("cut")), anew);
+    fs::write(folder.path("v/left/0.png"), old).unwrap();
     // The frames after one that is gone start from another one's messages.
     fs::rename(folder.path("v/left/1.png"), folder.path("v/left_1.png")).unwrap();
     assert_eq!(run("warm", "--warm-start=3")["skipped"], 0);

@@ -58,9 +58,11 @@ fn only_what_changed_is_done_again() {
     assert_eq!((with("calib.txt"), with("./calib.txt")), (3, 0));
     calibration(101);
     assert_eq!((with("calib.txt"), done("--slope 3 --also picture")), (3, 3));
+    // What a default says, said.
+    assert_eq!(done("--slope 3 --also picture --colours viridis"), 0);
     fs::rename(folder.path("out"), folder.path("moved")).unwrap();
-    fs::rename(folder.path("moved"), folder.path("out")).unwrap();
-    assert_eq!(done("--slope 3 --also picture"), 0);
+    let moved = folder.json(&format!("match --pairs in --output moved --json {TINY} --slope 3 --also picture"));
+    assert_eq!(moved["skipped"], 3);
 }
 
 #[test]
@@ -117,6 +119,10 @@ fn what_an_earlier_command_wrote_besides_is_removed() {
     fs::write(folder.path("out/a.mine.png"), "").unwrap();
     assert_eq!(written("--slope 3 --format npy"), ["a.mine.png", "a.npy", "a.npy.json"]);
     assert_eq!(written("--slope 3 --format npy --no-sidecar"), ["a.mine.png", "a.npy"]);
+    // Of a pair whose map is named as another one's picture.
+    written("--format png --also picture");
+    fs::write(folder.path("list"), "left.png right.png a.picture\nleft.png right.png a\n").unwrap();
+    assert_eq!(written("--format png"), ["a.mine.png", "a.picture.png", "a.picture.png.json", "a.png", "a.png.json"]);
 }
 
 #[test]

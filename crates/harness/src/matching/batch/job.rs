@@ -11,7 +11,7 @@ use std::{
 
 use super::{
     Shard,
-    record::{FileState, PairRecord},
+    record::{FileState, PairRecord, history},
     summary,
 };
 use crate::{
@@ -37,8 +37,6 @@ pub(super) struct Job {
     pub(super) record: PathBuf,
     /// Which of the pairs that are done together it belongs to.
     pub(super) chain: usize,
-    /// The one among them before it, whose messages its own start from, by its name.
-    pub(super) follows: Option<PathBuf>,
 }
 
 /// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
@@ -46,7 +44,7 @@ pub(super) struct Job {
 pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Shard) -> Result<Vec<Job>, Failure> {
     // An ending that stands for no format is the fault of none of the pairs.
     MapFormat::of(&Path::new("NAME").with_added_extension(&args.many.format))?;
-    let jobs: Vec<Job> = (0..pairs.len()).map(|index| Job::new(args, making, pairs, index)).collect();
+    let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(args, making, index, pair)).collect();
     check_apart(args, &jobs)?;
     let jobs: Vec<Job> = jobs.into_iter().filter(|job| shard.has(job.chain)).collect();
     folders(args, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
@@ -54,8 +52,7 @@ pub(super) fn jobs(args: &MatchArgs, making: &Making, pairs: &[Pair], shard: Sha
 }
 
 impl Job {
-    fn new(args: &MatchArgs, making: &Making, pairs: &[Pair], index: usize) -> Self {
-        let (pair, chain) = (&pairs[index], args.many.chain());
+    fn new(args: &MatchArgs, making: &Making, index: usize, pair: &Pair) -> Self {
         let named = |ending: &str| args.output.join(&pair.name).with_added_extension(ending);
         let also = |what: Also, ending: &str| args.many.also.contains(&what).then(|| named(ending));
         let outputs = Outputs {
@@ -67,9 +64,8 @@ impl Job {
         };
         let record = args.output.join(RECORDS).join(&pair.name).with_added_extension("json");
         let paths = outputs.paths(making);
-        let follows = (!index.is_multiple_of(chain)).then(|| pairs[index - 1].name.clone());
-        let calibration = args.outputs.making.calib.clone();
-        Self { pair: pair.clone(), calibration, outputs, paths, record, chain: index / chain, follows }
+        let (calibration, chain) = (args.outputs.making.calib.clone(), index / args.many.chain());
+        Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
     }
 
     /// The two images.
@@ -82,25 +78,17 @@ impl Job {
         self.images().into_iter().chain(self.calibration.as_deref()).collect()
     }
 
-    /// Whether nothing is to be done.
-    pub(super) fn is_complete(&self, settings_sha256: &str) -> bool {
-        PairRecord::read(&self.record).is_some_and(|record| {
-            record.settings_sha256 == settings_sha256
-                && record.follows == self.follows
-                && record.is_of(&self.images(), &self.paths)
-        })
-    }
-
     /// Fails where an output cannot be written.
     pub(super) fn check(&self, making: &Making) -> Result<(), Failure> {
         self.outputs.check(making, &self.inputs())
     }
 
-    /// Removes what an earlier command has written of it and this one does not: beside the new map it would be taken for
+    /// Removes what an earlier command has written of it and this one has not: beside the new map it would be taken for
     /// the map's.
     pub(super) fn remove_others(&self) {
         let Some(earlier) = PairRecord::read(&self.record) else { return };
-        self.earlier_outputs(&earlier).filter(|path| !self.paths.contains(path)).for_each(remove);
+        let written: HashSet<OsString> = self.paths.iter().map(|path| key(path)).collect();
+        self.earlier_outputs(&earlier).filter(|path| !written.contains(&key(path))).for_each(remove);
     }
 
     /// Removes what an earlier command has made of other images than these, which failed now: it would be taken for
@@ -112,10 +100,13 @@ impl Job {
         }
     }
 
-    /// The outputs that a record tells of, where they are now: all of a pair are in one folder, which may have been moved.
+    /// The outputs that a record tells of, where they are now, as they were: all of a pair are in one folder, which may
+    /// have been moved, and one of such a name may be another pair's by now, or the user's.
     fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = PathBuf> {
-        let names = earlier.done.outputs.iter().filter_map(|state| state.path.file_name());
-        names.filter_map(|name| Some(self.paths.first()?.with_file_name(name))).collect::<Vec<_>>().into_iter()
+        earlier.done.outputs.iter().filter_map(|state| {
+            let here = self.paths.first()?.with_file_name(state.path.file_name()?);
+            state.is_still(&here).then_some(here)
+        })
     }
 
     fn files(&self) -> impl Iterator<Item = &Path> {
@@ -126,6 +117,17 @@ impl Job {
 /// A file that is not there is as good as removed, and one that cannot be is told where it is written next.
 fn remove(path: PathBuf) {
     drop(fs::remove_file(path));
+}
+
+/// Whether nothing is to be done of pairs that are done together, in their order.
+pub(super) fn are_complete(chain: &[Job], settings_sha256: &str) -> bool {
+    let mut follows = None;
+    chain.iter().all(|job| {
+        let Some(record) = PairRecord::read(&job.record) else { return false };
+        let is_current = record.settings_sha256 == settings_sha256 && record.follows == follows;
+        follows = Some(history(record.follows.as_deref(), &record.inputs));
+        is_current && record.is_of(&job.images(), &job.paths)
+    })
 }
 
 /// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.

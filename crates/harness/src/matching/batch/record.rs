@@ -65,8 +65,8 @@ pub(super) struct PairRecord {
     pub(super) name: PathBuf,
     pub(super) left: PathBuf,
     pub(super) right: PathBuf,
-    /// The frame whose messages its own started from, by its name.
-    pub(super) follows: Option<PathBuf>,
+    /// The [`history`] of the frames before it whose messages its own go back to; none where it started anew.
+    pub(super) follows: Option<String>,
     /// Of all settings that outputs depend on; see [`settings_sha256`].
     pub(super) settings_sha256: String,
     /// The images.
@@ -74,6 +74,14 @@ pub(super) struct PairRecord {
     /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
     pub(super) elapsed_ms: f64,
     pub(super) done: Done,
+}
+
+/// SHA-256 of the images of a frame and, by those before them, of all frames that the messages go back to.
+pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
+    let mut hash = Sha256::new();
+    let frames = follows.into_iter().chain(images.iter().map(|state| state.sha256.as_str()));
+    frames.for_each(|part| hash.update(part));
+    hex(&hash.finalize())
 }
 
 impl PairRecord {
@@ -119,7 +127,7 @@ impl FileState {
     }
 
     /// Whether `path` holds the same. A file that was not written to since is not read again.
-    fn is_still(&self, path: &Path) -> bool {
+    pub(super) fn is_still(&self, path: &Path) -> bool {
         let Ok(metadata) = fs::metadata(path) else { return false };
         let (bytes, modified_ns, changed_ns) = Self::stamp(&metadata);
         let same_file = std::path::absolute(path).is_ok_and(|path| path == self.path);
@@ -145,17 +153,16 @@ impl FileState {
 }
 
 /// SHA-256 of the program's version and of all options but those that change no output: where files lie, which device
-/// computes, and what is told. Of a calibration it has what was read: the file may be another by now.
+/// computes, and what is told. How files are made it has as it was read: a calibration may be another by now.
 pub(super) fn settings_sha256(args: &MatchArgs, making: &Making) -> String {
     let ManyArgs { format, also, warm_start, .. } = args.many.clone();
-    let unnamed = MakingArgs { calib: None, ..args.outputs.making.clone() };
     let of_output = MatchArgs {
         left: None,
         right: None,
         output: PathBuf::new(),
         json: false,
         max_megapixels: 0,
-        outputs: OutputArgs { making: unnamed, ..args.outputs.clone() },
+        outputs: OutputArgs { making: MakingArgs::default(), ..args.outputs.clone() },
         many: ManyArgs { format, also, warm_start, ..ManyArgs::default() },
         plan: PlanArgs { backend: String::new(), device: None, threads: None, ..args.plan.clone() },
         ..args.clone()

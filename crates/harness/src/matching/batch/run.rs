@@ -11,7 +11,7 @@ use bp_core::{StereoPair, survey::Survey};
 
 use super::{
     job::Job,
-    record::{Done, FileState, PairRecord, PairTimes},
+    record::{Done, FileState, PairRecord, PairTimes, history},
     summary::Failed,
 };
 use crate::{
@@ -36,6 +36,7 @@ struct Read<'a> {
 struct Matched<'a> {
     job: &'a Job,
     inputs: Vec<FileState>,
+    follows: Option<String>,
     done: Result<(Done, Answer, StereoPair), Failure>,
 }
 
@@ -95,17 +96,19 @@ fn solve_all<'a>(
     to: SyncSender<Matched<'a>>,
 ) -> Result<(), Failure> {
     let mut session = Session::open(args)?;
-    let mut last_chain = None;
+    let mut before: Option<(usize, String)> = None;
     for Read { job, inputs, pair, read_ms } in from {
         // Not from another chain's messages: whether that is matched in this run must make no difference.
-        session.starts_warm = last_chain == Some(job.chain);
+        let follows = before.take().filter(|(chain, _)| *chain == job.chain).map(|(_, history)| history);
+        session.starts_warm = follows.is_some();
         let done = pair.and_then(|read| match_one(args, making, &mut session, job, read, read_ms));
-        last_chain = if done.is_ok() { Some(job.chain) } else { last_chain };
+        let history = if done.is_ok() { Some(history(follows.as_deref(), &inputs)) } else { follows.clone() };
+        before = history.map(|history| (job.chain, history));
         if done.as_ref().is_err_and(Failure::is_interrupted) {
             break;
         }
         let is_lost = done.as_ref().is_err_and(Failure::is_device_lost);
-        if to.send(Matched { job, inputs, done }).is_err() {
+        if to.send(Matched { job, inputs, follows, done }).is_err() {
             break;
         }
         if is_lost {
@@ -158,12 +161,12 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<Vec<Failed>, Failure> {
-        for (index, Matched { job, inputs, done }) in from.into_iter().enumerate() {
+        for (index, Matched { job, inputs, follows, done }) in from.into_iter().enumerate() {
             match done {
                 Ok((done, answer, pair)) => {
-                    job.remove_others();
                     let done = self.write(job, done, &answer, &pair)?;
-                    self.record(job, inputs, done)?;
+                    job.remove_others();
+                    self.record(job, (inputs, follows), done)?;
                 }
                 Err(failure) => {
                     tell(&format!("{}: {failure}", job.pair.name.display()));
@@ -179,14 +182,19 @@ impl Writer<'_> {
         Ok(self.failed)
     }
 
-    fn record(&mut self, job: &Job, inputs: Vec<FileState>, done: Done) -> Result<(), Failure> {
+    fn record(
+        &mut self,
+        job: &Job,
+        (inputs, follows): (Vec<FileState>, Option<String>),
+        done: Done,
+    ) -> Result<(), Failure> {
         let elapsed_ms = milliseconds_since(self.last);
         self.last = Instant::now();
         let record = PairRecord {
             name: job.pair.name.clone(),
             left: job.pair.left.clone(),
             right: job.pair.right.clone(),
-            follows: job.follows.clone(),
+            follows,
             settings_sha256: self.settings_sha256.to_owned(),
             inputs,
             elapsed_ms,

@@ -41,7 +41,8 @@ impl Shard {
         create_folder(folder)?;
         let path = folder.join(format!("{}.lock", self.file_part()));
         let file = File::options().create(true).truncate(false).write(true).open(&path);
-        let file = file.map_err(|error| Failure::writing(&path, &error))?;
+        // Somebody else's lock file, in a folder that is shared, can be locked without writing to it.
+        let file = file.or_else(|error| File::open(&path).map_err(|_| Failure::writing(&path, &error)))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 let advice = "wait until it has ended, name another --output, or share the pairs by --shard";

@@ -1,7 +1,7 @@
 //! Pairs that lie below a folder in a known layout.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
     path::{Path, PathBuf},
 };
@@ -25,8 +25,13 @@ const ENDINGS: [&str; 8] = ["png", "ppm", "pgm", "pnm", "tif", "tiff", "jpg", "j
 /// Images by their folders, which are relative to where the search began.
 type Folders = BTreeMap<PathBuf, Images>;
 
-/// Names of files by these names in lower case, by which they are searched: cameras write VIEW1.PNG.
-type Images = BTreeMap<String, String>;
+/// Names of files.
+type Images = BTreeSet<String>;
+
+/// The image of a name, or else the one whose name differs by upper and lower case alone: cameras write VIEW1.PNG.
+fn named<'a>(images: &'a Images, name: &str) -> Option<&'a String> {
+    images.get(name).or_else(|| images.iter().find(|image| image.eq_ignore_ascii_case(name)))
+}
 
 /// The pairs below `root`, but not in `output`, in the natural order of their names.
 pub(super) fn search(root: &Path, output: &Path) -> Result<Found, Failure> {
@@ -67,10 +72,7 @@ fn images(root: &Path, output: &Path, notes: &mut Vec<String>) -> Folders {
             notes.push(format!("passed over: {} is no name in UTF-8, as records hold it", entry.path().display()));
             continue;
         };
-        let images = folders.entry(folder.to_owned()).or_default();
-        if let Some(other) = images.insert(name.to_lowercase(), name.to_owned()) {
-            notes.push(format!("passed over: {other} beside {}", entry.path().display()));
-        }
+        folders.entry(folder.to_owned()).or_default().insert(name.to_owned());
     }
     folders
 }
@@ -83,7 +85,7 @@ fn is_ending(ending: &OsStr) -> bool {
 fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
     let all =
         IN_ONE_FOLDER.iter().flat_map(|layout| ENDINGS.map(|ending| layout.map(|name| format!("{name}.{ending}"))));
-    let actual = |name: &String| images.get(&name.to_lowercase()).map(|actual| folder.join(actual));
+    let actual = |name: &String| named(images, name).map(|actual| folder.join(actual));
     let (present, absent): (Vec<_>, Vec<_>) = all.partition(|names| names.iter().all(|name| actual(name).is_some()));
     let Some((taken, others)) = present.split_first() else {
         for [left, right] in absent {
@@ -115,20 +117,27 @@ fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
             found.notes.push(format!("passed over: {} has no folder {other} with images beside it", folder.display()));
             continue;
         };
-        let lonely = images.iter().filter(|(name, _)| !partners.contains_key(*name));
-        found.notes.extend(lonely.map(|(_, image)| {
-            format!("passed over: {} has no image of its name in {other}", folder.join(image).display())
-        }));
+        let lonely = images.iter().filter(|image| partner(image, images, partners).is_none());
+        found.notes.extend(
+            lonely.map(|image| {
+                format!("passed over: {} has no image of its name in {other}", folder.join(image).display())
+            }),
+        );
         if side == 0 {
             pairs_of_equal_names((folder, images), (&folder.with_file_name(other), partners), found);
         }
     }
 }
 
+/// The image beside one of a folder: another one of that folder may have it for its own by its very name.
+fn partner<'a>(image: &str, images: &Images, partners: &'a Images) -> Option<&'a String> {
+    named(partners, image).filter(|partner| *partner == image || !images.contains(*partner))
+}
+
 fn pairs_of_equal_names((folder, images): (&Path, &Images), (other, partners): (&Path, &Images), found: &mut Found) {
     let mut taken = BTreeMap::new();
-    for (key, image) in images {
-        let Some(partner) = partners.get(key) else { continue };
+    for image in images {
+        let Some(partner) = partner(image, images, partners) else { continue };
         let name = folder.join(image).with_extension("");
         if let Some(first) = taken.insert(name.clone(), image) {
             let (first, image) = (folder.join(first), folder.join(image));
@@ -136,5 +145,18 @@ fn pairs_of_equal_names((folder, images): (&Path, &Images), (other, partners): (
             continue;
         }
         found.pairs.push(Pair { name, left: folder.join(image), right: other.join(partner) });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_names_come_before_names_that_differ_by_case() {
+        let images = |names: &[&str]| -> Images { names.iter().map(|&name| name.to_owned()).collect() };
+        let (left, right) = (images(&["A.png", "a.png", "b.PNG"]), images(&["A.png", "B.png"]));
+        let found = ["A.png", "a.png", "b.PNG"].map(|name| partner(name, &left, &right).map(String::as_str));
+        assert_eq!(found, [Some("A.png"), None, Some("B.png")]);
     }
 }
