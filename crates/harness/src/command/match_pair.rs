@@ -20,19 +20,7 @@ use crate::{
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     heap::return_large_buffers();
-    plan::check_options(&args.plan)?;
-    if args.finish.fill.is_some() && args.finish.check.is_none() && args.finish.speckle.is_none() {
-        return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
-    }
-    let truth_options =
-        args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
-    if args.ground_truth.is_none() && truth_options {
-        return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
-    }
-    // Clap does not ask for --video where --pairs or two images stand in its place.
-    if args.many.warm_start.is_some() && args.many.video.is_none() {
-        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
-    }
+    check_options(args)?;
     let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let confidence = args.finish.confidence.clone();
@@ -54,6 +42,24 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     let outputs = (&outputs, &making);
     let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), warnings, outputs))?;
     if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
+}
+
+/// Refuses options that do nothing without others, or contradict one another.
+fn check_options(args: &MatchArgs) -> Result<(), Failure> {
+    plan::check_options(&args.plan)?;
+    if args.finish.fill.is_some() && args.finish.check.is_none() && args.finish.speckle.is_none() {
+        return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
+    }
+    let truth_options =
+        args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
+    if args.ground_truth.is_none() && truth_options {
+        return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
+    }
+    // Clap does not ask for --video where --pairs or two images stand in its place.
+    if args.many.warm_start.is_some() && args.many.video.is_none() {
+        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
+    }
+    Ok(())
 }
 
 /// The plan for a pair, which its outputs can hold, and what may be wrong with the two: that is told too.

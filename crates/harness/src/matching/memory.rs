@@ -71,21 +71,21 @@ pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<F
         return Err(limit.refuse(plan, peak_bytes));
     }
     if !tiling.is_whole() {
-        if args.messages_hash {
-            return Err(Failure::out_of_memory("--messages-hash needs the whole image in memory at once"));
-        }
-        if args.many.warm_start.is_some() {
-            let advice = "match without it, or allow more --max-memory";
-            return Err(Failure::out_of_memory(format!(
-                "--warm-start needs the whole image in memory at once; {advice}"
-            )));
-        }
+        check_whole_options(args)?;
         let bytes = |bytes| format!("{} bytes are needed", beside.peak(bytes));
         let whole = needed(plan).map_or_else(|error| error.to_string(), bytes);
         let tell = if tiling.likeness() == Likeness::Same { note } else { warn };
         tell(&format!("for the whole image {whole}: matching {} in {peak_bytes} bytes", described(&tiling)));
     }
     Ok(Fitted { tiling, peak_bytes })
+}
+
+/// Refuses options that need all messages at once.
+fn check_whole_options(args: &MatchArgs) -> Result<(), Failure> {
+    let needing = [(args.messages_hash, "--messages-hash"), (args.many.warm_start.is_some(), "--warm-start")];
+    let Some((_, option)) = needing.into_iter().find(|&(is_given, _)| is_given) else { return Ok(()) };
+    let what = format!("{option} needs the whole image in memory at once");
+    Err(Failure::out_of_memory(format!("{what}: leave it out, or allow more --max-memory")))
 }
 
 /// Bytes that are needed beside those of tiles.

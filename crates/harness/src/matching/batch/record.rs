@@ -3,6 +3,7 @@
 use std::{
     fs::{self, File},
     io::{self, Read as _},
+    ops::Add,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
@@ -57,6 +58,19 @@ pub(super) struct PairTimes {
     pub(super) match_ms: f64,
     /// Writing the outputs, while another pair is matched.
     pub(super) write_ms: f64,
+}
+
+impl Add for PairTimes {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            read_ms: self.read_ms + other.read_ms,
+            solve_ms: self.solve_ms + other.solve_ms,
+            match_ms: self.match_ms + other.match_ms,
+            write_ms: self.write_ms + other.write_ms,
+        }
+    }
 }
 
 /// The record of a pair that is done.

@@ -76,14 +76,8 @@ impl Summary {
         let succeeded = jobs.iter().filter(|job| !failed.contains(job.pair.name.as_path()));
         let records = succeeded.map(read).collect::<Result<Vec<_>, _>>()?;
         let done: Vec<&Done> = records.iter().map(|record| &record.done).collect();
+        let times = done.iter().fold(PairTimes::default(), |sum, done| sum + done.times);
         // From 0: the sum of no numbers is -0, and is written so.
-        let sum = |time: fn(&PairTimes) -> f64| done.iter().fold(0.0, |sum, done| sum + time(&done.times));
-        let times = PairTimes {
-            read_ms: sum(|times| times.read_ms),
-            solve_ms: sum(|times| times.solve_ms),
-            match_ms: sum(|times| times.match_ms),
-            write_ms: sum(|times| times.write_ms),
-        };
         let total_ms = records.iter().fold(0.0, |sum, record| sum + record.elapsed_ms);
         let rate = |ms: f64| (ms > 0.0 && !done.is_empty()).then(|| 1000.0 * done.len() as f64 / ms);
         Ok(Self {
