@@ -30,7 +30,7 @@ pub(crate) use maps::{map_of, mask_of};
 pub(crate) use maps::{read_map, read_mask};
 pub(crate) use picture::{Picture, encode_picture};
 pub(crate) use ply::write_points;
-pub(crate) use sidecar::{Origin, remove_sidecar, sidecar_of, write_sidecar};
+pub(crate) use sidecar::{Origin, remove_sidecar, sidecar_of, write_picture_sidecar, write_sidecar};
 
 use serde::Serialize;
 

@@ -37,7 +37,7 @@ pub(crate) struct MakingArgs {
     /// Leave out the bar with the disparities of the colours, so that the picture has the map's size.
     #[arg(long)]
     pub(crate) no_colour_bar: bool,
-    /// Write no MAP.json beside maps, which tells scale, unit, range, plan and inputs.
+    /// Write no MAP.json beside maps and pictures, which tells scale, unit, range, plan and inputs.
     #[arg(long)]
     pub(crate) no_sidecar: bool,
     /// Calibration of the pair as Middlebury has it (calib.txt: cam0, doffs, baseline, width, height).

@@ -9,7 +9,7 @@ use bp_core::Calibration;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{MapFormat, Raster, write_json};
+use super::{Colours, MapFormat, Raster, write_json};
 use crate::{failure::Failure, record};
 
 /// Version of the sidecar; changes with every change of meaning.
@@ -63,6 +63,8 @@ struct Sidecar<'a> {
     scale: f64,
     offset: f64,
     unknown: Unknown,
+    /// Of a picture: the colours in which places from 0 to 1 are stored.
+    colours: Option<&'static str>,
     width: usize,
     height: usize,
     /// Disparities of the first and the last label, in pixels.
@@ -107,6 +109,15 @@ impl From<&Calibration> for Geometry {
     }
 }
 
+/// How values are stored.
+struct Stored {
+    format: &'static str,
+    scale: f64,
+    offset: f64,
+    unknown: Unknown,
+    colours: Option<&'static str>,
+}
+
 /// Writes the sidecar of a map that was written to `path`.
 pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_>) -> Result<(), Failure> {
     let format = MapFormat::of(path)?;
@@ -114,6 +125,23 @@ pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_
         MapFormat::Png16 => (1.0 / f64::from(raster.quantity.steps()), Unknown::Number(0)),
         MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
     };
+    write(path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
+}
+
+/// Writes the sidecar of a coloured picture of a map that was written to `path`: stored are places among the colours,
+/// from 0 to 1.
+pub(crate) fn write_picture_sidecar(
+    path: &Path,
+    raster: &Raster<'_>,
+    colours: Colours,
+    origin: &Origin<'_>,
+) -> Result<(), Failure> {
+    let (low, high) = raster.range().map_or((0.0, 1.0), |(low, high)| (f64::from(low), f64::from(high)));
+    let (unknown, colours) = (Unknown::Text("black"), Some(colours.name()));
+    write(path, raster, origin, Stored { format: "coloured PNG", scale: high - low, offset: low, unknown, colours })
+}
+
+fn write(path: &Path, raster: &Raster<'_>, origin: &Origin<'_>, stored: Stored) -> Result<(), Failure> {
     let labels = |plan: &record::Settings| {
         let min = i64::from(plan.min_disparity);
         Range { min, max: min + plan.labels as i64 - 1 }
@@ -123,10 +151,11 @@ pub(crate) fn write_sidecar(path: &Path, raster: &Raster<'_>, origin: &Origin<'_
         program: format!("{PROGRAM}{}", env!("CARGO_PKG_VERSION")),
         quantity: raster.quantity.name(),
         unit: raster.quantity.unit(),
-        format: format.name(),
-        scale,
-        offset: 0.0,
-        unknown,
+        format: stored.format,
+        scale: stored.scale,
+        offset: stored.offset,
+        unknown: stored.unknown,
+        colours: stored.colours,
         width: raster.size.width,
         height: raster.size.height,
         labels: origin.plan.map(labels),

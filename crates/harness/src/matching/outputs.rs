@@ -9,7 +9,7 @@ use crate::{
     failure::Failure,
     files::{
         Colours, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
-        check_writable, remove_sidecar, sidecar_of, write_points, write_sidecar,
+        check_writable, remove_sidecar, sidecar_of, write_picture_sidecar, write_points, write_sidecar,
     },
     record, warn,
 };
@@ -136,7 +136,7 @@ impl Outputs {
     pub(crate) fn write(&self, making: &Making, content: &Content<'_>) -> Result<(), Failure> {
         let disparities = Raster::disparities(content.map);
         self.map.as_deref().map_or(Ok(()), |path| write_map(path, &disparities, making, content, None))?;
-        self.picture.as_deref().map_or(Ok(()), |path| making.picture.write(path, content.map))?;
+        self.picture.as_deref().map_or(Ok(()), |path| write_picture(path, making, content))?;
         if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
             let raster = Raster { size: content.map.size(), values, quantity: Quantity::Confidence };
             write_map(path, &raster, making, content, None)?;
@@ -151,7 +151,7 @@ impl Outputs {
 
     /// All files that are written.
     pub(crate) fn paths(&self, making: &Making) -> Vec<PathBuf> {
-        let sidecars = self.maps().filter(|_| making.sidecar).map(sidecar_of);
+        let sidecars = self.maps().chain(self.picture.as_deref()).filter(|_| making.sidecar).map(sidecar_of);
         let files = [&self.map, &self.picture, &self.depth, &self.points, &self.confidence].into_iter().flatten();
         files.cloned().chain(sidecars).collect()
     }
@@ -193,6 +193,14 @@ fn write_map(
     raster.write(path)?;
     let origin = Origin { plan: content.plan, calibration, inputs: content.inputs };
     if making.sidecar { write_sidecar(path, raster, &origin) } else { Ok(()) }
+}
+
+fn write_picture(path: &Path, making: &Making, content: &Content<'_>) -> Result<(), Failure> {
+    remove_sidecar(path)?;
+    making.picture.write(path, content.map)?;
+    let origin = Origin { plan: content.plan, calibration: None, inputs: content.inputs };
+    let raster = Raster::disparities(content.map);
+    if making.sidecar { write_picture_sidecar(path, &raster, making.picture.colours, &origin) } else { Ok(()) }
 }
 
 fn write_depth(path: &Path, making: &Making, content: &Content<'_>, calibration: &Calibration) -> Result<(), Failure> {

@@ -110,6 +110,8 @@ fn lists_name_maps_and_broken_lines_are_told_by_number() {
         "a b/left.pfm.json",
         "x/y.pfm.json",
         "a b/left.picture.png",
+        "a b/left.picture.png.json",
+        "x/y.picture.png.json",
         "records/1-of-1.lock",
         "records/a b/left.json",
         "records/x/y.json",

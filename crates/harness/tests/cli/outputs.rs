@@ -199,6 +199,11 @@ fn a_picture_has_the_maps_pixels_and_a_bar_beside_them() {
         image::open(folder.path("p.png")).unwrap().into_rgb8()
     };
     let alone = picture("--no-colour-bar");
+    let told = sidecar(&folder, "p.png");
+    assert_eq!((&told["format"], &told["colours"]), (&"coloured PNG".into(), &"viridis".into()));
+    let [scale, offset] = ["scale", "offset"].map(|name| told[name].as_f64().unwrap());
+    let ends = ["min", "max"].map(|end| told["found"][end].as_f64().unwrap());
+    assert_eq!([offset, offset + scale], ends);
     assert_eq!(alone.dimensions(), (WIDTH, HEIGHT));
     assert_eq!([alone.get_pixel(3, 0).0, alone.get_pixel(0, 0).0], [[0, 0, 0], [68, 1, 84]]);
     let with_bar = picture("");

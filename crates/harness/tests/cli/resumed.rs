@@ -115,7 +115,7 @@ fn what_an_earlier_command_wrote_besides_is_removed() {
         let written = files(&folder.path("out")).into_iter().map(|path| path.display().to_string());
         written.filter(|path| path.starts_with("a.")).collect::<Vec<_>>()
     };
-    assert_eq!(written("--also picture"), ["a.pfm", "a.pfm.json", "a.picture.png"]);
+    assert_eq!(written("--also picture"), ["a.pfm", "a.pfm.json", "a.picture.png", "a.picture.png.json"]);
     fs::write(folder.path("out/a.mine.png"), "").unwrap();
     assert_eq!(written("--slope 3 --format npy"), ["a.mine.png", "a.npy", "a.npy.json"]);
     assert_eq!(written("--slope 3 --format npy --no-sidecar"), ["a.mine.png", "a.npy"]);
