@@ -29,8 +29,8 @@ impl Device for Oracle {
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
-/// Grey values `[node]`, costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and received messages
-/// `[node][side][label]`.
+/// Grey values `[node]`, costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and
+/// received messages `[node][side][label]`.
 struct Grid {
     greys: Vec<i64>,
     sums: Vec<Vec<i64>>,

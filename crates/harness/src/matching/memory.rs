@@ -48,8 +48,8 @@ pub(crate) struct Fitted {
     pub(crate) peak_bytes: u64,
 }
 
-/// How `plan` is tiled to keep within `--max-memory` and the memory that there is. Standard error tells where the image is
-/// not matched as a whole. The plan itself stays what it is: tiles cost less accuracy than a smaller plan does.
+/// How `plan` is tiled to keep within `--max-memory` and the memory that there is. Standard error tells where the image
+/// is not matched as a whole. The plan itself stays what it is: tiles cost less accuracy than a smaller plan does.
 pub(crate) fn fitted(args: &MatchArgs, plan: &Plan, opened: &Opened) -> Result<Fitted, Failure> {
     let beside = Beside::of(args, plan.image_size());
     let limit = Limit::of(args, opened, beside.held);

@@ -97,9 +97,8 @@ impl Outputs {
         for (index, output) in outputs.iter().enumerate() {
             check_writable(output)?;
             inputs.iter().try_for_each(|input| check_distinct(input, output, "is read, and would be overwritten"))?;
-            let others = outputs[..index].iter();
             let twice = "would be written twice (beside a map goes MAP.json)";
-            others.clone().try_for_each(|other| check_distinct(other, output, twice))?;
+            outputs[..index].iter().try_for_each(|other| check_distinct(other, output, twice))?;
         }
         self.maps().try_for_each(|map| MapFormat::of(map).map(drop))?;
         self.picture.as_deref().map_or(Ok(()), |picture| check_ending(picture, "a picture", "png"))?;

@@ -83,26 +83,28 @@ fn is_ending(ending: &OsStr) -> bool {
 
 /// The one pair of a folder whose images are called as in a known data set.
 fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
-    let all =
-        IN_ONE_FOLDER.iter().flat_map(|layout| ENDINGS.map(|ending| layout.map(|name| format!("{name}.{ending}"))));
-    let actual = |name: &String| named(images, name).map(|actual| folder.join(actual));
-    let (present, absent): (Vec<_>, Vec<_>) = all.partition(|names| names.iter().all(|name| actual(name).is_some()));
-    let Some((taken, others)) = present.split_first() else {
-        for [left, right] in absent {
-            for (here, missing) in [(&left, &right), (&right, &left)] {
-                if let Some(here) = actual(here) {
-                    found.notes.push(format!("passed over: {} has no {missing} beside it", here.display()));
-                }
-            }
+    let mut taken: Option<[&String; 2]> = None;
+    let mut lonely = Vec::new();
+    for (layout, ending) in IN_ONE_FOLDER.iter().flat_map(|layout| ENDINGS.map(|ending| (layout, ending))) {
+        let names = layout.map(|name| format!("{name}.{ending}"));
+        match (names.each_ref().map(|name| named(images, name)), taken) {
+            ([Some(left), Some(right)], None) => taken = Some([left, right]),
+            ([Some(left), Some(right)], Some([first, second])) => found.notes.push(format!(
+                "{}: {first} and {second} are taken as its pair, not {left} and {right}",
+                folder.join("").display()
+            )),
+            ([Some(here), None], _) => lonely.push((here, names[1].clone())),
+            ([None, Some(here)], _) => lonely.push((here, names[0].clone())),
+            ([None, None], _) => {}
         }
-        return;
-    };
-    for other in others {
-        let [taken, other] = [taken, other].map(|names| names.join(" and "));
-        found.notes.push(format!("{}: {taken} are taken as its pair, not {other}", folder.join("").display()));
     }
-    if let [Some(left), Some(right)] = taken.each_ref().map(actual) {
-        found.pairs.push(Pair { name: left.with_extension(""), left, right });
+    match taken.map(|names| names.map(|name| folder.join(name))) {
+        Some([left, right]) => found.pairs.push(Pair { name: left.with_extension(""), left, right }),
+        None => {
+            found.notes.extend(lonely.into_iter().map(|(here, missing)| {
+                format!("passed over: {} has no {missing} beside it", folder.join(here).display())
+            }))
+        }
     }
 }
 
