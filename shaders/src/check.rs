@@ -1,6 +1,6 @@
 //! A tiny problem with a known answer.
 
-use bp_core::{Device, Error, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings, StereoPair};
+use bp_core::{Device, Driver, Error, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, StereoPair};
 
 /// Solves the pair of [`bp_core::worked_example`] on two grids, and compares with the labels told there: a device that
 /// answers otherwise is not to be trusted with anything larger.
@@ -25,7 +25,7 @@ fn solve(device: &dyn Device) -> Result<Vec<u16>, Error> {
     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
     let settings = Settings { grids: 2, steps: 1, schedule, message_start, cut: None, coarse_clip: false };
     let plan = Plan::new(pair.size(), Model::new(Profile::Thesis, 3)?, settings)?;
-    let mut matcher = Matcher::new(device, plan)?;
-    matcher.solve(&pair)?;
-    Ok(matcher.labels().to_vec())
+    let mut driver = Driver::new(device, plan)?;
+    driver.solve(&pair)?;
+    Ok(driver.labels().to_vec())
 }

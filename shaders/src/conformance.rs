@@ -6,7 +6,7 @@
 use std::{env, thread, time::Duration};
 
 use bp_core::{
-    Algorithm, Device, Error, Matcher, Model, Plan, Profile, Schedule,
+    Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule,
     conformance::{Case, assert_conforms, assert_same, assert_same_at_random, noise_pair},
 };
 
@@ -89,7 +89,7 @@ pub fn runs_plans_at_once(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Lim
 pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Error>) {
     let Some(plan) = banded_cases().pop().map(|case| case.plan) else { return };
     let prepare = |change: &dyn Fn(&mut Limits)| {
-        opened(open(change)).map(|device| Matcher::new(device.as_ref(), plan.clone()).err())
+        opened(open(change)).map(|device| Driver::new(device.as_ref(), plan.clone()).err())
     };
     let small = prepare(&|limits| limits.binding_bytes = 4 << 10);
     assert!(matches!(small, None | Some(Some(Error::Unsupported { .. }))), "{small:?}");
@@ -109,9 +109,9 @@ pub fn tells_times(open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>
     let settings = Algorithm::Bp.settings(pair.size(), 20, 1, Schedule::Sync);
     let plan = Model::new(Profile::Thesis, 64).and_then(|model| Plan::new(pair.size(), model, settings));
     let solve = |plan| {
-        let mut matcher = Matcher::new(device.as_ref(), plan)?;
-        matcher.solve(&pair)?;
-        matcher.solve(&pair)
+        let mut driver = Driver::new(device.as_ref(), plan)?;
+        driver.solve(&pair)?;
+        driver.solve(&pair)
     };
     let times = plan.and_then(solve).unwrap_or_else(|error| panic!("{error}"));
     // A device may have no clock.

@@ -1,5 +1,5 @@
 //! What a backend is: list devices, open one, prepare a plan on it, solve pairs. A backend owns buffers and the five
-//! kernels; order, timing and stopping are [`crate::Matcher`]'s.
+//! kernels; order, timing and stopping are [`crate::Driver`]'s.
 //!
 //! Whatever can be checked without a device is checked before a backend is called: a [`Solver`] may rely on a valid
 //! plan and on pairs of its size.
@@ -144,7 +144,7 @@ pub trait Solver: Send {
 
     /// In place of [`Solver::refine`] of grid 0, after a solve that was not stopped and before any coarser grid is
     /// refined again: makes the messages that grid 0 holds its first messages. Not under
-    /// [`crate::Schedule::Sweep`]; see [`crate::Matcher::solve_warm_observed`].
+    /// [`crate::Schedule::Sweep`]; see [`crate::Driver::solve_warm_observed`].
     ///
     /// # Errors
     /// [`Error::Unsupported`] where the plan's messages are not kept, and those of the device.

@@ -14,7 +14,7 @@ pub use random::random_case;
 
 use std::ops::ControlFlow;
 
-use crate::{Algorithm, Device, Error, Matcher, Model, Plan, Profile, Schedule, Side, StereoPair};
+use crate::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Side, StereoPair};
 
 /// A pair and a plan for it.
 #[derive(Clone, Debug)]
@@ -40,15 +40,15 @@ pub struct Answer {
 /// # Errors
 /// Those of the device.
 pub fn solve(device: &dyn Device, case: &Case) -> Result<Answer, Error> {
-    let mut matcher = Matcher::new(device, case.plan.clone())?;
-    matcher.solve(&case.pair)?;
-    answer(&mut matcher)
+    let mut driver = Driver::new(device, case.plan.clone())?;
+    driver.solve(&case.pair)?;
+    answer(&mut driver)
 }
 
-fn answer(matcher: &mut Matcher) -> Result<Answer, Error> {
+fn answer(driver: &mut Driver) -> Result<Answer, Error> {
     let [left, right, up, down] = Side::ALL;
-    let messages = [matcher.messages(left)?, matcher.messages(right)?, matcher.messages(up)?, matcher.messages(down)?];
-    Ok(Answer { labels: matcher.labels().to_vec(), messages })
+    let messages = [driver.messages(left)?, driver.messages(right)?, driver.messages(up)?, driver.messages(down)?];
+    Ok(Answer { labels: driver.labels().to_vec(), messages })
 }
 
 /// The whole suite.
@@ -130,19 +130,19 @@ fn difference(expected: &Answer, found: &Answer, case: &Case) -> Option<String> 
     Some(format!("label at ({}, {}): {found} instead of {expected}", i % width, i / width))
 }
 
-/// Asserts that a matcher answers as a fresh one does, after another pair and after a solve that was stopped.
+/// Asserts that a driver answers as a fresh one does, after another pair and after a solve that was stopped.
 fn assert_forgets(device: &dyn Device, case: &Case) {
     let expected = solved(device, case);
     let other = noise_pair(case.pair.size().width, case.pair.size().height, 2);
     let again = || -> Result<[Answer; 2], Error> {
-        let mut matcher = Matcher::new(device, case.plan.clone())?;
-        matcher.solve(&other)?;
-        matcher.solve(&case.pair)?;
-        let reused = answer(&mut matcher)?;
-        let stopped = matcher.solve_observed(&other, &mut |_| ControlFlow::Break(()));
+        let mut driver = Driver::new(device, case.plan.clone())?;
+        driver.solve(&other)?;
+        driver.solve(&case.pair)?;
+        let reused = answer(&mut driver)?;
+        let stopped = driver.solve_observed(&other, &mut |_| ControlFlow::Break(()));
         assert_eq!(stopped, Err(Error::Stopped));
-        matcher.solve(&case.pair)?;
-        Ok([reused, answer(&mut matcher)?])
+        driver.solve(&case.pair)?;
+        Ok([reused, answer(&mut driver)?])
     };
     let found = again().unwrap_or_else(|error| panic!("{error}\n{:?}", case.plan));
     found.iter().for_each(|found| assert_equal(&expected, found, case));
@@ -150,8 +150,8 @@ fn assert_forgets(device: &dyn Device, case: &Case) {
 
 /// Asserts that what is allocated is what was planned, but for a few kilobytes of scratch.
 fn assert_memory_as_planned(device: &dyn Device, plan: &Plan) {
-    let matcher = Matcher::new(device, plan.clone()).unwrap_or_else(|error| panic!("{error}\n{plan:?}"));
-    let (planned, allocated) = (device.planned_bytes(plan), matcher.allocated_bytes());
+    let driver = Driver::new(device, plan.clone()).unwrap_or_else(|error| panic!("{error}\n{plan:?}"));
+    let (planned, allocated) = (device.planned_bytes(plan), driver.allocated_bytes());
     assert!(allocated.abs_diff(planned) <= 4096, "{allocated} bytes allocated, {planned} planned\n{plan:?}");
 }
 

@@ -76,7 +76,7 @@ pub struct Progress {
 pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
 /// A plan prepared on a device, ready to match pairs of its size one after another.
-pub struct Matcher {
+pub struct Driver {
     plan: Plan,
     solver: Box<dyn Solver>,
     labels: Vec<u16>,
@@ -84,7 +84,7 @@ pub struct Matcher {
     has_answer: bool,
 }
 
-impl Matcher {
+impl Driver {
     /// Prepares `plan` on `device`; everything is allocated here.
     ///
     /// # Errors
@@ -110,7 +110,7 @@ impl Matcher {
         self.solver.allocated_bytes() + memory::bytes(&self.labels)
     }
 
-    /// Time that compiling kernels took within [`Matcher::new`], where the device compiles any.
+    /// Time that compiling kernels took within [`Driver::new`], where the device compiles any.
     #[must_use]
     pub fn compile_time(&self) -> Option<Duration> {
         self.solver.compile_time()
@@ -123,7 +123,7 @@ impl Matcher {
         self.solver.moved_bytes()
     }
 
-    /// Matches a pair; [`Matcher::labels`] and [`Matcher::disparities`] hold the answer until the next.
+    /// Matches a pair; [`Driver::labels`] and [`Driver::disparities`] hold the answer until the next.
     ///
     /// # Errors
     /// [`Error::WrongSize`] where the pair is not of the plan's size, and those of the device.
@@ -134,18 +134,18 @@ impl Matcher {
     /// The same, with an observer that is told of progress and may stop it.
     ///
     /// # Errors
-    /// As [`Matcher::solve`], and [`Error::Stopped`].
+    /// As [`Driver::solve`], and [`Error::Stopped`].
     pub fn solve_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
         self.solve_from(pair, Start::Cold, observer)
     }
 
     /// Matches the next frame of a video, starting from the messages of the frame before: the last messages of grid 0 are
     /// its first ones, and the plan's steps run on grid 0 alone, counted from 0. No coarser grid takes part, so that such
-    /// a solve is the faster one, and as good only where little moved. The first solve of a matcher, and one after a
-    /// solve that was stopped or failed, is that of [`Matcher::solve_observed`].
+    /// a solve is the faster one, and as good only where little moved. The first solve of a driver, and one after a
+    /// solve that was stopped or failed, is that of [`Driver::solve_observed`].
     ///
     /// # Errors
-    /// As [`Matcher::solve_observed`]; [`Error::Plan`] under [`Schedule::Sweep`], whose bands hold messages only while
+    /// As [`Driver::solve_observed`]; [`Error::Plan`] under [`Schedule::Sweep`], whose bands hold messages only while
     /// they are swept, and [`Error::Unsupported`] where the device does not keep the plan's messages.
     pub fn solve_warm_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
         if self.plan.settings().schedule == Schedule::Sweep {

@@ -1,6 +1,6 @@
 //! Images and rectified stereo pairs.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use crate::Error;
 
@@ -64,8 +64,8 @@ pub struct Image {
     /// Rows of the apron above the image, and below.
     above: usize,
     below: usize,
-    /// `[above + height + below][width]`.
-    pixels: Vec<[u8; 3]>,
+    /// `[above + height + below][width]`; clones share them.
+    pixels: Arc<Vec<[u8; 3]>>,
 }
 
 impl Image {
@@ -78,7 +78,7 @@ impl Image {
         if pixels.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: pixels.len() });
         }
-        Ok(Self { size, above: 0, below: 0, pixels })
+        Ok(Self { size, above: 0, below: 0, pixels: pixels.into() })
     }
 
     /// An image from grey values, `[height][width]`.
@@ -92,9 +92,9 @@ impl Image {
     /// The same turned left to right.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let mut pixels = self.pixels.clone();
+        let mut pixels = self.pixels.to_vec();
         pixels.chunks_exact_mut(self.size.width).for_each(<[_]>::reverse);
-        Self { pixels, ..*self }
+        Self { pixels: pixels.into(), ..*self }
     }
 
     /// Width and height.
@@ -138,7 +138,7 @@ impl Image {
         let (above, below) = (above.min(APRON), below.min(APRON));
         let known = rows.start + self.above - above..rows.end + self.above + below;
         let pixels = self.pixels[known.start * width..known.end * width].to_vec();
-        Self { size: Size { width, height: rows.len() }, above, below, pixels }
+        Self { size: Size { width, height: rows.len() }, above, below, pixels: pixels.into() }
     }
 
     /// A copy of some columns as an image of its own, with the apron's. Nothing is known of the columns beside them.
@@ -149,8 +149,8 @@ impl Image {
     pub fn columns(&self, columns: Range<usize>) -> Self {
         let Self { size: Size { width, height }, above, below, ref pixels } = *self;
         assert!(!columns.is_empty() && columns.end <= width, "columns {columns:?} of an image of {}", self.size);
-        let pixels = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
-        Self { size: Size { width: columns.len(), height }, above, below, pixels }
+        let pixels: Vec<_> = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
+        Self { size: Size { width: columns.len(), height }, above, below, pixels: pixels.into() }
     }
 
     /// The colour at column `x`, row `y`.

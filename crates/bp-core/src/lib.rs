@@ -3,7 +3,7 @@
 //! Two images in, a disparity map out:
 //!
 //! ```
-//! use bp_core::{Algorithm, Backend, Image, Matcher, Model, Plan, Profile, Schedule, StereoPair};
+//! use bp_core::{Algorithm, Backend, Image, Driver, Model, Plan, Profile, Schedule, StereoPair};
 //!
 //! # fn main() -> Result<(), bp_core::Error> {
 //! # let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * x * 31 + x * y * 17) % 251) as u8;
@@ -15,9 +15,9 @@
 //! let plan = Plan::new(pair.size(), model, settings)?;
 //! println!("{} message entries, {} bytes", plan.message_updates(), plan.bytes());
 //! let device = bp_cpu_scalar::Scalar.open(0)?;
-//! let mut matcher = Matcher::new(device.as_ref(), plan)?;
-//! matcher.solve(&pair)?;
-//! assert_eq!(matcher.disparities().at(20, 10), Some(3.0));
+//! let mut driver = Driver::new(device.as_ref(), plan)?;
+//! driver.solve(&pair)?;
+//! assert_eq!(driver.disparities().at(20, 10), Some(3.0));
 //! # Ok(())
 //! # }
 //! ```
@@ -55,7 +55,7 @@ pub mod worked_example;
 pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Side, Solver};
 pub use cost::{DataCost, Seed};
 pub use depth::{Calibration, Point, depth_map, points};
-pub use driver::{Matcher, Observer, Progress, Stage, Times};
+pub use driver::{Driver, Observer, Progress, Stage, Times};
 pub use energy::{Energy, cheapest_labels};
 pub use error::Error;
 pub use image::{Image, Size, StereoPair};

@@ -10,6 +10,7 @@ pub const MAX_TRUNCATION: u8 = 63;
 
 /// A data cost D(p, d) with the smoothness that goes with it, all in whole units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Profile {
     /// Truncated absolute grey difference in tenths of the literature's unit: `(7 min(|Il - Ir|, 15) + 5) div 10`,
     /// after Felzenszwalb and Huttenlocher (2006): lambda 0.07, tau 15, s 1, K 1.7.

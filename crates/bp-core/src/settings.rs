@@ -5,6 +5,7 @@ use crate::Size;
 /// The algorithms of Doan Van Tuan's thesis (2019), and one of ours. Each is a way to fill [`Settings`]; nothing else
 /// knows their names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Algorithm {
     /// Plain belief propagation: k loops on the full grid.
     Bp,
@@ -94,6 +95,7 @@ pub const BAND_ROWS: usize = 32;
 /// In which order messages are updated. A loop is one update of every directed message; under [`Schedule::Sweep`] of
 /// all but those across a seam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Schedule {
     /// All messages of a loop come from those of the loop before.
     Sync,
@@ -161,6 +163,7 @@ impl Schedule {
 /// Which of the parent's messages a node of the next finer grid starts with. The coarsest grid starts with zeros.
 /// [`Schedule::Sweep`] says itself what is taken over, and goes with [`MessageStart::Receiver`] only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum MessageStart {
     /// A node receives at first what its parent received last.
     Receiver,

@@ -8,14 +8,14 @@ use std::{ops::ControlFlow, time::Instant};
 pub use tile::{Span, Tile};
 pub use tiling::{HALO, Likeness, Needed, Tiling};
 
-use crate::{Device, DisparityMap, Error, Matcher, Observer, Plan, Progress, Side, StereoPair, Times, memory};
+use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 
 /// A tiled plan prepared on a device, ready to match pairs of its size one after another. A single tile is matched as
-/// [`Matcher`] does it, without a copy of the pair.
+/// [`Driver`] does it, without a copy of the pair.
 pub struct Tiled {
     tiling: Tiling,
     /// Prepared for the tile that was matched last.
-    matcher: Option<Matcher>,
+    driver: Option<Driver>,
     /// The labels of all tiles; none where there is one tile.
     labels: Vec<u16>,
     most_bytes: u64,
@@ -30,9 +30,9 @@ impl Tiled {
     pub fn new(device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
         let pixels = if tiling.is_whole() { 0 } else { tiling.plan().image_size().pixels() };
         let labels = memory::filled("labels", pixels, 0)?;
-        let mut tiled = Self { tiling, matcher: None, labels, most_bytes: 0 };
+        let mut tiled = Self { tiling, driver: None, labels, most_bytes: 0 };
         if let Some(tile) = tiled.tiling.tiles().first() {
-            tiled.matcher = Some(tiled.prepared(device, tile)?);
+            tiled.driver = Some(tiled.prepared(device, tile)?);
         }
         Ok(tiled)
     }
@@ -59,7 +59,7 @@ impl Tiled {
     /// answer until the next. Stages are summed over all tiles; preparing tiles of further sizes is in the total.
     ///
     /// # Errors
-    /// As [`Matcher::solve_observed`], and those of [`Device::prepare`].
+    /// As [`Driver::solve_observed`], and those of [`Device::prepare`].
     pub fn solve_observed(
         &mut self,
         device: &dyn Device,
@@ -73,18 +73,18 @@ impl Tiled {
         let start = Instant::now();
         let (mut times, mut done, total) = (Times::default(), 0, self.tiling.message_updates());
         for tile in self.tiling.tiles() {
-            let mut matcher = self.prepared(device, &tile)?;
+            let mut driver = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
-            let solved = self.solve_tile(&mut matcher, pair, &tile, observe);
-            done += matcher.plan().message_updates();
-            self.matcher = Some(matcher);
+            let solved = self.solve_tile(&mut driver, pair, &tile, observe);
+            done += driver.plan().message_updates();
+            self.driver = Some(driver);
             times += solved?;
         }
         times.total = start.elapsed();
         Ok(times)
     }
 
-    /// Matches the next frame of a video from the messages of the frame before, see [`Matcher::solve_warm_observed`]. Where
+    /// Matches the next frame of a video from the messages of the frame before, see [`Driver::solve_warm_observed`]. Where
     /// there are several tiles, whose messages are gone, every frame is matched as if it were the first.
     ///
     /// # Errors
@@ -95,8 +95,8 @@ impl Tiled {
         pair: &StereoPair,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
-        match self.matcher.as_mut().filter(|_| self.tiling.is_whole()) {
-            Some(matcher) => matcher.solve_warm_observed(pair, observer),
+        match self.driver.as_mut().filter(|_| self.tiling.is_whole()) {
+            Some(driver) => driver.solve_warm_observed(pair, observer),
             None => self.solve_observed(device, pair, observer),
         }
     }
@@ -111,16 +111,16 @@ impl Tiled {
 
     fn solve_tile(
         &mut self,
-        matcher: &mut Matcher,
+        driver: &mut Driver,
         pair: &StereoPair,
         tile: &Tile,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         if self.tiling.is_whole() {
-            return matcher.solve_observed(pair, observer);
+            return driver.solve_observed(pair, observer);
         }
-        let times = matcher.solve_observed(&tile.pair(pair), observer)?;
-        let rows = matcher.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
+        let times = driver.solve_observed(&tile.pair(pair), observer)?;
+        let rows = driver.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
         for (labels, y) in rows.filter(|(_, y)| tile.rows.kept.contains(y)) {
             let Span { all, kept } = &tile.columns;
             let from = kept.start - all.start;
@@ -131,27 +131,27 @@ impl Tiled {
     }
 
     /// What is prepared, if it is for such a tile; else that is freed, and the tile's plan is prepared.
-    fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Matcher, Error> {
+    fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
         let plan = tile.plan(self.tiling.plan())?;
-        let matcher = match self.matcher.take().filter(|matcher| *matcher.plan() == plan) {
-            Some(matcher) => matcher,
-            None => Matcher::new(device, plan)?,
+        let driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
+            Some(driver) => driver,
+            None => Driver::new(device, plan)?,
         };
-        self.most_bytes = self.most_bytes.max(matcher.allocated_bytes());
-        Ok(matcher)
+        self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
+        Ok(driver)
     }
 
     /// Frees all but the last answer, where that is kept apart: where there are several tiles.
     pub fn free_tiles(&mut self) {
         if !self.tiling.is_whole() {
-            self.matcher = None;
+            self.driver = None;
         }
     }
 
     /// The last answer: a label for every pixel, `[height][width]`.
     #[must_use]
     pub fn labels(&self) -> &[u16] {
-        if self.tiling.is_whole() { self.matcher.as_ref().map_or(&[], Matcher::labels) } else { &self.labels }
+        if self.tiling.is_whole() { self.driver.as_ref().map_or(&[], Driver::labels) } else { &self.labels }
     }
 
     /// The last answer in pixels; allocates the map.
@@ -160,13 +160,13 @@ impl Tiled {
         DisparityMap::from_labels(self.plan().image_size(), self.plan().model(), self.labels())
     }
 
-    /// The last messages received from `side`, see [`Matcher::messages`].
+    /// The last messages received from `side`, see [`Driver::messages`].
     ///
     /// # Errors
     /// As there; and [`Error::Plan`] where there are several tiles, whose messages are gone.
     pub fn messages(&mut self, side: Side) -> Result<Vec<u8>, Error> {
-        match self.matcher.as_mut().filter(|_| self.tiling.is_whole()) {
-            Some(matcher) => matcher.messages(side),
+        match self.driver.as_mut().filter(|_| self.tiling.is_whole()) {
+            Some(driver) => driver.messages(side),
             None => Err(Error::Plan("messages are kept of images that are matched as a whole only")),
         }
     }

@@ -42,7 +42,7 @@
 //! `0 1 1 / 0 0 0`, with energy 19 + 30 by the images' own costs and over all edges.
 //!
 //! ```
-//! use bp_core::{Cut, Energy, Image, Matcher, MessageStart, Model, Plan, Profile, Schedule, Settings, Side, StereoPair};
+//! use bp_core::{Cut, Energy, Image, Driver, MessageStart, Model, Plan, Profile, Schedule, Settings, Side, StereoPair};
 //! use bp_core::{Backend, DataCost};
 //!
 //! # fn main() -> Result<(), bp_core::Error> {
@@ -59,33 +59,33 @@
 //! let run = |grids, steps, cut| {
 //!     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
 //!     let settings = Settings { grids, steps, schedule, message_start, cut, coarse_clip: false };
-//!     let mut matcher = Matcher::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
-//!     matcher.solve(&pair)?;
-//!     let energy = Energy::of(&pair, &model, matcher.labels())?;
-//!     Ok::<_, bp_core::Error>((matcher.labels().to_vec(), energy.data, energy.smoothness, matcher))
+//!     let mut driver = Driver::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
+//!     driver.solve(&pair)?;
+//!     let energy = Energy::of(&pair, &model, driver.labels())?;
+//!     Ok::<_, bp_core::Error>((driver.labels().to_vec(), energy.data, energy.smoothness, driver))
 //! };
 //!
-//! let (labels, data, smoothness, mut matcher) = run(1, 1, None)?;
+//! let (labels, data, smoothness, mut driver) = run(1, 1, None)?;
 //! assert_eq!((labels, data, smoothness), (vec![0, 1, 1, 0, 1, 1], 12, 20));
 //! let from_left = [0, 0, 0, 0, 3, 3, 6, 0, 10, 0, 0, 0, 0, 10, 11, 7, 0, 7];
-//! assert_eq!(matcher.messages(Side::Left)?, from_left);
-//! assert_eq!(matcher.messages(Side::Down)?, [0, 10, 11, 7, 0, 7, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+//! assert_eq!(driver.messages(Side::Left)?, from_left);
+//! assert_eq!(driver.messages(Side::Down)?, [0, 10, 11, 7, 0, 7, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
 //!
-//! let (labels, data, smoothness, mut matcher) = run(1, 2, None)?;
+//! let (labels, data, smoothness, mut driver) = run(1, 2, None)?;
 //! assert_eq!((labels, data, smoothness), (vec![1, 0, 1, 1, 1, 1], 32, 30));
 //! let from_right = [10, 0, 10, 1, 0, 10, 0, 0, 0, 10, 0, 10, 1, 0, 10, 0, 0, 0];
-//! assert_eq!(matcher.messages(Side::Right)?, from_right);
+//! assert_eq!(driver.messages(Side::Right)?, from_right);
 //!
-//! let (labels, data, smoothness, mut matcher) = run(2, 1, None)?;
+//! let (labels, data, smoothness, mut driver) = run(2, 1, None)?;
 //! assert_eq!((labels, data, smoothness), (vec![0, 1, 1, 0, 1, 1], 12, 20));
-//! assert_eq!(matcher.messages(Side::Right)?[..3], [7, 0, 10]);
-//! assert_eq!(matcher.messages(Side::Down)?[..9], [0, 10, 17, 8, 0, 10, 0, 1, 11]);
+//! assert_eq!(driver.messages(Side::Right)?[..3], [7, 0, 10]);
+//! assert_eq!(driver.messages(Side::Down)?[..9], [0, 10, 17, 8, 0, 10, 0, 1, 11]);
 //!
 //! let cut = Cut { x: 1, y: 1, seed_start: true };
-//! let (labels, data, smoothness, mut matcher) = run(1, 2, Some(cut))?;
+//! let (labels, data, smoothness, mut driver) = run(1, 2, Some(cut))?;
 //! assert_eq!((labels, data, smoothness), (vec![0, 1, 1, 0, 0, 0], 19, 30));
-//! assert_eq!(matcher.messages(Side::Right)?[3..6], [1, 0, 6]);
-//! assert_eq!(matcher.messages(Side::Up)?, [0; 18]);
+//! assert_eq!(driver.messages(Side::Right)?[3..6], [1, 0, 6]);
+//! assert_eq!(driver.messages(Side::Up)?, [0; 18]);
 //! # Ok(())
 //! # }
 //! ```

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, Matcher, Model, Plan, Profile, Schedule,
+    Algorithm, Backend, Driver, Model, Plan, Profile, Schedule,
     conformance::{Answer, Case, assert_conforms, assert_same_at_random, noise_pair, random_case, solve},
 };
 use bp_cpu_rayon::Rayon;
@@ -70,9 +70,9 @@ fn a_matcher_may_move_to_another_pool() {
     let expected = solve(&Scalar, &case).unwrap().labels;
     let device = Rayon.open(0).unwrap();
     for (prepared, used) in [(0, 3), (3, 0)] {
-        let mut matcher = POOLS[prepared].install(|| Matcher::new(device.as_ref(), case.plan.clone())).unwrap();
-        POOLS[used].install(|| matcher.solve(&case.pair)).unwrap();
-        assert_eq!(matcher.labels(), expected);
+        let mut driver = POOLS[prepared].install(|| Driver::new(device.as_ref(), case.plan.clone())).unwrap();
+        POOLS[used].install(|| driver.solve(&case.pair)).unwrap();
+        assert_eq!(driver.labels(), expected);
     }
 }
 

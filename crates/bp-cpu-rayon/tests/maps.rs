@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, DisparityMap, GroundTruth, MapErrors, Matcher, Model, Plan, Profile, Schedule, StereoPair,
+    Algorithm, Backend, DisparityMap, Driver, GroundTruth, MapErrors, Model, Plan, Profile, Schedule, StereoPair,
     maps::{self, Finish},
     synthetic::{self, Scene},
 };
@@ -15,10 +15,10 @@ const LABELS: usize = 48;
 fn both(pair: &StereoPair) -> [DisparityMap; 2] {
     let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
     let plan = Plan::new(pair.size(), Model::new(Profile::Census, LABELS).unwrap(), settings).unwrap();
-    let mut matcher = Matcher::new(Rayon.open(0).unwrap().as_ref(), plan).unwrap();
+    let mut driver = Driver::new(Rayon.open(0).unwrap().as_ref(), plan).unwrap();
     let mut map = |pair: &StereoPair| {
-        matcher.solve(pair).unwrap();
-        matcher.disparities()
+        driver.solve(pair).unwrap();
+        driver.disparities()
     };
     [map(pair), map(&pair.mirrored()).mirrored()]
 }

@@ -1,8 +1,8 @@
-//! A prepared matcher matches pair after pair without allocating.
+//! A prepared driver matches pair after pair without allocating.
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Matcher, Model, Plan, Profile, Schedule, conformance::noise_pair};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, conformance::noise_pair};
 use bp_cpu_rayon::Rayon;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
@@ -20,17 +20,17 @@ fn matching_allocates_nothing() {
             let model = Model::new(profile, 17).unwrap().with_weak_edges((profile != Profile::Mrf).then_some(10));
             let settings = algorithm.settings(pairs[0].size(), 6, 2, schedule);
             let plan = Plan::new(pairs[0].size(), model, settings).unwrap();
-            matchers.push(pool.install(|| Matcher::new(device.as_ref(), plan)).unwrap());
+            matchers.push(pool.install(|| Driver::new(device.as_ref(), plan)).unwrap());
         }
     }
     pool.install(|| {
         // Once, so that the pool's own queues have grown.
-        matchers.iter_mut().for_each(|matcher| _ = matcher.solve(&pairs[0]).unwrap());
-        for matcher in &mut matchers {
+        matchers.iter_mut().for_each(|driver| _ = driver.solve(&pairs[0]).unwrap());
+        for driver in &mut matchers {
             let region = Region::new(ALLOCATOR);
-            pairs.iter().for_each(|pair| _ = matcher.solve(pair).unwrap());
+            pairs.iter().for_each(|pair| _ = driver.solve(pair).unwrap());
             let change = region.change();
-            let plan = matcher.plan();
+            let plan = driver.plan();
             assert_eq!((change.allocations, change.reallocations), (0, 0), "{plan:?}");
         }
     });

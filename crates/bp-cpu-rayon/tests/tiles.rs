@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, Cut, Device, HALO, Likeness, Matcher, MessageStart, Model, Plan, Profile, Progress, Schedule,
+    Algorithm, Backend, Cut, Device, Driver, HALO, Likeness, MessageStart, Model, Plan, Profile, Progress, Schedule,
     Settings, Side, Size, StereoPair, Tiled, Tiling, conformance::noise_pair, synthetic,
 };
 use bp_cpu_rayon::Rayon;
@@ -13,9 +13,9 @@ fn devices() -> [Box<dyn Device>; 2] {
 }
 
 fn whole(device: &dyn Device, pair: &StereoPair, plan: &Plan) -> Vec<u16> {
-    let mut matcher = Matcher::new(device, plan.clone()).unwrap();
-    matcher.solve(pair).unwrap();
-    matcher.labels().to_vec()
+    let mut driver = Driver::new(device, plan.clone()).unwrap();
+    driver.solve(pair).unwrap();
+    driver.labels().to_vec()
 }
 
 fn tiled(device: &dyn Device, pair: &StereoPair, tiling: Tiling) -> Vec<u16> {
@@ -94,14 +94,14 @@ fn one_tile_is_the_matcher_itself() {
     let pair = noise_pair(50, 40, 3);
     let plan = Plan::new(pair.size(), Model::new(Profile::Census, 9).unwrap(), swept(3, 1)).unwrap();
     let device = Scalar.open(0).unwrap();
-    let mut matcher = Matcher::new(device.as_ref(), plan.clone()).unwrap();
-    matcher.solve(&pair).unwrap();
+    let mut driver = Driver::new(device.as_ref(), plan.clone()).unwrap();
+    driver.solve(&pair).unwrap();
     let mut tiled = Tiled::new(device.as_ref(), Tiling::whole(plan)).unwrap();
     tiled.solve(device.as_ref(), &pair).unwrap();
     tiled.free_tiles();
-    assert_eq!(tiled.labels(), matcher.labels());
-    assert_eq!(tiled.allocated_bytes(), matcher.allocated_bytes());
-    assert!(tiled.messages(Side::Left).unwrap() == matcher.messages(Side::Left).unwrap());
+    assert_eq!(tiled.labels(), driver.labels());
+    assert_eq!(tiled.allocated_bytes(), driver.allocated_bytes());
+    assert!(tiled.messages(Side::Left).unwrap() == driver.messages(Side::Left).unwrap());
 }
 
 #[test]

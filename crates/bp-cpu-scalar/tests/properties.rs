@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use bp_core::{
-    Algorithm, BAND_ROWS, Backend, Cut, DataCost, Energy, Error, Image, Matcher, MessageStart, Model, Plan, Profile,
+    Algorithm, BAND_ROWS, Backend, Cut, DataCost, Driver, Energy, Error, Image, MessageStart, Model, Plan, Profile,
     Schedule, Settings, Size, StereoPair,
     conformance::{Answer, Case, Oracle, assert_same, noise_pair, solve},
 };
@@ -284,11 +284,11 @@ fn a_solve_tells_its_progress_and_can_be_stopped() {
     let pair = noise_pair(9, 9, 3);
     let model = Model::new(Profile::Census, 5).unwrap();
     let plan = Plan::new(pair.size(), model, plan_settings(2, 3, Schedule::Checkerboard)).unwrap();
-    let mut matcher = Matcher::new(&Scalar, plan.clone()).unwrap();
+    let mut driver = Driver::new(&Scalar, plan.clone()).unwrap();
     let mut calls = Vec::new();
     let mut stop_at = |stop| {
         calls.clear();
-        let outcome = matcher.solve_observed(&pair, &mut |progress| {
+        let outcome = driver.solve_observed(&pair, &mut |progress| {
             calls.push(progress.done);
             if calls.len() == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
@@ -299,6 +299,6 @@ fn a_solve_tells_its_progress_and_can_be_stopped() {
     let (outcome, calls) = stop_at(0);
     assert_eq!((outcome, calls.last()), (Ok(()), Some(&plan.message_updates())));
     assert!(calls.is_sorted());
-    assert!(matcher.solve(&noise_pair(8, 9, 3)).is_err());
+    assert!(driver.solve(&noise_pair(8, 9, 3)).is_err());
     assert!(Scalar.open(1).is_err());
 }

@@ -217,7 +217,7 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Matcher, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
 
     use super::*;
 
@@ -230,12 +230,12 @@ mod tests {
         let pair = noise_pair(4, 3, 1);
         let settings = Algorithm::Bp.settings(pair.size(), 1, 1, Schedule::Sync);
         let plan = Plan::new(pair.size(), Model::new(Profile::Thesis, 3).unwrap(), settings).unwrap();
-        let mut matcher = Matcher::new(&device, plan.clone()).unwrap();
+        let mut driver = Driver::new(&device, plan.clone()).unwrap();
         device.gpu.abandon();
-        assert!(matches!(matcher.solve(&pair), Err(Error::DeviceLost { .. })));
+        assert!(matches!(driver.solve(&pair), Err(Error::DeviceLost { .. })));
         assert!(matches!(device.prepare(&plan).err(), Some(Error::DeviceLost { .. })));
         drop(device);
-        drop(matcher);
+        drop(driver);
     }
 
     fn family(flags: vk::QueueFlags, timestamp_valid_bits: u32) -> vk::QueueFamilyProperties {

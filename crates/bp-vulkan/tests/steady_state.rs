@@ -1,8 +1,8 @@
-//! A prepared matcher matches pair after pair without allocating on the host. A driver's own memory is not counted.
+//! A prepared driver matches pair after pair without allocating on the host. A driver's own memory is not counted.
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Error, Matcher, Model, Plan, Profile, Schedule, conformance::noise_pair};
+use bp_core::{Algorithm, Backend, Driver, Error, Model, Plan, Profile, Schedule, conformance::noise_pair};
 use bp_vulkan::Vulkan;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
@@ -25,10 +25,10 @@ fn matching_allocates_nothing() -> Result<(), Error> {
         let settings = algorithm.settings(pairs[0].size(), 6, 2, schedule);
         let plan = Plan::new(pairs[0].size(), Model::new(Profile::Census, 17)?, settings)?;
         for device in &devices {
-            let mut matcher = Matcher::new(device.as_ref(), plan.clone())?;
-            (0..2).try_for_each(|_| matcher.solve(&pairs[0]).map(drop))?;
+            let mut driver = Driver::new(device.as_ref(), plan.clone())?;
+            (0..2).try_for_each(|_| driver.solve(&pairs[0]).map(drop))?;
             let region = Region::new(ALLOCATOR);
-            let solved = pairs.iter().try_for_each(|pair| matcher.solve(pair).map(drop));
+            let solved = pairs.iter().try_for_each(|pair| driver.solve(pair).map(drop));
             let change = region.change();
             solved?;
             assert_eq!((change.allocations, change.reallocations), (0, 0), "{plan:?}");

@@ -84,7 +84,7 @@ impl Device for WgpuDevice {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Matcher, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
 
     use super::*;
 
@@ -99,11 +99,11 @@ mod tests {
         let pair = noise_pair(9, 7, 1);
         let settings = Algorithm::Cfbp.settings(pair.size(), 5, 2, Schedule::Checkerboard);
         let plan = Plan::new(pair.size(), Model::new(Profile::Mrf, 8)?, settings)?;
-        let mut matcher = Matcher::new(&device, plan.clone())?;
-        matcher.solve(&pair)?;
+        let mut driver = Driver::new(&device, plan.clone())?;
+        driver.solve(&pair)?;
         device.gpu.device.destroy();
-        assert!(matches!(matcher.solve(&pair), Err(Error::DeviceLost { .. })));
-        assert!(matches!(Matcher::new(&device, plan).err(), Some(Error::DeviceLost { .. })));
+        assert!(matches!(driver.solve(&pair), Err(Error::DeviceLost { .. })));
+        assert!(matches!(Driver::new(&device, plan).err(), Some(Error::DeviceLost { .. })));
         Ok(())
     }
 

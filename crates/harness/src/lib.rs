@@ -29,6 +29,7 @@ mod scenes;
 mod speed;
 mod summary;
 mod threads;
+pub mod watch;
 
 use std::process::ExitCode;
 

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::{Answer, Case, answer, assert_equal, noise_pair, solved};
-use crate::{Algorithm, Cut, Device, Error, Matcher, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+use crate::{Algorithm, Cut, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
 /// Frames from which each next one starts warm.
 const FRAMES: u64 = 3;
@@ -49,27 +49,27 @@ fn plans() -> impl Iterator<Item = (Plan, (usize, usize))> {
 
 /// Answers to all frames, each but the first from a warm start.
 fn video(device: &dyn Device, plan: &Plan, frames: &[StereoPair]) -> Result<Vec<Answer>, Error> {
-    let mut matcher = Matcher::new(device, plan.clone())?;
+    let mut driver = Driver::new(device, plan.clone())?;
     let mut solve = |pair: &StereoPair| {
-        matcher.solve_warm_observed(pair, &mut |_| ControlFlow::Continue(()))?;
-        answer(&mut matcher)
+        driver.solve_warm_observed(pair, &mut |_| ControlFlow::Continue(()))?;
+        answer(&mut driver)
     };
     frames.iter().map(&mut solve).collect()
 }
 
-/// Asserts that a solve after a video, and a warm one after a solve that was stopped, are those of a fresh matcher.
+/// Asserts that a solve after a video, and a warm one after a solve that was stopped, are those of a fresh driver.
 fn assert_forgets_video(device: &dyn Device, plan: &Plan, frames: &[StereoPair]) {
     let case = Case { pair: frames[0].clone(), plan: plan.clone() };
     let again = || -> Result<[Answer; 2], Error> {
-        let mut matcher = Matcher::new(device, plan.clone())?;
-        matcher.solve(&frames[1])?;
-        matcher.solve_warm_observed(&frames[2], &mut |_| ControlFlow::Continue(()))?;
-        matcher.solve(&case.pair)?;
-        let cold = answer(&mut matcher)?;
-        let stopped = matcher.solve_warm_observed(&frames[1], &mut |_| ControlFlow::Break(()));
+        let mut driver = Driver::new(device, plan.clone())?;
+        driver.solve(&frames[1])?;
+        driver.solve_warm_observed(&frames[2], &mut |_| ControlFlow::Continue(()))?;
+        driver.solve(&case.pair)?;
+        let cold = answer(&mut driver)?;
+        let stopped = driver.solve_warm_observed(&frames[1], &mut |_| ControlFlow::Break(()));
         assert_eq!(stopped, Err(Error::Stopped));
-        matcher.solve_warm_observed(&case.pair, &mut |_| ControlFlow::Continue(()))?;
-        Ok([cold, answer(&mut matcher)?])
+        driver.solve_warm_observed(&case.pair, &mut |_| ControlFlow::Continue(()))?;
+        Ok([cold, answer(&mut driver)?])
     };
     let found = again().unwrap_or_else(|error| panic!("{error}\n{plan:?}"));
     let expected = solved(device, &case);

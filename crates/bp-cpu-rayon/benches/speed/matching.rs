@@ -98,7 +98,7 @@ fn on_both<'a>(
 ) -> Result<Vec<Contestant<'a>>, Failure> {
     let on = |(count, asked): (usize, [Option<f64>; 2])| {
         let prepared = Prepared::new(bench.pool(count), (&Rayon, 0), case)?;
-        let facts = facts_of_answer(case.scene, &prepared.matcher)?;
+        let facts = facts_of_answer(case.scene, &prepared.driver)?;
         let mut contestant = contestant(format!("{name}, {}", threads(count)), Of::Total, rounds, asked, prepared);
         contestant.facts.extend(facts);
         Ok(contestant)

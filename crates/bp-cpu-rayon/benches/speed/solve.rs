@@ -3,8 +3,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use bp_core::{
-    Algorithm, Backend, Energy, Error, Matcher, Model, Plan, Profile, Schedule, Settings, Size, Stage, StereoPair,
-    Times,
+    Algorithm, Backend, Driver, Energy, Error, Model, Plan, Profile, Schedule, Settings, Size, Stage, StereoPair, Times,
 };
 use bp_cpu_rayon::Rayon;
 use rayon::ThreadPool;
@@ -49,7 +48,7 @@ pub(crate) struct Prepared<'a> {
     pool: &'a ThreadPool,
     pair: &'a StereoPair,
     /// Its last answer.
-    pub(crate) matcher: Matcher,
+    pub(crate) driver: Driver,
 }
 
 impl<'a> Prepared<'a> {
@@ -60,15 +59,15 @@ impl<'a> Prepared<'a> {
         case: &Case<'a>,
     ) -> Result<Self, Failure> {
         let plan = case.plan()?;
-        let matcher = pool.install(|| Matcher::new(backend.open(device)?.as_ref(), plan))?;
-        let mut prepared = Self { pool, pair: &case.scene.pair, matcher };
+        let driver = pool.install(|| Driver::new(backend.open(device)?.as_ref(), plan))?;
+        let mut prepared = Self { pool, pair: &case.scene.pair, driver };
         prepared.solve()?;
         Ok(prepared)
     }
 
     /// Solves it in its pool.
     pub(crate) fn solve(&mut self) -> Result<Times, Error> {
-        self.pool.install(|| self.matcher.solve(self.pair))
+        self.pool.install(|| self.driver.solve(self.pair))
     }
 }
 
@@ -115,21 +114,21 @@ pub(crate) fn contestant<'a>(
     asked: [Option<f64>; 2],
     mut prepared: Prepared<'a>,
 ) -> Contestant<'a> {
-    let facts = BTreeMap::from([("MiB", (prepared.matcher.allocated_bytes() as f64 / f64::from(1 << 20)).round())]);
+    let facts = BTreeMap::from([("MiB", (prepared.driver.allocated_bytes() as f64 / f64::from(1 << 20)).round())]);
     let run = Box::new(move || {
         let times = prepared.solve()?;
         let stages_ms = Some(times.wall.map(milliseconds));
-        Ok(Sample { value: of.value(&times, prepared.matcher.plan()), stages_ms })
+        Ok(Sample { value: of.value(&times, prepared.driver.plan()), stages_ms })
     });
     Contestant { name, unit: of.unit(), rounds, asked, facts, run }
 }
 
 /// What is known of a scene's answer: its energy and, where the truth is known, the percentages of wrong pixels.
-pub(crate) fn facts_of_answer(scene: &Scene, matcher: &Matcher) -> Result<BTreeMap<&'static str, f64>, Error> {
-    let energy = Energy::of(&scene.pair, matcher.plan().model(), matcher.labels())?.total();
+pub(crate) fn facts_of_answer(scene: &Scene, driver: &Driver) -> Result<BTreeMap<&'static str, f64>, Error> {
+    let energy = Energy::of(&scene.pair, driver.plan().model(), driver.labels())?.total();
     let mut facts = BTreeMap::from([("energy", energy as f64)]);
     if let Some(truth) = &scene.truth {
-        let errors = truth.errors(&matcher.disparities())?;
+        let errors = truth.errors(&driver.disparities())?;
         facts.insert("wrong, all (%)", errors.all.bad_or_unanswered[1]);
         facts.extend(errors.visible.map(|visible| ("wrong, visible (%)", visible.bad_or_unanswered[1])));
     }

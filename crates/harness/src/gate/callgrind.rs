@@ -17,7 +17,7 @@ use std::{
     time::Duration,
 };
 
-use bp_core::{Error, Image, Matcher, Plan, Size, Stage, StereoPair};
+use bp_core::{Driver, Error, Image, Plan, Size, Stage, StereoPair};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -111,7 +111,7 @@ fn solve(backend: &str, plan: Plan) -> Result<String, Failure> {
     threads::run_on(Some(1), || {
         let opened = backends::open(backend, None)?;
         let pair = pair(plan.image_size())?;
-        Matcher::new(opened.device.as_ref(), plan)?.solve(&pair)?;
+        Driver::new(opened.device.as_ref(), plan)?.solve(&pair)?;
         Ok(opened.info.name)
     })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bp_core::{Energy, Matcher, Stage};
+use bp_core::{Driver, Energy, Stage};
 
 use super::{
     guarded::{Entrant, Guarded},
@@ -59,7 +59,7 @@ pub(super) struct Fact {
 struct Ready<'a> {
     entrant: &'a Entrant,
     runner: &'a Runner,
-    matcher: Matcher,
+    driver: Driver,
     solves: u32,
     /// One a round.
     turns: Vec<Sample>,
@@ -120,12 +120,12 @@ fn enter<'a>(
     let known = runners.get(&entrant.runner).zip(planned);
     let (runner, planned) = known.ok_or_else(|| Failure::other(format!("there is no plan {}", entrant.plan)))?;
     let mut ready =
-        Ready { entrant, runner, matcher: prepare(runner, &planned, problem)?, solves: 1, turns: Vec::new() };
+        Ready { entrant, runner, driver: prepare(runner, &planned, problem)?, solves: 1, turns: Vec::new() };
     let first = ready.solve(problem)?;
     ready.solves = ((runner.turn_ms / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
-    add_answer(&runner.name, entrant.plan, &ready.matcher, problem, facts)?;
+    add_answer(&runner.name, entrant.plan, &ready.driver, problem, facts)?;
     let owner = Some(runner.name.clone()).filter(|runner| *runner != runners.lineup.reference);
-    let allocated = Fact { value: ready.matcher.allocated_bytes().to_string(), runner: owner };
+    let allocated = Fact { value: ready.driver.allocated_bytes().to_string(), runner: owner };
     facts.insert(format!("{}: {}, bytes allocated", runner.name, entrant.plan), allocated);
     Ok(ready)
 }
@@ -137,9 +137,9 @@ fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut BTreeMap<St
         if facts.contains_key(&format!("{}: energy", planned.name)) {
             continue;
         }
-        let mut matcher = prepare(runner, &planned, problem)?;
-        runner.run(|| matcher.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
-        add_answer(&runner.name, planned.name, &matcher, problem, facts)?;
+        let mut driver = prepare(runner, &planned, problem)?;
+        runner.run(|| driver.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
+        add_answer(&runner.name, planned.name, &driver, problem, facts)?;
     }
     Ok(())
 }
@@ -148,11 +148,11 @@ fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut BTreeMap<St
 fn add_answer(
     runner: &str,
     plan: &str,
-    matcher: &Matcher,
+    driver: &Driver,
     problem: &Problem,
     facts: &mut BTreeMap<String, Fact>,
 ) -> Result<(), Failure> {
-    for (name, value) in answer(matcher, problem)? {
+    for (name, value) in answer(driver, problem)? {
         let new = Fact { value: value.clone(), runner: None };
         let known = facts.entry(format!("{plan}: {name}")).or_insert(new);
         if known.value != value {
@@ -163,23 +163,23 @@ fn add_answer(
     Ok(())
 }
 
-fn prepare(runner: &Runner, planned: &Planned, problem: &Problem) -> Result<Matcher, Failure> {
+fn prepare(runner: &Runner, planned: &Planned, problem: &Problem) -> Result<Driver, Failure> {
     let plan = planned.plan(problem.scene.pair.size(), problem.labels, problem.k)?;
     let device = runner.opened.device.as_ref();
     let prepared = runner.run(|| {
         let needed = device.planned_bytes(&plan);
         machine::check_memory(runner.opened.info.kind, needed, "a full run needs more than --quick")?;
-        Ok(Matcher::new(device, plan)?)
+        Ok(Driver::new(device, plan)?)
     });
     prepared.map_err(|failure: Failure| failure.of(&runner.name))
 }
 
 /// What every backend must answer, by name.
-fn answer(matcher: &Matcher, problem: &Problem) -> Result<[(&'static str, String); 5], Failure> {
-    let (scene, plan) = (&problem.scene, matcher.plan());
-    let errors = scene.truth.errors(&matcher.disparities())?;
+fn answer(driver: &Driver, problem: &Problem) -> Result<[(&'static str, String); 5], Failure> {
+    let (scene, plan) = (&problem.scene, driver.plan());
+    let errors = scene.truth.errors(&driver.disparities())?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
-    let energy = Energy::of(&scene.pair, plan.model(), matcher.labels())?.total();
+    let energy = Energy::of(&scene.pair, plan.model(), driver.labels())?.total();
     Ok([
         ("message entries", plan.message_updates().to_string()),
         ("energy", energy.to_string()),
@@ -191,9 +191,9 @@ fn answer(matcher: &Matcher, problem: &Problem) -> Result<[(&'static str, String
 
 impl Ready<'_> {
     fn solve(&mut self, problem: &Problem) -> Result<Sample, Failure> {
-        let Self { runner, matcher, .. } = self;
+        let Self { runner, driver, .. } = self;
         let times =
-            runner.run(|| matcher.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
+            runner.run(|| driver.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
         // Without a clock of its own a GPU's stages are those of handing over work: they are no numbers.
         let waits = runner.opened.info.api.is_none();
         let stages = times.device.or(waits.then_some(times.wall)).map(|stages| stages.map(milliseconds));

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use bp_core::{
-    Algorithm, Energy, Matcher, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels,
-};
+use bp_core::{Algorithm, Driver, Energy, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels};
 
 use crate::{
     backends,
@@ -43,9 +41,9 @@ pub(super) fn compare(folder: &Path, observer: &mut Observer<'_>) -> Result<Vec<
         }
         let settings = Algorithm::Bp.settings(pair.size(), LOOPS, 1, Schedule::Checkerboard);
         let reference = backends::reference()?;
-        let mut matcher = Matcher::new(reference.device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
-        matcher.solve_observed(&pair, observer)?;
-        add(&format!("BP, {LOOPS} checkerboard loops"), true, matcher.labels())?;
+        let mut driver = Driver::new(reference.device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
+        driver.solve_observed(&pair, observer)?;
+        add(&format!("BP, {LOOPS} checkerboard loops"), true, driver.labels())?;
     }
     Ok(labellings)
 }

@@ -2,7 +2,7 @@
 
 use std::{ops::ControlFlow, time::Instant};
 
-use bp_core::{Energy, Matcher, Times};
+use bp_core::{Driver, Energy, Times};
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -165,7 +165,7 @@ fn wants_sample(cell: &Cell, round: u32) -> bool {
 
 /// A finished solve.
 struct Solved {
-    matcher: Matcher,
+    driver: Driver,
     prepare_ms: f64,
     compile_ms: Option<f64>,
     times: Times,
@@ -182,17 +182,17 @@ fn solve(
     let plan = planned.plan(scene.pair.size(), run.labels, run.k)?;
     machine::check_memory(device.info.kind, device.device.planned_bytes(&plan), "--quick needs less")?;
     let start = Instant::now();
-    let mut matcher = Matcher::new(device.device.as_ref(), plan)?;
+    let mut driver = Driver::new(device.device.as_ref(), plan)?;
     let prepare_ms = 1000.0 * start.elapsed().as_secs_f64();
-    let compile_ms = matcher.compile_time().map(|time| 1000.0 * time.as_secs_f64());
-    let times = matcher.solve_observed(&scene.pair, &mut |progress| update(progress.done))?;
-    Ok(Solved { matcher, prepare_ms, compile_ms, times })
+    let compile_ms = driver.compile_time().map(|time| 1000.0 * time.as_secs_f64());
+    let times = driver.solve_observed(&scene.pair, &mut |progress| update(progress.done))?;
+    Ok(Solved { driver, prepare_ms, compile_ms, times })
 }
 
 /// Adds a sample to a cell's measurement. The first one brings the answer's quality and map; all samples on all devices
 /// must answer the same.
 fn measured(cell: &Cell, round: u32, scene: &Scene, solved: Solved, storage: &Storage) -> Result<Outcome, Failure> {
-    let labels: Vec<u8> = solved.matcher.labels().iter().flat_map(|label| label.to_le_bytes()).collect();
+    let labels: Vec<u8> = solved.driver.labels().iter().flat_map(|label| label.to_le_bytes()).collect();
     let labels_sha256 = hex(&Sha256::digest(labels));
     let same = |other: &&Cell| other.scene == cell.scene && other.plan == cell.plan;
     for other in storage.record().cells.iter().filter(same) {
@@ -209,7 +209,7 @@ fn measured(cell: &Cell, round: u32, scene: &Scene, solved: Solved, storage: &St
     };
     let mut measurement = match cell.measured() {
         Some(measurement) => measurement.clone(),
-        None => first_measurement(cell, scene, &solved.matcher, labels_sha256, storage)?,
+        None => first_measurement(cell, scene, &solved.driver, labels_sha256, storage)?,
     };
     measurement.samples.push(sample);
     Ok(Outcome::Measured(Box::new(measurement)))
@@ -219,19 +219,19 @@ fn measured(cell: &Cell, round: u32, scene: &Scene, solved: Solved, storage: &St
 fn first_measurement(
     cell: &Cell,
     scene: &Scene,
-    matcher: &Matcher,
+    driver: &Driver,
     labels_sha256: String,
     storage: &Storage,
 ) -> Result<Measurement, Failure> {
-    let disparities = matcher.disparities();
+    let disparities = driver.disparities();
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
     Raster::disparities(&disparities).write(&storage.folder().join(&map))?;
     Ok(Measurement {
         samples: Vec::new(),
-        allocated_bytes: matcher.allocated_bytes(),
-        energy: Energy::of(&scene.pair, matcher.plan().model(), matcher.labels())?.into(),
+        allocated_bytes: driver.allocated_bytes(),
+        energy: Energy::of(&scene.pair, driver.plan().model(), driver.labels())?.into(),
         all: errors.all.into(),
         visible: visible.into(),
         labels_sha256,

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bp_core::{Matcher, Plan, StereoPair, Times};
+use bp_core::{Driver, Plan, StereoPair, Times};
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -105,7 +105,7 @@ fn sha256(labels: &[u16]) -> String {
 /// A device in a contest.
 enum Entrant {
     /// It is ready for the next round.
-    In(Box<Matcher>, Box<Measurement>),
+    In(Box<Driver>, Box<Measurement>),
     /// It cannot go on.
     Out(Outcome),
 }
@@ -130,33 +130,33 @@ impl Turns<'_> {
         let planned = opened.device.planned_bytes(&self.plan);
         machine::check_memory(opened.info.kind, planned, "--quick needs less")?;
         let start = Instant::now();
-        let mut matcher = Matcher::new(opened.device.as_ref(), self.plan.clone())?;
+        let mut driver = Driver::new(opened.device.as_ref(), self.plan.clone())?;
         let prepare_ms = milliseconds(start.elapsed());
-        let first_ms = milliseconds(self.solve(opened, &mut matcher)?.total);
+        let first_ms = milliseconds(self.solve(opened, &mut driver)?.total);
         let rounds = if first_ms > FEW_ROUNDS_ABOVE_MS { self.rounds.min(FEW_ROUNDS) } else { self.rounds };
         self.work.skip(u64::from(self.rounds - rounds) * self.plan.message_updates());
         let line = format!("{:<12}{:<10}ready in {prepare_ms:>8.1} ms", self.name, opened.name);
         self.work.bar.line(&format!("{line}, first solve {first_ms:>10.1} ms"));
         let measurement = Measurement {
             prepare_ms,
-            compile_ms: matcher.compile_time().map(milliseconds),
-            allocated_bytes: matcher.allocated_bytes(),
-            moved_bytes: matcher.moved_bytes().map(Into::into),
+            compile_ms: driver.compile_time().map(milliseconds),
+            allocated_bytes: driver.allocated_bytes(),
+            moved_bytes: driver.moved_bytes().map(Into::into),
             first_ms,
             rounds,
             samples: Vec::new(),
         };
-        Ok(Entrant::In(Box::new(matcher), Box::new(measurement)))
+        Ok(Entrant::In(Box::new(driver), Box::new(measurement)))
     }
 
     /// Takes the sample of a round, where the device takes part in it.
     fn take(&mut self, opened: &mut Opened, entrant: &mut Entrant, round: u32) -> Result<(), Failure> {
-        let Entrant::In(matcher, measurement) = entrant else { return Ok(()) };
+        let Entrant::In(driver, measurement) = entrant else { return Ok(()) };
         if round >= measurement.rounds {
             return Ok(());
         }
         self.work.bar.message(format!("{} {}, round {} of {}", self.name, opened.name, round + 1, measurement.rounds));
-        match self.solve(opened, matcher) {
+        match self.solve(opened, driver) {
             Ok(times) => {
                 let total_ms = milliseconds(times.total);
                 measurement.samples.push(Sample { round, total_ms, clocks: clocks(&times) });
@@ -170,11 +170,11 @@ impl Turns<'_> {
     }
 
     /// Solves the problem; fails where the answer is not that of those before.
-    fn solve(&mut self, opened: &Opened, matcher: &mut Matcher) -> Result<Times, Failure> {
+    fn solve(&mut self, opened: &Opened, driver: &mut Driver) -> Result<Times, Failure> {
         let work = &*self.work;
-        let times = matcher.solve_observed(self.pair, &mut |progress| work.update(progress.done))?;
-        let (labels, whose) = self.answer.get_or_insert_with(|| (matcher.labels().to_vec(), opened.name.clone()));
-        if labels != matcher.labels() {
+        let times = driver.solve_observed(self.pair, &mut |progress| work.update(progress.done))?;
+        let (labels, whose) = self.answer.get_or_insert_with(|| (driver.labels().to_vec(), opened.name.clone()));
+        if labels != driver.labels() {
             return Err(Failure::other(format!("other labels than {whose} gave")));
         }
         self.work.done += self.plan.message_updates();
