@@ -1,0 +1,48 @@
+//! Files of stereo matching: images, disparity maps, masks, point clouds, calibrations and the sidecars that describe maps.
+//!
+//! Readers take any bytes and answer with an [`Error`] instead of a panic; [`Limits`] bound what they allocate. Writers
+//! go through [`Files`], which writes beside the final place and renames, so that nobody ever sees half a file.
+//!
+//! ```no_run
+//! use bp_io::{Files, Limits, Raster, read_image, read_map};
+//!
+//! # fn main() -> Result<(), bp_io::Error> {
+//! let limits = Limits::default();
+//! let image = read_image("left.png".as_ref(), limits)?;
+//! println!("{} pixels", image.size());
+//! let map = read_map("map.pfm".as_ref(), None, limits)?;
+//! Raster::disparities(&map).write(&Files::default(), "map.png".as_ref())?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod calibration;
+mod caught;
+mod colours;
+mod error;
+mod format;
+mod images;
+mod limits;
+mod maps;
+mod npy;
+mod pfm;
+mod picture;
+mod ply;
+mod raster;
+mod sidecar;
+mod tiff;
+mod write;
+
+pub use calibration::{CalibrationFile, Geometry};
+pub use caught::is_caught;
+pub use colours::Colours;
+pub use error::Error;
+pub use format::{MapFormat, Quantity, check_ending, check_range};
+pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey};
+pub use limits::Limits;
+pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};
+pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};
+pub use ply::write_points;
+pub use raster::Raster;
+pub use sidecar::{Origin, remove_sidecar, sidecar_of, write_picture_sidecar, write_sidecar};
+pub use write::{Files, check_distinct, check_new, create_folder, resolved};

@@ -1,0 +1,64 @@
+//! How much a reader may take.
+
+use std::path::Path;
+
+use crate::Error;
+
+/// Bounds on what a file may hold, and on the memory that reading it may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most pixels.
+    pub pixels: u64,
+    /// Most bytes of memory, where there is such a bound.
+    pub memory: Option<u64>,
+}
+
+/// [`Limits::MEGAPIXELS`] and any memory.
+impl Default for Limits {
+    fn default() -> Self {
+        Self::megapixels(Self::MEGAPIXELS)
+    }
+}
+
+impl Limits {
+    /// The default, in megapixels.
+    pub const MEGAPIXELS: u32 = 100;
+
+    /// A limit of so many megapixels, and any memory.
+    #[must_use]
+    pub fn megapixels(megapixels: u32) -> Self {
+        Self { pixels: u64::from(megapixels) * 1_000_000, memory: None }
+    }
+
+    /// The same with at most so many bytes of memory.
+    #[must_use]
+    pub fn within(self, memory: Option<u64>) -> Self {
+        Self { memory, ..self }
+    }
+
+    /// Most bytes that a file of so many pixels may have, and its decoder may take at a time.
+    pub(crate) fn file_bytes(self) -> u64 {
+        self.pixels.saturating_mul(16).saturating_add(1 << 20)
+    }
+
+    /// Refuses an image beyond the limit.
+    pub(crate) fn check_size(self, path: &Path, width: u64, height: u64) -> Result<(), Error> {
+        if width.saturating_mul(height) <= self.pixels {
+            return Ok(());
+        }
+        let limit = self.pixels / 1_000_000;
+        let what = format!("{width}x{height} pixels exceed the limit of {limit} megapixels; raise `max_megapixels`");
+        Err(Error::reading(path, &what))
+    }
+
+    /// Refuses a file that takes more memory to read than there is.
+    pub(crate) fn check_memory(self, path: &Path, needed: u64) -> Result<(), Error> {
+        let refused = |available| Error::OutOfMemory { path: path.to_owned(), needed, available };
+        if self.memory.is_some_and(|memory| needed > memory) {
+            return Err(refused(self.memory));
+        }
+        // A decoder that gets no memory, below `ulimit -v` say, would end the program.
+        let is_there = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX)).is_ok();
+        if is_there { Ok(()) } else { Err(refused(None)) }
+    }
+}

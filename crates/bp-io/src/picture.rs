@@ -1,0 +1,99 @@
+//! Coloured pictures of disparity maps.
+
+use std::{io::Write, ops::RangeInclusive, path::Path};
+
+use bp_core::{DisparityMap, Size};
+use image::{ExtendedColorType, ImageEncoder, ImageError, codecs::png::PngEncoder};
+
+use crate::{Colours, Error, Files};
+
+/// The colour of unknown pixels.
+const UNKNOWN: [u8; 3] = [0; 3];
+
+/// A picture in memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Pixels of a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Red, green and blue, `[height][width]`.
+    pub colours: Vec<[u8; 3]>,
+}
+
+/// The bar beside a picture: which disparities its colours stand for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColourBar {
+    /// Disparity of the lower end in pixels.
+    pub low: f32,
+    /// Disparity of the upper end in pixels.
+    pub high: f32,
+    /// Height of the picture in pixels.
+    pub height: u32,
+    /// The colours.
+    pub colours: Colours,
+}
+
+/// Draws a bar, or says why it cannot. Text needs a font, so that a program brings its own way to draw it.
+pub type DrawBar = fn(&ColourBar) -> Result<Pixels, String>;
+
+/// How a picture of a map looks.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Picture {
+    /// The colours of known pixels.
+    pub colours: Colours,
+    /// Draws the bar beside the map; none for a picture of the map's size.
+    pub bar: Option<DrawBar>,
+}
+
+impl Picture {
+    /// Writes a map as a coloured PNG over its own range; a map without known pixels has no bar.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn write(self, files: &Files, path: &Path, map: &DisparityMap) -> Result<(), Error> {
+        let (low, high) = map.range().unwrap_or((0.0, 1.0));
+        let mut picture = coloured(map, low..=high, self.colours);
+        if let Some(draw) = self.bar.filter(|_| map.range().is_some()) {
+            let bar = ColourBar { low, high, height: picture.height, colours: self.colours };
+            picture = beside(&picture, &draw(&bar).map_err(|error| Error::writing(path, &error))?);
+        }
+        files.whole(path, |file| encode(file, &picture))
+    }
+}
+
+/// Encodes a map as a coloured PNG: the near end of `range` bright, the far end dark, unknown black.
+///
+/// # Errors
+/// Those of the encoder, and of writing.
+pub fn encode_picture(file: &mut dyn Write, map: &DisparityMap, range: RangeInclusive<f32>) -> Result<(), ImageError> {
+    encode(file, &coloured(map, range, Colours::Viridis))
+}
+
+fn coloured(map: &DisparityMap, range: RangeInclusive<f32>, colours: Colours) -> Pixels {
+    let (low, high) = (f64::from(*range.start()), f64::from(*range.end()));
+    let place = |value: f32| if low < high { (f64::from(value) - low) / (high - low) } else { 0.5 };
+    let pixel = |&value: &f32| if value.is_finite() { colours.at(place(value)) } else { UNKNOWN };
+    let Size { width, height } = map.size();
+    Pixels { width: width as u32, height: height as u32, colours: map.values().iter().map(pixel).collect() }
+}
+
+/// Two pictures side by side from the top, on white.
+fn beside(left: &Pixels, right: &Pixels) -> Pixels {
+    let (width, height) = (left.width + right.width, left.height.max(right.height));
+    let row = |picture: &Pixels, y: u32| -> Vec<[u8; 3]> {
+        let begin = y as usize * picture.width as usize;
+        picture
+            .colours
+            .get(begin..begin + picture.width as usize)
+            .map_or_else(|| vec![[255; 3]; picture.width as usize], Vec::from)
+    };
+    let mut colours = Vec::with_capacity(width as usize * height as usize);
+    colours.extend((0..height).flat_map(|y| [row(left, y), row(right, y)]).flatten());
+    Pixels { width, height, colours }
+}
+
+fn encode(file: &mut dyn Write, picture: &Pixels) -> Result<(), ImageError> {
+    let bytes = picture.colours.as_flattened();
+    PngEncoder::new(file).write_image(bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
+}

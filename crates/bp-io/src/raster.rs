@@ -1,0 +1,86 @@
+//! Values a pixel on their way to a file.
+
+use std::path::Path;
+
+use bp_core::{DisparityMap, Size};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use crate::{Error, Files, MapFormat, Quantity, format::out_of_png_range, npy, pfm, tiff};
+
+/// Values on their way to a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Raster<'a> {
+    /// Width and height.
+    pub size: Size,
+    /// `[height][width]`; plus infinity where unknown.
+    pub values: &'a [f32],
+    /// What they are.
+    pub quantity: Quantity,
+}
+
+impl<'a> Raster<'a> {
+    /// The disparities of a map.
+    #[must_use]
+    pub fn disparities(map: &'a DisparityMap) -> Self {
+        Self { size: map.size(), values: map.values(), quantity: Quantity::Disparity }
+    }
+
+    /// The least and the largest known value.
+    #[must_use]
+    pub fn range(&self) -> Option<(f32, f32)> {
+        let known = self.values.iter().filter(|value| value.is_finite()).map(|&value| (value, value));
+        known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
+    }
+
+    /// The file of a format that holds the values themselves, in memory.
+    ///
+    /// # Errors
+    /// What the encoder says; `None` for [`MapFormat::Png16`], which rounds.
+    pub fn floats(&self, format: MapFormat) -> Option<Result<Vec<u8>, String>> {
+        let Self { size, values, .. } = *self;
+        let mut bytes = Vec::new();
+        let written = match format {
+            MapFormat::Png16 => return None,
+            MapFormat::Pfm => pfm::write(&mut bytes, size, values).map_err(|error| error.to_string()),
+            MapFormat::Npy => npy::write(&mut bytes, size, values).map_err(|error| error.to_string()),
+            MapFormat::Tiff => {
+                tiff::encode(size, values).map(|encoded| bytes = encoded).map_err(|error| error.to_string())
+            }
+        };
+        Some(written.map(|()| bytes))
+    }
+
+    /// Writes it in the format of the path's ending.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where the format cannot hold a value, [`Error::Write`].
+    pub fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
+        let Self { size, values, quantity } = *self;
+        match MapFormat::of(path)? {
+            MapFormat::Pfm => files.whole(path, |file| pfm::write(file, size, values)),
+            MapFormat::Npy => files.whole(path, |file| npy::write(file, size, values)),
+            MapFormat::Tiff => {
+                let bytes = tiff::encode(size, values).map_err(|error| Error::writing(path, &error))?;
+                files.whole(path, |file| file.write_all(&bytes))
+            }
+            MapFormat::Png16 => {
+                let stored = whole_numbers(values, quantity.steps()).ok_or_else(|| out_of_png_range(path))?;
+                let bytes: Vec<u8> = stored.iter().flat_map(|value| value.to_ne_bytes()).collect();
+                let (width, height) = (size.width as u32, size.height as u32);
+                files.whole(path, |file| {
+                    PngEncoder::new(file).write_image(&bytes, width, height, ExtendedColorType::L16)
+                })
+            }
+        }
+    }
+}
+
+/// Values times `steps`, at least 1; 0 where unknown. `None` where one does not fit.
+fn whole_numbers(values: &[f32], steps: f32) -> Option<Vec<u16>> {
+    let stored = |&value: &f32| match (value * steps).round() {
+        _ if !value.is_finite() => Some(0),
+        scaled if (0.0..=65535.0).contains(&scaled) => Some((scaled as u16).max(1)),
+        _ => None,
+    };
+    values.iter().map(stored).collect()
+}

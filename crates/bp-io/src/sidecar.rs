@@ -1,0 +1,188 @@
+//! What a map's file does not say of itself, as JSON beside it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bp_core::Calibration;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::{Colours, Error, Files, MapFormat, Raster};
+
+/// Version of the sidecar; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
+
+/// What the program is called in it, before its version.
+const PROGRAM: &str = "bp ";
+
+/// The sidecar's path: the map's, and `.json`.
+#[must_use]
+pub fn sidecar_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
+}
+
+/// What a map's sidecar says it holds; `None` where there is no sidecar of this program.
+pub(crate) fn told_quantity(path: &Path) -> Option<String> {
+    let sidecar: Value = serde_json::from_slice(&fs::read(sidecar_of(path)).ok()?).ok()?;
+    let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
+    Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
+}
+
+/// Removes the sidecar of a map, but not another program's file of that name.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn remove_sidecar(path: &Path) -> Result<(), Error> {
+    if told_quantity(path).is_none() {
+        return Ok(());
+    }
+    let sidecar = sidecar_of(path);
+    fs::remove_file(&sidecar).map_err(|error| Error::writing(&sidecar, &error))
+}
+
+/// Where a map comes from.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin<'a, P> {
+    /// What was run to make it, where it was matched.
+    pub plan: Option<&'a P>,
+    /// Disparities of the first and the last label in pixels, where it was matched.
+    pub labels: Option<[i64; 2]>,
+    /// The geometry, of depths.
+    pub calibration: Option<&'a Calibration>,
+    /// The files that it was made of.
+    pub inputs: &'a [&'a Path],
+}
+
+/// What is told; a value is `stored * scale + offset`.
+#[derive(Serialize)]
+struct Sidecar<'a, P> {
+    schema_version: u32,
+    program: String,
+    quantity: &'static str,
+    unit: &'static str,
+    format: &'static str,
+    scale: f64,
+    offset: f64,
+    unknown: Unknown,
+    /// Of a picture: the colours in which places from 0 to 1 are stored.
+    colours: Option<&'static str>,
+    width: usize,
+    height: usize,
+    /// Disparities of the first and the last label, in pixels.
+    labels: Option<Range<i64>>,
+    /// The least and the largest known value, in `unit`; none where no pixel is known.
+    found: Option<Range<f32>>,
+    calibration: Option<Geometry>,
+    plan: Option<&'a P>,
+    inputs: Vec<String>,
+}
+
+/// What is stored where nothing is known; JSON has no number for infinity.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Unknown {
+    Number(u16),
+    Text(&'static str),
+}
+
+#[derive(Serialize)]
+struct Range<T> {
+    min: T,
+    max: T,
+}
+
+#[derive(Serialize)]
+struct Geometry {
+    focal_px: f64,
+    baseline_mm: f64,
+    doffs_px: f64,
+    principal_point_px: [f64; 2],
+}
+
+impl From<&Calibration> for Geometry {
+    fn from(calibration: &Calibration) -> Self {
+        Self {
+            focal_px: calibration.focal(),
+            baseline_mm: calibration.baseline(),
+            doffs_px: calibration.doffs(),
+            principal_point_px: calibration.principal_point(),
+        }
+    }
+}
+
+/// How values are stored.
+struct Stored {
+    format: &'static str,
+    scale: f64,
+    offset: f64,
+    unknown: Unknown,
+    colours: Option<&'static str>,
+}
+
+/// Writes the sidecar of a map that was written to `path`.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn write_sidecar<P: Serialize>(
+    files: &Files,
+    path: &Path,
+    raster: &Raster<'_>,
+    origin: &Origin<'_, P>,
+) -> Result<(), Error> {
+    let format = MapFormat::of(path)?;
+    let (scale, unknown) = match format {
+        MapFormat::Png16 => (1.0 / f64::from(raster.quantity.steps()), Unknown::Number(0)),
+        MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
+    };
+    write(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
+}
+
+/// Writes the sidecar of a coloured picture of a map that was written to `path`: stored are places among the colours,
+/// from 0 to 1.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn write_picture_sidecar<P: Serialize>(
+    files: &Files,
+    path: &Path,
+    raster: &Raster<'_>,
+    colours: Colours,
+    origin: &Origin<'_, P>,
+) -> Result<(), Error> {
+    let (low, high) = raster.range().map_or((0.0, 1.0), |(low, high)| (f64::from(low), f64::from(high)));
+    let (unknown, colours) = (Unknown::Text("black"), Some(colours.name()));
+    let stored = Stored { format: "coloured PNG", scale: high - low, offset: low, unknown, colours };
+    write(files, path, raster, origin, stored)
+}
+
+fn write<P: Serialize>(
+    files: &Files,
+    path: &Path,
+    raster: &Raster<'_>,
+    origin: &Origin<'_, P>,
+    stored: Stored,
+) -> Result<(), Error> {
+    let sidecar = Sidecar {
+        schema_version: SCHEMA_VERSION,
+        program: format!("{PROGRAM}{}", env!("CARGO_PKG_VERSION")),
+        quantity: raster.quantity.name(),
+        unit: raster.quantity.unit(),
+        format: stored.format,
+        scale: stored.scale,
+        offset: stored.offset,
+        unknown: stored.unknown,
+        colours: stored.colours,
+        width: raster.size.width,
+        height: raster.size.height,
+        labels: origin.labels.map(|[min, max]| Range { min, max }),
+        found: raster.range().map(|(min, max)| Range { min, max }),
+        calibration: origin.calibration.map(Into::into),
+        plan: origin.plan,
+        inputs: origin.inputs.iter().map(|path| path.display().to_string()).collect(),
+    };
+    files.json(&sidecar_of(path), &sidecar)
+}

@@ -1,0 +1,68 @@
+//! TIFF files of 32-bit floats, which the `image` crate neither reads nor writes.
+
+use std::{
+    io::{Cursor, ErrorKind},
+    path::Path,
+};
+
+use bp_core::Size;
+use tiff::{
+    ColorType, TiffError, TiffResult,
+    decoder::{Decoder, DecodingResult},
+    encoder::{TiffEncoder, colortype::Gray32Float},
+};
+
+use crate::{Error, Limits};
+
+/// Encodes values `[height][width]`.
+pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
+    let mut file = Cursor::new(Vec::new());
+    TiffEncoder::new(&mut file)?.write_image::<Gray32Float>(size.width as u32, size.height as u32, values)?;
+    Ok(file.into_inner())
+}
+
+/// The floats `[height][width]` of a grey file; `None` where it holds something else.
+pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
+    let failed = |error: TiffError| match error {
+        TiffError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
+            Error::reading(path, &"the file ends too early or is broken")
+        }
+        error => Error::reading(path, &error),
+    };
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(failed)?;
+    if !matches!(decoder.colortype().map_err(failed)?, ColorType::Gray(32 | 64)) {
+        return Ok(None);
+    }
+    let (width, height) = decoder.dimensions().map_err(failed)?;
+    limit.check_size(path, width.into(), height.into())?;
+    let size = Size::new(width as usize, height as usize).map_err(|error| Error::reading(path, &error))?;
+    // Doubles and what they become.
+    let needed = 12 * size.pixels() as u64;
+    limit.check_memory(path, needed)?;
+    let mut limits = tiff::decoder::Limits::default();
+    limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
+    limits.intermediate_buffer_size = limits.decoding_buffer_size;
+    let values = match decoder.with_limits(limits).read_image().map_err(failed)? {
+        DecodingResult::F32(values) => values,
+        DecodingResult::F64(values) => values.into_iter().map(|value| value as f32).collect(),
+        _ => return Err(Error::reading(path, &"a TIFF map holds 8 or 16 bits, or floats of 32 or 64")),
+    };
+    if values.len() != size.pixels() {
+        return Err(Error::reading(path, &format!("{} values where {size} pixels were expected", values.len())));
+    }
+    Ok(Some((size, values)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_written_and_cut_files_refused() {
+        let (size, values) = (Size { width: 3, height: 2 }, [1.0, -2.5, f32::INFINITY, 0.0, 1e-3, 255.0]);
+        let bytes = encode(size, &values).unwrap();
+        let read = |bytes: &[u8]| parse(Path::new("map.tif"), bytes, Limits::megapixels(1));
+        assert_eq!(read(&bytes).unwrap(), Some((size, values.to_vec())));
+        assert!((0..bytes.len()).all(|len| read(&bytes[..len]).is_err()));
+    }
+}

@@ -1,0 +1,169 @@
+//! Writing files whole or not at all.
+
+use std::{
+    fmt::Display,
+    fs,
+    io::{BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+use tempfile::NamedTempFile;
+
+use crate::Error;
+
+/// Writes files beside their final place and renames them.
+#[derive(Clone, Debug)]
+pub struct Files {
+    /// What names of temporary files begin with, so that those of a killed process can be found.
+    temporary: String,
+}
+
+/// Temporary files are called `.bp-` and something random.
+impl Default for Files {
+    fn default() -> Self {
+        Self { temporary: Self::PREFIX.to_owned() }
+    }
+}
+
+impl Files {
+    /// What names of all temporary files begin with.
+    pub const PREFIX: &str = ".bp-";
+
+    /// Files whose temporary names begin with [`Files::PREFIX`], `owner` and a hyphen.
+    #[must_use]
+    pub fn of(owner: &str) -> Self {
+        Self { temporary: format!("{}{owner}-", Self::PREFIX) }
+    }
+
+    /// What names of these temporary files begin with.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        &self.temporary
+    }
+
+    /// Writes a file that `write` fills, or leaves what was there.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn whole<E: Display>(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), Error> {
+        // A link stays; what it points to is replaced.
+        let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        self.filled_beside(path, write)?.persist(path).map_err(|failed| Error::writing(path, &failed.error))?;
+        Ok(())
+    }
+
+    /// Writes a text.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn text(&self, path: &Path, text: &str) -> Result<(), Error> {
+        self.whole(path, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// Writes a value as JSON that people can read.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn json(&self, path: &Path, value: &impl Serialize) -> Result<(), Error> {
+        let text = serde_json::to_string_pretty(value).map_err(|error| Error::writing(path, &error))?;
+        self.text(path, &(text + "\n"))
+    }
+
+    /// Writes a file that is not there yet; one that is stays as it was.
+    ///
+    /// # Errors
+    /// [`Error::Write`], also where there is a file.
+    pub fn new_file(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Error> {
+        let file = self.filled_beside(path, |file| file.write_all(contents.as_ref()))?;
+        file.persist_noclobber(path).map_err(|failed| Error::writing(path, &failed.error))?;
+        Ok(())
+    }
+
+    /// Fails where no file could be written at `path`, so that a caller can say so before the work is done.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn check_writable(&self, path: &Path) -> Result<(), Error> {
+        if path.is_dir() {
+            return Err(Error::writing(path, &"it is a folder"));
+        }
+        if path.exists() && !path.is_file() {
+            return Err(Error::writing(path, &"something is there that is no file"));
+        }
+        self.temporary_beside(path).map(drop)
+    }
+
+    /// A file in the folder of `path`, filled and safe on the disk, which vanishes unless it is kept.
+    fn filled_beside<E: Display>(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<NamedTempFile, Error> {
+        let failed = |error: &dyn Display| Error::writing(path, error);
+        let mut file = self.temporary_beside(path)?;
+        let mut buffered = BufWriter::new(file.as_file_mut());
+        write(&mut buffered).map_err(|e| failed(&e))?;
+        buffered.flush().map_err(|e| failed(&e))?;
+        drop(buffered);
+        file.as_file().sync_all().map_err(|e| failed(&e))?;
+        Ok(file)
+    }
+
+    fn temporary_beside(&self, path: &Path) -> Result<NamedTempFile, Error> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            return Err(Error::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
+        }
+        let mut builder = tempfile::Builder::new();
+        // Temporary files are private by default; a result is for whom the user's mask says.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        // The error's own words would name the temporary file.
+        let failed = |error: std::io::Error| Error::writing(path, &error.kind());
+        builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
+    }
+}
+
+/// Fails where writing `output` would overwrite `other`; `what` says so in words.
+///
+/// # Errors
+/// [`Error::Request`].
+pub fn check_distinct(other: &Path, output: &Path, what: &str) -> Result<(), Error> {
+    if resolved(other) != resolved(output) {
+        return Ok(());
+    }
+    Err(Error::request(output, &format!("it {what}; choose another output")))
+}
+
+/// The path of a file without links and steps up, as far as it exists: two names of one file become equal.
+#[must_use]
+pub fn resolved(path: &Path) -> PathBuf {
+    path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned())
+}
+
+/// Fails where there is a file at `path`, which [`Files::new_file`] would refuse in the end.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn check_new(path: &Path) -> Result<(), Error> {
+    match path.symlink_metadata() {
+        Ok(_) => Err(Error::writing(path, &"it exists, and a record is never overwritten; choose another folder")),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Creates a folder and those above it.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn create_folder(path: &Path) -> Result<(), Error> {
+    if path.exists() && !path.is_dir() {
+        return Err(Error::writing(path, &"a file is there, and a folder is needed"));
+    }
+    fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))
+}

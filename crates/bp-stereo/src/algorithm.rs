@@ -1,0 +1,261 @@
+//! The algorithms, each with the options that it has.
+
+use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, description::Asked};
+
+/// What is run. The first is ours, the others are those of Doan Van Tuan's PhD thesis (2019).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case")]
+pub enum Algorithm {
+    /// Coarse to fine with sequential passes ([`Schedule::Sweep`]), one message an edge.
+    Sweep {
+        /// Number of grids; none for five, or fewer where the image is small.
+        #[serde(default)]
+        grids: Option<usize>,
+        /// Loops on each grid.
+        #[serde(default = "one")]
+        loops: u32,
+        /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].
+        #[serde(default = "yes")]
+        coarse_clip: bool,
+    },
+    /// Plain belief propagation on one grid.
+    Bp {
+        /// How many messages are passed.
+        #[serde(default)]
+        loops: Loops,
+    },
+    /// Coarse-to-fine belief propagation.
+    Cfbp {
+        /// How many messages are passed.
+        #[serde(default)]
+        loops: Loops,
+        /// The grids.
+        #[serde(default)]
+        hierarchy: Hierarchy,
+    },
+    /// Coarse-to-fine constant-space belief propagation: fewer loops.
+    Cfcsbp {
+        /// How many messages are passed.
+        #[serde(default)]
+        loops: Loops,
+        /// The grids.
+        #[serde(default)]
+        hierarchy: Hierarchy,
+        /// What [`Loops::Total`] is divided by (Z''); none for 2. It goes with no other way to count.
+        #[serde(default)]
+        z: Option<u32>,
+    },
+    /// Census-transform belief propagation: four parts, cut at the image's centre.
+    Ctbp {
+        /// How many messages are passed.
+        #[serde(default)]
+        loops: Loops,
+        /// Whether the census match of the centre is a prior.
+        #[serde(default = "yes")]
+        seed_start: bool,
+    },
+    /// Census-transform constant-space belief propagation: four parts and fewer loops.
+    Ctcsbp {
+        /// How many messages are passed.
+        #[serde(default)]
+        loops: Loops,
+        /// Whether the census match of the centre is a prior.
+        #[serde(default = "yes")]
+        seed_start: bool,
+        /// What [`Loops::Total`] is divided by (Z''''); none for 2. It goes with no other way to count.
+        #[serde(default)]
+        z: Option<u32>,
+    },
+}
+
+/// How many messages the thesis's algorithms pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Loops {
+    /// So many loops in all (k), from which the algorithm derives those of each grid; none for as many as labels.
+    Total {
+        /// Loops.
+        k: Option<u32>,
+        /// Order of message updates.
+        schedule: Schedule,
+    },
+    /// So many loops on each grid.
+    OnEachGrid {
+        /// Loops.
+        loops: u32,
+        /// Order of message updates.
+        schedule: Schedule,
+    },
+    /// So many checkerboard half-steps on each grid.
+    HalfSteps(u32),
+}
+
+/// As many loops as labels, all messages of a loop at once: the thesis's own.
+impl Default for Loops {
+    fn default() -> Self {
+        Self::Total { k: None, schedule: Schedule::Sync }
+    }
+}
+
+/// How a coarse-to-fine algorithm uses its grids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Hierarchy {
+    /// Number of grids; none for the thesis's floor(log2 m), m being the width. Loops must then count on each grid.
+    pub grids: Option<usize>,
+    /// By which side finer grids take over messages.
+    pub message_start: MessageStart,
+    /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].
+    pub coarse_clip: bool,
+}
+
+impl Default for Hierarchy {
+    fn default() -> Self {
+        Self { grids: None, message_start: MessageStart::Receiver, coarse_clip: false }
+    }
+}
+
+/// What the thesis's Z divides loops by where nothing else is said.
+const Z: u32 = 2;
+
+fn one() -> u32 {
+    1
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// [`Algorithm::Sweep`] as it comes.
+impl Default for Algorithm {
+    fn default() -> Self {
+        Self::Sweep { grids: None, loops: 1, coarse_clip: true }
+    }
+}
+
+impl Algorithm {
+    /// The same without its options, as [`bp_core`] knows it.
+    #[must_use]
+    pub fn kind(&self) -> bp_core::Algorithm {
+        match self {
+            Self::Sweep { .. } => bp_core::Algorithm::Sweep,
+            Self::Bp { .. } => bp_core::Algorithm::Bp,
+            Self::Cfbp { .. } => bp_core::Algorithm::Cfbp,
+            Self::Cfcsbp { .. } => bp_core::Algorithm::Cfcsbp,
+            Self::Ctbp { .. } => bp_core::Algorithm::Ctbp,
+            Self::Ctcsbp { .. } => bp_core::Algorithm::Ctcsbp,
+        }
+    }
+
+    /// Whether messages are those of the schedule sweep, which keeps none from one pair to the next.
+    pub(crate) fn is_swept(&self) -> bool {
+        self.loops().is_none_or(|loops| loops.schedule() == Schedule::Sweep)
+    }
+
+    /// Fails where options contradict each other.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let is_total = matches!(self.loops(), Some(Loops::Total { .. }));
+        if self.hierarchy().is_some_and(|hierarchy| hierarchy.grids.is_some()) && is_total {
+            return Err(Error::Options("`grids` needs `loops` that count on each grid".to_owned()));
+        }
+        if self.z().is_some() && !is_total {
+            return Err(Error::Options("`z` divides loops in all, not those on each grid".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// The settings of a plan for images of this size and so many labels.
+    pub(crate) fn settings(&self, size: Size, labels: usize) -> Settings {
+        let Some(passing) = self.loops() else { return self.swept(size) };
+        let (k, schedule) = (passing.k(labels), passing.schedule());
+        let own = self.kind().settings(size, k, self.z().unwrap_or(Z), schedule);
+        let hierarchy = self.hierarchy().unwrap_or_default();
+        Settings {
+            grids: hierarchy.grids.unwrap_or(own.grids),
+            steps: passing.steps().unwrap_or(own.steps),
+            message_start: hierarchy.message_start,
+            coarse_clip: hierarchy.coarse_clip,
+            cut: own.cut.map(|cut| Cut { seed_start: self.seed_start(), ..cut }),
+            ..own
+        }
+    }
+
+    fn swept(&self, size: Size) -> Settings {
+        let own = bp_core::Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
+        match *self {
+            Self::Sweep { grids, loops, coarse_clip } => {
+                Settings { grids: grids.unwrap_or(own.grids), steps: loops, coarse_clip, ..own }
+            }
+            _ => own,
+        }
+    }
+
+    /// What the loops of a plan with so many labels were derived from.
+    pub(crate) fn asked(&self, labels: usize) -> Asked {
+        match self.loops() {
+            Some(passing @ Loops::Total { .. }) => {
+                let z = self.kind().divides_loops().then(|| self.z().unwrap_or(Z));
+                Asked { k: Some(passing.k(labels)), z }
+            }
+            _ => Asked::default(),
+        }
+    }
+
+    fn loops(&self) -> Option<Loops> {
+        match *self {
+            Self::Sweep { .. } => None,
+            Self::Bp { loops }
+            | Self::Cfbp { loops, .. }
+            | Self::Cfcsbp { loops, .. }
+            | Self::Ctbp { loops, .. }
+            | Self::Ctcsbp { loops, .. } => Some(loops),
+        }
+    }
+
+    fn hierarchy(&self) -> Option<Hierarchy> {
+        match *self {
+            Self::Cfbp { hierarchy, .. } | Self::Cfcsbp { hierarchy, .. } => Some(hierarchy),
+            _ => None,
+        }
+    }
+
+    fn z(&self) -> Option<u32> {
+        match *self {
+            Self::Cfcsbp { z, .. } | Self::Ctcsbp { z, .. } => z,
+            _ => None,
+        }
+    }
+
+    fn seed_start(&self) -> bool {
+        matches!(self, Self::Ctbp { seed_start: true, .. } | Self::Ctcsbp { seed_start: true, .. })
+    }
+}
+
+impl Loops {
+    fn schedule(self) -> Schedule {
+        match self {
+            Self::Total { schedule, .. } | Self::OnEachGrid { schedule, .. } => schedule,
+            Self::HalfSteps(_) => Schedule::Checkerboard,
+        }
+    }
+
+    /// Loops in all, for an image with so many labels.
+    fn k(self, labels: usize) -> u32 {
+        match self {
+            Self::Total { k: Some(k), .. } => k,
+            _ => labels as u32,
+        }
+    }
+
+    /// Steps on each grid, where they are not derived.
+    fn steps(self) -> Option<u32> {
+        match self {
+            Self::Total { .. } => None,
+            Self::OnEachGrid { loops, schedule } => Some(loops.saturating_mul(schedule.steps_per_loop())),
+            Self::HalfSteps(steps) => Some(steps),
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Many pairs in one call. Complete pairs are skipped; the others are matched one after another on one device, while the
+//! next is read and the last is written.
+//!
+//! Only files say how far a batch has come, so that it may end at any moment and in any way. Outputs are written whole; the
+//! record of a pair follows them, with checksums of its images and outputs. Processes that share a batch share no other
+//! files.
+
+mod job;
+mod record;
+mod run;
+mod shard;
+mod summary;
+
+use std::path::{Path, PathBuf};
+
+use job::Job;
+pub use record::PairTimes;
+use run::Run;
+use serde::{Deserialize, Serialize};
+pub use shard::Shard;
+pub use summary::{Failed, Summary};
+
+use crate::{Cause, Error, Labels, Making, Options, Watch, pairs::Source};
+
+/// What is matched, and what is written of it.
+#[derive(Clone, Debug)]
+pub struct BatchOptions {
+    /// The pairs.
+    pub source: Source,
+    /// The folder of the outputs.
+    pub output: PathBuf,
+    /// How each pair is matched.
+    pub matching: Options,
+    /// Ending of the maps, which names their format.
+    pub format: String,
+    /// What is written beside each map.
+    pub also: Vec<Also>,
+    /// Which pairs this process matches.
+    pub shard: Shard,
+    /// Frames of a video start from the messages of the frame before; every so many-th starts anew.
+    pub warm_start: Option<u32>,
+    /// Whether complete pairs are matched again.
+    pub force: bool,
+    /// Most megapixels of an image.
+    pub max_megapixels: u32,
+}
+
+impl BatchOptions {
+    /// How many pairs in turn depend on the first of them: they are done together or not at all.
+    fn chain(&self) -> usize {
+        self.warm_start.unwrap_or(1) as usize
+    }
+}
+
+/// What is written beside a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Also {
+    /// A coloured picture, NAME.picture.png.
+    Picture,
+    /// A depth map, NAME.depth with the ending of the maps.
+    Depth,
+    /// A point cloud, NAME.points.ply.
+    Points,
+    /// A confidence, NAME.confidence with the ending of the maps.
+    Confidence,
+}
+
+impl Also {
+    /// All of these.
+    pub const ALL: [Self; 4] = [Self::Picture, Self::Depth, Self::Points, Self::Confidence];
+
+    /// The name used in options.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Picture => "picture",
+            Self::Depth => "depth",
+            Self::Points => "points",
+            Self::Confidence => "confidence",
+        }
+    }
+}
+
+/// Matches all pairs of a batch. `watch` hears notes, warnings and failures of single pairs, and progress in pairs.
+///
+/// # Errors
+/// [`Error::Options`] and [`Error::Input`] before the work begins, [`Error::Stopped`], and what ends all work: an output
+/// that cannot be written, a device that is gone. A pair that fails is an entry of [`Summary::failures`].
+pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
+    check(options)?;
+    let found = options.source.find(&options.output)?;
+    found.notes.iter().for_each(|note| watch.note(note));
+    let shard = options.shard;
+    let jobs = job::jobs(options, making, &found.pairs)?;
+    let making = &Making { files: bp_io::Files::of(&shard.file_part()), ..making.clone() };
+    let _lock = shard.lock(&options.output.join(job::RECORDS))?;
+    job::clear_leftovers(options, &jobs, &making.files)?;
+    let settings_sha256 = record::settings_sha256(options, making)?;
+    let is_complete = |chain: &&[Job]| !options.force && job::are_complete(chain, &settings_sha256);
+    let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
+    let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
+    due.iter().try_for_each(|job| job.check(making))?;
+    let failures = match_due(&Run { options, making, settings_sha256: &settings_sha256, watch }, &due)?;
+    let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
+    summary.write(&making.files, &summary_path(&options.output, shard))?;
+    Ok(summary)
+}
+
+/// Where the summary of a batch is written.
+#[must_use]
+pub fn summary_path(output: &Path, shard: Shard) -> PathBuf {
+    summary::path(output, shard)
+}
+
+/// Matches the jobs that are due, and returns those that failed.
+fn match_due(run: &Run<'_>, due: &[&Job]) -> Result<Vec<Failed>, Error> {
+    if due.is_empty() {
+        return Ok(Vec::new());
+    }
+    run.all(due).inspect_err(|error| {
+        if error.cause() == Cause::Stopped {
+            let again = if run.options.force { "the same command without `force`" } else { "the same command again" };
+            run.watch.note(&format!("run {again} to continue with the pairs that are not complete"));
+        }
+    })
+}
+
+/// Fails where options do not go together, or a folder has a name that no record can hold.
+fn check(options: &BatchOptions) -> Result<(), Error> {
+    options.matching.check()?;
+    let folder = if let Source::Path(path) = &options.source { Some(path) } else { None };
+    for folder in [Some(&options.output), folder].into_iter().flatten() {
+        if std::path::absolute(folder).is_ok_and(|folder| folder.to_str().is_none()) {
+            let what = "the name is not UTF-8, which the records of a batch need; rename it";
+            return Err(Error::Options(format!("{}: {what}", folder.display())));
+        }
+    }
+    check_warm_start(options)
+}
+
+/// Refuses warm starts where there are no messages to start from.
+fn check_warm_start(options: &BatchOptions) -> Result<(), Error> {
+    let matching = &options.matching;
+    if options.warm_start.is_none() {
+        return Ok(());
+    }
+    if !matches!(options.source, Source::Video(_)) {
+        let what = "pairs of different scenes have nothing in common";
+        return Err(Error::Options(format!("`warm_start` needs `video`: {what}")));
+    }
+    if matching.labels == Labels::Auto {
+        let what = "the same labels for all frames: give `labels` a number";
+        return Err(Error::Options(format!("`warm_start` needs {what}")));
+    }
+    if matching.algorithm.is_swept() || matching.needs_right() {
+        let what = "`warm_start` needs the messages of the frame before";
+        let why = "the schedule sweep does not keep them, and matching both views overwrites them";
+        let advice = "use the `algorithm` cfbp with 10 `half_steps`, say, and neither `check` nor confidence";
+        return Err(Error::Options(format!("{what}: {why}; {advice}")));
+    }
+    Ok(())
+}

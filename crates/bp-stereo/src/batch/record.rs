@@ -1,0 +1,217 @@
+//! What is written of every pair when it is done, by which it is known to be complete.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read as _},
+    ops::Add,
+    path::{Path, PathBuf},
+    time::{Duration, SystemTime},
+};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use bp_core::Size;
+use bp_io::{CalibrationFile, Colours, Files, Geometry, hex};
+
+use super::{Also, BatchOptions};
+use crate::{Error, Making, Options, Tiles, description};
+
+/// A file as it was when a pair was done.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct FileState {
+    pub(super) path: PathBuf,
+    bytes: u64,
+    /// Nanoseconds since 1970, where the file system tells.
+    modified_ns: Option<u64>,
+    /// The same of the last change in any way, which `cp --preserve` and `tar` do not set back.
+    changed_ns: Option<i128>,
+    sha256: String,
+}
+
+/// What was done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Done {
+    pub(super) outputs: Vec<FileState>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) backend: String,
+    pub(super) device: description::Device,
+    pub(super) settings: description::Settings,
+    /// None where the pair was matched as a whole.
+    pub(super) tiles: Option<Tiles>,
+    pub(super) energy: description::Energy,
+    pub(super) warnings: Vec<String>,
+    pub(super) times: PairTimes,
+}
+
+/// Milliseconds by the wall clock.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct PairTimes {
+    /// Reading both images, while another pair is matched.
+    pub read_ms: f64,
+    /// From the images in memory to the map in memory.
+    pub solve_ms: f64,
+    /// The same with all that matching needs besides: preparing a device for another size, the energy, the map.
+    pub match_ms: f64,
+    /// Writing the outputs, while another pair is matched.
+    pub write_ms: f64,
+}
+
+impl Add for PairTimes {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            read_ms: self.read_ms + other.read_ms,
+            solve_ms: self.solve_ms + other.solve_ms,
+            match_ms: self.match_ms + other.match_ms,
+            write_ms: self.write_ms + other.write_ms,
+        }
+    }
+}
+
+/// The record of a pair that is done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct PairRecord {
+    pub(super) name: PathBuf,
+    pub(super) left: PathBuf,
+    pub(super) right: PathBuf,
+    /// The [`history`] of the frames before it whose messages its own go back to; none where it started anew.
+    pub(super) follows: Option<String>,
+    /// Of all settings that outputs depend on; see [`settings_sha256`].
+    pub(super) settings_sha256: String,
+    /// The images.
+    pub(super) inputs: Vec<FileState>,
+    /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
+    pub(super) elapsed_ms: f64,
+    pub(super) done: Done,
+}
+
+/// SHA-256 of the images of a frame and, by those before them, of all frames that the messages go back to.
+pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
+    let mut hash = Sha256::new();
+    let frames = follows.into_iter().chain(images.iter().map(|state| state.sha256.as_str()));
+    frames.for_each(|part| hash.update(part));
+    hex(&hash.finalize())
+}
+
+impl PairRecord {
+    /// Reads a record; none where there is none or it is broken.
+    pub(super) fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&fs::read(path).ok()?).ok()
+    }
+
+    /// Writes it, whole or not at all.
+    pub(super) fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
+        Ok(files.json(path, self)?)
+    }
+
+    /// Whether its images and outputs are still these files, as they were.
+    pub(super) fn is_of(&self, images: &[&Path; 2], outputs: &[PathBuf]) -> bool {
+        fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
+            then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
+        }
+        same(&self.inputs, images) && same(&self.done.outputs, outputs)
+    }
+
+    /// Whether it tells of images with these contents.
+    pub(super) fn is_of_contents(&self, images: &[FileState]) -> bool {
+        self.inputs.iter().map(|state| &state.sha256).eq(images.iter().map(|state| &state.sha256))
+    }
+}
+
+impl FileState {
+    /// A file as it is now.
+    pub(super) fn of(path: &Path) -> io::Result<Self> {
+        let path = std::path::absolute(path)?;
+        let mut file = File::open(&path)?;
+        let (bytes, modified_ns, changed_ns) = Self::stamp(&file.metadata()?);
+        let mut hash = Sha256::new();
+        let mut part = vec![0; 1 << 16];
+        loop {
+            match file.read(&mut part)? {
+                0 => break,
+                bytes => hash.update(&part[..bytes]),
+            }
+        }
+        Ok(Self { path, bytes, modified_ns, changed_ns, sha256: hex(&hash.finalize()) })
+    }
+
+    /// Whether `path` holds the same. A file that was not written to since is not read again.
+    pub(super) fn is_still(&self, path: &Path) -> bool {
+        let Ok(metadata) = fs::metadata(path) else { return false };
+        let (bytes, modified_ns, changed_ns) = Self::stamp(&metadata);
+        let same_file = std::path::absolute(path).is_ok_and(|path| path == self.path);
+        let same_times = (modified_ns, changed_ns) == (self.modified_ns, self.changed_ns);
+        let untouched = same_file && modified_ns.is_some() && same_times;
+        let same_contents = || Self::of(path).is_ok_and(|now| now.sha256 == self.sha256);
+        metadata.is_file() && bytes == self.bytes && (untouched || same_contents())
+    }
+
+    /// Length and times of a file.
+    fn stamp(metadata: &fs::Metadata) -> (u64, Option<u64>, Option<i128>) {
+        #[cfg(unix)]
+        let changed_ns = {
+            use std::os::unix::fs::MetadataExt;
+            Some(i128::from(metadata.ctime()) * 1_000_000_000 + i128::from(metadata.ctime_nsec()))
+        };
+        #[cfg(not(unix))]
+        let changed_ns = None;
+        let since = |time: SystemTime| time.duration_since(SystemTime::UNIX_EPOCH).ok();
+        let nanoseconds = |time: Duration| u64::try_from(time.as_nanos()).ok();
+        (metadata.len(), metadata.modified().ok().and_then(since).and_then(nanoseconds), changed_ns)
+    }
+}
+
+/// Everything that outputs depend on.
+#[derive(Serialize)]
+struct OutputSettings<'a> {
+    version: &'static str,
+    matching: Options,
+    format: &'a str,
+    also: &'a [Also],
+    warm_start: Option<u32>,
+    colours: Colours,
+    colour_bar: bool,
+    sidecar: bool,
+    geometry: Option<GeometrySettings>,
+}
+
+/// A geometry as it was read: its file may be another by now.
+#[derive(Serialize)]
+struct GeometrySettings {
+    focal: f64,
+    baseline: f64,
+    doffs: f64,
+    principal_point: Option<[f64; 2]>,
+    size: Option<[usize; 2]>,
+}
+
+impl From<&Geometry> for GeometrySettings {
+    fn from(geometry: &Geometry) -> Self {
+        let Geometry { focal, baseline, doffs, principal_point, ref file } = *geometry;
+        let size = file.as_ref().and_then(|CalibrationFile { size, .. }| *size);
+        let size = size.map(|Size { width, height }| [width, height]);
+        Self { focal, baseline, doffs, principal_point, size }
+    }
+}
+
+/// SHA-256 of the program's version and of everything that outputs depend on: not of where files lie, nor of the device,
+/// since every device gives the same answer.
+pub(super) fn settings_sha256(options: &BatchOptions, making: &Making) -> Result<String, Error> {
+    let unnamed = Options { backend: String::new(), device: None, threads: None, ..options.matching.clone() };
+    let settings = OutputSettings {
+        version: env!("CARGO_PKG_VERSION"),
+        matching: unnamed,
+        format: &options.format,
+        also: &options.also,
+        warm_start: options.warm_start,
+        colours: making.picture.colours,
+        colour_bar: making.picture.bar.is_some(),
+        sidecar: !making.no_sidecar,
+        geometry: making.geometry.as_ref().map(Into::into),
+    };
+    let text = serde_json::to_vec(&settings).map_err(|error| Error::System(format!("settings: {error}")))?;
+    Ok(hex(&Sha256::digest(text)))
+}

@@ -1,0 +1,241 @@
+//! Three threads, a pair in each: one reads, one matches, one writes.
+
+use std::{
+    io,
+    sync::mpsc::{Receiver, SyncSender, sync_channel},
+    thread,
+    time::Instant,
+};
+
+use bp_core::{DeviceKind, StereoPair, survey::Survey};
+use bp_io::{Limits, read_image};
+
+use super::{
+    BatchOptions,
+    job::Job,
+    record::{Done, FileState, PairRecord, PairTimes, history},
+    summary::Failed,
+};
+use crate::{Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Memory, Start, Watch, description};
+
+/// A pair in memory.
+struct Read<'a> {
+    job: &'a Job,
+    inputs: Vec<FileState>,
+    pair: Result<Surveyed, Error>,
+    read_ms: f64,
+}
+
+/// Two images, and what a quick look at them found.
+struct Surveyed {
+    pair: StereoPair,
+    survey: Survey,
+}
+
+/// An answer, not yet written.
+struct Matched<'a> {
+    job: &'a Job,
+    origin: PairOrigin,
+    answer: Result<Answer, Error>,
+}
+
+/// What an answer depends on: its images, and the history of the frames that its messages go back to.
+struct PairOrigin {
+    inputs: Vec<FileState>,
+    follows: Option<String>,
+}
+
+struct Answer {
+    done: Done,
+    disparity: Disparity,
+    pair: StereoPair,
+}
+
+/// A batch at work.
+pub(super) struct Run<'a> {
+    pub(super) options: &'a BatchOptions,
+    pub(super) making: &'a Making,
+    pub(super) settings_sha256: &'a str,
+    pub(super) watch: &'a Watch<'a>,
+}
+
+impl Run<'_> {
+    /// Matches and writes all jobs; where a pair fails, the others go on.
+    pub(super) fn all(&self, jobs: &[&Job]) -> Result<Vec<Failed>, Error> {
+        // Nothing waits in the channels: at most three pairs are in memory.
+        let (read, to_match) = sync_channel(0);
+        let (matched, to_write) = sync_channel(0);
+        let writer = Writer { run: self, pairs: jobs.len() as u64, last: Instant::now(), failed: Vec::new() };
+        thread::scope(|scope| {
+            scope.spawn(move || self.read_all(jobs, &read));
+            let writer = scope.spawn(|| writer.write_all(to_write));
+            let solved = self.solve_all(to_match, matched);
+            let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            // Where writing fails, matching ends for want of a writer.
+            written.and_then(|failed| solved.map(|()| failed))
+        })
+    }
+
+    /// Reads pair after pair until nobody wants more.
+    fn read_all<'a>(&self, jobs: &[&'a Job], to: &SyncSender<Read<'a>>) {
+        for &job in jobs {
+            let start = Instant::now();
+            // Taken before the images are read, so that a later change of them is noticed.
+            let inputs: io::Result<Vec<FileState>> = job.images().into_iter().map(FileState::of).collect();
+            let pair = self.read(job);
+            let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
+            if self.watch.is_stopped() || to.send(read).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn read(&self, job: &Job) -> Result<Surveyed, Error> {
+        let limits = Limits::megapixels(self.options.max_megapixels);
+        let limits = limits.within(Memory::available_to(DeviceKind::Processor));
+        let [left, right] = job.images();
+        let pair = StereoPair::new(read_image(left, limits)?, read_image(right, limits)?);
+        let pair = pair.map_err(|error| Error::from(error).of(job.images_name()))?;
+        Ok(Surveyed { survey: Survey::of(&pair)?, pair })
+    }
+
+    /// Matches pair after pair. A device that is lost is opened again for the next.
+    fn solve_all<'a>(&self, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Error> {
+        let mut matcher = self.matcher()?;
+        let mut before: Option<(usize, String)> = None;
+        for Read { job, inputs, pair, read_ms } in from {
+            // Not from another chain's messages: whether that is matched in this run must make no difference.
+            let follows = before.take().filter(|(chain, _)| *chain == job.chain).map(|(_, history)| history);
+            let start = if follows.is_some() { Start::Warm } else { Start::Cold };
+            let answer = pair.and_then(|pair| self.match_one(&mut matcher, job, pair, start, read_ms));
+            let history = if answer.is_ok() { Some(history(follows.as_deref(), &inputs)) } else { follows.clone() };
+            before = history.map(|history| (job.chain, history));
+            let cause = answer.as_ref().err().map(Error::cause);
+            if cause == Some(Cause::Stopped) {
+                break;
+            }
+            if to.send(Matched { job, origin: PairOrigin { inputs, follows }, answer }).is_err() {
+                break;
+            }
+            if cause == Some(Cause::DeviceLost) {
+                matcher = self.matcher()?;
+            }
+        }
+        Ok(self.watch.check()?)
+    }
+
+    fn matcher(&self) -> Result<Matcher, Error> {
+        let depth = self.options.also.contains(&super::Also::Depth);
+        let whole = self.options.warm_start.map(|_| "warm_start");
+        Ok(Matcher::new(&self.options.matching)?.beside(Beside { truth: false, depth, batch: true, whole }))
+    }
+
+    fn match_one(
+        &self,
+        matcher: &mut Matcher,
+        job: &Job,
+        Surveyed { pair, survey }: Surveyed,
+        start: Start,
+        read_ms: f64,
+    ) -> Result<Answer, Error> {
+        let begun = Instant::now();
+        let planned = matcher.plan_within(&pair, &survey, &|disparity| job.outputs.hold(disparity))?;
+        let warnings: Vec<String> = planned.warnings.iter().map(|warning| warning.about(&job.images_name())).collect();
+        // Told first: exchanged images may be why the outputs cannot hold what is asked for.
+        warnings.iter().for_each(|warning| self.watch.warn(warning));
+        job.outputs.check_plan(self.making, &planned.plan)?;
+        // The batch counts pairs, not the work within one.
+        let events = |event: Event<'_>| {
+            if !matches!(event, Event::Progress { .. }) {
+                self.watch.tell(event);
+            }
+        };
+        let disparity = matcher.run(&pair, planned, start, &self.watch.with_events(&events))?;
+        let times = PairTimes { read_ms, match_ms: milliseconds_since(begun), ..PairTimes::default() };
+        Ok(Answer { done: done(matcher, &pair, &disparity, warnings, times), disparity, pair })
+    }
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    1000.0 * start.elapsed().as_secs_f64()
+}
+
+/// The record of an answer, but for the files that are still to be written.
+fn done(matcher: &Matcher, pair: &StereoPair, disparity: &Disparity, warnings: Vec<String>, times: PairTimes) -> Done {
+    let solve_ms = 1000.0 * disparity.times.total().as_secs_f64();
+    Done {
+        outputs: Vec::new(),
+        width: pair.size().width,
+        height: pair.size().height,
+        backend: matcher.device_name().to_owned(),
+        device: description::Device::from(matcher.device()),
+        settings: disparity.settings.clone(),
+        tiles: disparity.tiles.clone(),
+        energy: disparity.energy.into(),
+        warnings,
+        times: PairTimes { solve_ms, ..times },
+    }
+}
+
+/// Writes outputs and, after them, records.
+struct Writer<'a> {
+    run: &'a Run<'a>,
+    pairs: u64,
+    last: Instant,
+    failed: Vec<Failed>,
+}
+
+impl Writer<'_> {
+    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<Vec<Failed>, Error> {
+        for (index, Matched { job, origin, answer }) in from.into_iter().enumerate() {
+            match answer {
+                Ok(answer) => {
+                    let done = self.write(job, answer)?;
+                    job.remove_others();
+                    self.record(job, origin, done)?;
+                }
+                Err(error) => {
+                    self.run.watch.tell(Event::Failed(&format!("{}: {error}", job.pair.name.display())));
+                    job.remove_stale(&origin.inputs);
+                    self.failed.push(Failed::new(&job.pair, &error));
+                }
+            }
+            let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
+            self.run.watch.tell(Event::Task(&format!("{} pairs{failed}", index + 1)));
+            // Stopping is for the thread that matches; what it has handed over is still written.
+            let _ = self.run.watch.progress(index as u64 + 1, self.pairs);
+        }
+        Ok(self.failed)
+    }
+
+    fn record(&mut self, job: &Job, origin: PairOrigin, done: Done) -> Result<(), Error> {
+        let elapsed_ms = milliseconds_since(self.last);
+        self.last = Instant::now();
+        let record = PairRecord {
+            name: job.pair.name.clone(),
+            left: job.pair.left.clone(),
+            right: job.pair.right.clone(),
+            follows: origin.follows,
+            settings_sha256: self.run.settings_sha256.to_owned(),
+            inputs: origin.inputs,
+            elapsed_ms,
+            done,
+        };
+        record.write(&self.run.making.files, &job.record)
+    }
+
+    fn write(&self, job: &Job, Answer { done, disparity, pair }: Answer) -> Result<Done, Error> {
+        let start = Instant::now();
+        let content = Content {
+            map: &disparity.map,
+            confidence: disparity.confidence.as_deref(),
+            image: Some(pair.left()),
+            plan: Some(&disparity.settings),
+            inputs: &job.inputs(),
+        };
+        job.outputs.write(self.run.making, &content, self.run.watch)?;
+        let state = |path| FileState::of(path).map_err(|error| bp_io::Error::writing(path, &error));
+        let outputs = job.paths.iter().map(|path| state(path)).collect::<Result<_, _>>()?;
+        Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
+    }
+}

@@ -1,0 +1,267 @@
+//! Plans, devices and answers as files describe them: sidecars of maps, records of batches and experiments, `--json`.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// What a plan runs, and what it predicts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Data cost profile.
+    pub profile: String,
+    /// Labels (L).
+    pub labels: usize,
+    /// Disparity of the first label in pixels.
+    pub min_disparity: i32,
+    /// Slope of the smoothness cost.
+    pub slope: u8,
+    /// Truncation of the smoothness cost (K).
+    pub truncation: u8,
+    /// Grey difference above which edges are weak, where any may be; records from before that option lack it.
+    #[serde(default)]
+    pub edge_threshold: Option<u8>,
+    /// Algorithm.
+    pub algorithm: String,
+    /// Loops asked for (k), where the algorithm derived its own from them.
+    pub k: Option<u32>,
+    /// What the thesis's coefficient Z divided those by, where it did.
+    pub z: Option<u32>,
+    /// Number of grids.
+    pub grids: usize,
+    /// Loops (schedules sync and sweep) or half-steps (checkerboard) on each grid.
+    pub steps_per_grid: u32,
+    /// Schedule.
+    pub schedule: String,
+    /// Side by which finer grids take over messages.
+    pub message_start: String,
+    /// Whether the data costs of grids from 1 on are clipped at K + K div 2; records from before that option lack it.
+    #[serde(default)]
+    pub coarse_clip: bool,
+    /// Where the image is cut.
+    pub cut: Option<Cut>,
+    /// What was done to the map after matching, where something was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finish: Option<Finish>,
+    /// Message entries that the plan predicts to compute.
+    pub message_updates: u64,
+    /// Bytes that the plan predicts on this device, or in general where there is none.
+    pub planned_bytes: u64,
+}
+
+/// What was done to a map after matching, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Finish {
+    /// Whether a left-right check made pixels unknown.
+    pub check: bool,
+    /// Surfaces of fewer pixels were made unknown.
+    pub speckles: Option<usize>,
+    /// Whether unknown pixels were filled.
+    pub fill: bool,
+    /// Side of the median's window.
+    pub median: Option<usize>,
+    /// Whether fractions of disparities were made.
+    pub subpixel: bool,
+}
+
+/// A cut into four parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// First column right of it.
+    pub x: usize,
+    /// First row below it.
+    pub y: usize,
+    /// Whether the census match was used as a prior.
+    pub seed_start: bool,
+}
+
+/// A device.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Device {
+    /// Its name.
+    pub name: String,
+    /// What it is: "processor", "discrete GPU", "integrated GPU", "virtual GPU", "other device" or "software
+    /// rasteriser"; records from before there were GPU backends lack it.
+    #[serde(default)]
+    pub kind: Option<String>,
+    /// The interface that reaches it and its version, where there is one.
+    pub api: Option<String>,
+    /// Its driver and the driver's version, where there is one.
+    pub driver: Option<String>,
+    /// Memory of its own in bytes, where it has some.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
+    /// The universally unique identifier that its driver gives it.
+    #[serde(default)]
+    pub uuid: Option<String>,
+    /// Whether it is a CPU that pretends to be a GPU.
+    pub software_rasteriser: bool,
+    /// How many threads work at once.
+    pub workers: usize,
+}
+
+/// A clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Clock {
+    /// The host's monotonic clock.
+    Wall,
+    /// The device's own clock.
+    Device,
+}
+
+/// Stage times by one clock.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Clocked {
+    /// The clock.
+    pub clock: Clock,
+    /// The times.
+    pub stages: Stages,
+}
+
+/// Milliseconds of each stage, over all grids.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
+pub struct Stages {
+    pub match_cost_ms: f64,
+    pub coarsen_ms: f64,
+    pub refine_ms: f64,
+    pub update_messages_ms: f64,
+    pub select_labels_ms: f64,
+}
+
+/// An energy in the units of its profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// Data and smoothness together.
+    pub total: u64,
+    /// Sum of the data costs.
+    pub data: u64,
+    /// Sum of the smoothness costs.
+    pub smoothness: u64,
+}
+
+/// Errors over a set of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// Pixels of known truth.
+    pub known: u64,
+    /// Those that were answered.
+    pub answered: u64,
+    /// Root of the mean squared error of answered pixels, in pixels.
+    pub rmse: f64,
+    /// Percentages of answered pixels wrong by more than 0.5, 1, 2 and 4 pixels.
+    pub bad: [f64; 4],
+    /// The same of known pixels, unanswered ones counted as wrong.
+    pub bad_or_unanswered: [f64; 4],
+}
+
+impl Stages {
+    /// The stages in their order.
+    #[must_use]
+    pub fn in_order(&self) -> [f64; 5] {
+        let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
+        [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
+    }
+}
+
+impl From<bp_core::Energy> for Energy {
+    fn from(energy: bp_core::Energy) -> Self {
+        Self { total: energy.total(), data: energy.data, smoothness: energy.smoothness }
+    }
+}
+
+impl From<bp_core::MapErrors> for Errors {
+    fn from(errors: bp_core::MapErrors) -> Self {
+        let bp_core::MapErrors { known, answered, rmse, bad, bad_or_unanswered } = errors;
+        Self { known, answered, rmse, bad, bad_or_unanswered }
+    }
+}
+
+impl From<&bp_core::DeviceInfo> for Device {
+    fn from(device: &bp_core::DeviceInfo) -> Self {
+        let bp_core::DeviceInfo { name, kind, api, driver, memory_bytes, uuid, workers } = device.clone();
+        let software_rasteriser = kind == bp_core::DeviceKind::SoftwareRasteriser;
+        Self { name, kind: Some(kind.name().to_owned()), api, driver, memory_bytes, uuid, software_rasteriser, workers }
+    }
+}
+
+/// What an algorithm derived its loops from, where it did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// Loops asked for.
+    pub k: Option<u32>,
+    /// What they were divided by.
+    pub z: Option<u32>,
+}
+
+impl Settings {
+    /// Describes a plan before it runs; `device` tells how many bytes it will take there.
+    #[must_use]
+    pub fn new(
+        plan: &bp_core::Plan,
+        device: Option<&dyn bp_core::Device>,
+        algorithm: bp_core::Algorithm,
+        asked: Asked,
+    ) -> Self {
+        let (model, settings) = (plan.model(), plan.settings());
+        Self {
+            profile: model.profile().name().to_owned(),
+            labels: model.labels(),
+            min_disparity: model.min_disparity(),
+            slope: model.slope(),
+            truncation: model.truncation(),
+            edge_threshold: model.weak_edges(),
+            algorithm: algorithm.name().to_owned(),
+            k: asked.k,
+            z: asked.z,
+            grids: settings.grids,
+            steps_per_grid: settings.steps,
+            schedule: settings.schedule.name().to_owned(),
+            message_start: settings.message_start.name().to_owned(),
+            coarse_clip: settings.coarse_clip,
+            cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            finish: None,
+            message_updates: plan.message_updates(),
+            planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),
+        }
+    }
+}
+
+impl Finish {
+    /// What a map goes through; `None` where that is nothing.
+    #[must_use]
+    pub fn of(finish: bp_core::maps::Finish) -> Option<Self> {
+        let bp_core::maps::Finish { check, speckles, fill, median, subpixel } = finish;
+        (finish != bp_core::maps::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
+    }
+}
+
+/// All clocks of a solve.
+#[must_use]
+pub fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
+    let clocked = |clock, stages: [Duration; 5]| {
+        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] =
+            stages.map(|time| 1000.0 * time.as_secs_f64());
+        let stages = Stages { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms };
+        Clocked { clock, stages }
+    };
+    let device = times.device.map(|stages| clocked(Clock::Device, stages));
+    std::iter::once(clocked(Clock::Wall, times.wall)).chain(device).collect()
+}

@@ -1,0 +1,136 @@
+//! What can go wrong, sorted by who can mend it.
+
+use bytesize::ByteSize;
+
+use crate::watch::Stopped;
+
+/// Why a call ended without its result. Messages name options by their field, as in `` `max_memory` ``; a front end may show
+/// its own names for them.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The model, a plan, a backend or a device.
+    #[error(transparent)]
+    Core(#[from] bp_core::Error),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] bp_io::Error),
+    /// Options that contradict each other or that nothing can follow.
+    #[error("{0}")]
+    Options(String),
+    /// Images, lists or patterns that do not fit.
+    #[error("{0}")]
+    Input(String),
+    /// Something that cannot be written, or threads that cannot be started.
+    #[error("{0}")]
+    System(String),
+    /// A backend or device that is not there.
+    #[error("{0}")]
+    Unavailable(String),
+    /// More memory needed than allowed or free.
+    #[error("needs at least {}, but only {} is {reason}; {advice}", iec(*needed), iec(*available))]
+    OutOfMemory {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that may be taken.
+        available: u64,
+        /// Who says so: "available", or "allowed by `max_memory`".
+        reason: &'static str,
+        /// What would need less.
+        advice: String,
+    },
+    /// The caller's [`crate::Stop`] asked to stop.
+    #[error("interrupted")]
+    Stopped,
+    /// An error with the name of what it is about.
+    #[error("{what}: {source}")]
+    Of {
+        /// A file, a pair, a device.
+        what: String,
+        /// The error.
+        source: Box<Error>,
+    },
+}
+
+/// Who can mend an [`Error`], and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cause {
+    /// The caller, with other options.
+    Options,
+    /// The caller, with other files or images.
+    Input,
+    /// The caller, with another device or backend.
+    Unavailable,
+    /// The caller, with another device or a smaller plan: the device is there, but too small for this one.
+    Unsupported,
+    /// Nobody at once: the device went away and must be opened again.
+    DeviceLost,
+    /// The caller, with a smaller problem or more memory.
+    Memory,
+    /// Whoever looks after the machine: a full disk, missing permissions.
+    System,
+    /// Nobody: the caller asked to stop.
+    Stopped,
+}
+
+impl Error {
+    /// Who can mend it.
+    #[must_use]
+    pub fn cause(&self) -> Cause {
+        match self {
+            Self::Core(error) => cause_of_core(error),
+            Self::File(error) => cause_of_file(error),
+            Self::Options(_) => Cause::Options,
+            Self::Input(_) => Cause::Input,
+            Self::System(_) => Cause::System,
+            Self::Unavailable(_) => Cause::Unavailable,
+            Self::OutOfMemory { .. } => Cause::Memory,
+            Self::Stopped => Cause::Stopped,
+            Self::Of { source, .. } => source.cause(),
+        }
+    }
+
+    /// The same error with the name of what it is about.
+    #[must_use]
+    pub fn of(self, what: impl Into<String>) -> Self {
+        Self::Of { what: what.into(), source: Box::new(self) }
+    }
+}
+
+fn cause_of_core(error: &bp_core::Error) -> Cause {
+    use bp_core::Error as E;
+    match error {
+        E::Stopped => Cause::Stopped,
+        E::OutOfMemory { .. } => Cause::Memory,
+        E::Unsupported { .. } => Cause::Unsupported,
+        E::Unavailable { .. } => Cause::Unavailable,
+        E::DeviceLost { .. } | E::Timeout { .. } => Cause::DeviceLost,
+        E::Plan(_) | E::Calibration(_) | E::Labels { .. } | E::Truncation { .. } | E::MinDisparity { .. } => {
+            Cause::Options
+        }
+        E::Empty { .. } | E::TooLarge { .. } | E::PixelCount { .. } | E::SizesDiffer { .. } | E::WrongSize { .. } => {
+            Cause::Input
+        }
+        _ => Cause::System,
+    }
+}
+
+fn cause_of_file(error: &bp_io::Error) -> Cause {
+    match error {
+        bp_io::Error::Read { .. } | bp_io::Error::MissingFolder { .. } => Cause::Input,
+        bp_io::Error::Request { .. } => Cause::Options,
+        bp_io::Error::OutOfMemory { .. } => Cause::Memory,
+        _ => Cause::System,
+    }
+}
+
+impl From<Stopped> for Error {
+    fn from(Stopped: Stopped) -> Self {
+        Self::Stopped
+    }
+}
+
+/// Bytes in a unit that people use.
+pub(crate) fn iec(bytes: u64) -> String {
+    ByteSize(bytes).display().iec().to_string()
+}

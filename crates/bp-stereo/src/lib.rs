@@ -1,0 +1,56 @@
+//! Stereo matching by belief propagation: two rectified images in, a disparity map out.
+//!
+//! ```
+//! use bp_stereo::{Image, Matcher, Options};
+//!
+//! # fn main() -> Result<(), bp_stereo::Error> {
+//! # let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * x * 31 + x * y * 17) % 251) as u8;
+//! # let view = |shift| (0..64 * 48).map(|i| noise(i % 64 + shift, i / 64)).collect::<Vec<u8>>();
+//! # let (grey_left, grey_right) = (view(0), view(3));
+//! let left = Image::from_grey(64, 48, &grey_left)?;
+//! let right = Image::from_grey(64, 48, &grey_right)?;
+//! let mut matcher = Matcher::new(&Options::default().with_labels(16).with_check(true))?;
+//! let disparity = matcher.compute(&left, &right)?;
+//! assert_eq!(disparity.map.at(40, 20), Some(3.0));
+//! println!("{:?} on {}", disparity.times.total(), matcher.device().name);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`Options`] says what is matched and how; every option has a default. A [`Matcher`] opens a device once and matches pair
+//! after pair on it. A [`Disparity`] holds the map, a confidence, times, the energy, the memory taken and [`Warning`]s.
+//! [`Watch`] follows and stops long work; [`batch`] matches folders, lists and videos, and resumes where it was stopped;
+//! [`Outputs`] writes maps, pictures, depth and points. Errors say who can mend them: see [`Error::cause`].
+//!
+//! This crate prints nothing, keeps no state outside of its values and changes no panic hook.
+
+mod algorithm;
+pub mod batch;
+pub mod description;
+pub mod devices;
+mod error;
+mod finishing;
+mod matcher;
+mod memory;
+mod options;
+mod outputs;
+pub mod pairs;
+mod plan;
+mod system;
+mod tiles;
+mod warning;
+mod watch;
+
+pub use algorithm::{Algorithm, Hierarchy, Loops};
+pub use bp_core::{DisparityMap, Energy, Image, Profile, Schedule, Size, StereoPair};
+pub use bp_io as io;
+pub use error::{Cause, Error};
+pub use finishing::AnswerTimes;
+pub use matcher::{Disparity, Matcher, Planned, Start};
+pub use memory::Beside;
+pub use options::{Labels, Options};
+pub use outputs::{Content, Making, Outputs};
+pub use system::{Memory, thread_pool};
+pub use tiles::Tiles;
+pub use warning::{Beyond, Unused, Warning};
+pub use watch::{Event, Stop, Stopped, Watch};

@@ -1,0 +1,243 @@
+//! The matcher: a device that is opened once, and prepared anew only where a pair needs another plan than the one before.
+
+use std::fmt;
+
+use bp_core::{
+    DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, Times, survey::Survey,
+};
+use rayon::ThreadPool;
+use sha2::{Digest, Sha256};
+
+use crate::{
+    AnswerTimes, Beside, Error, Options, Tiles, Warning, Watch, description,
+    devices::{self, Opened},
+    finishing::{Finished, finished},
+    memory::{self, Fitted},
+    plan::{self, labels, quarter_of_width},
+    system, warning,
+};
+
+/// Matches pairs on one device. See the [crate's front page](crate) for an example.
+pub struct Matcher {
+    options: Options,
+    pool: ThreadPool,
+    opened: Opened,
+    beside: Beside,
+    prepared: Option<Prepared>,
+}
+
+/// A tiled plan, prepared on the device.
+struct Prepared {
+    tiled: Tiled,
+    /// Bytes that the program was predicted to hold.
+    peak_bytes: u64,
+}
+
+/// What will be run for a pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// The plan.
+    pub plan: Plan,
+    /// What may be wrong with the pair or its labels.
+    pub warnings: Vec<Warning>,
+}
+
+/// From which messages a pair starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// From none.
+    #[default]
+    Cold,
+    /// From those of the pair before: for the next frame of a video, on the full grid alone.
+    Warm,
+}
+
+/// The answer for a pair.
+#[derive(Clone, Debug)]
+pub struct Disparity {
+    /// The disparity map of the left image.
+    pub map: DisparityMap,
+    /// How far each pixel can be trusted, 0 to 1, `[height][width]`; none unless [`Options::confidence`] asks for it.
+    pub confidence: Option<Vec<f32>>,
+    /// What it took.
+    pub times: AnswerTimes,
+    /// The energy of the labels.
+    pub energy: Energy,
+    /// What was run.
+    pub settings: description::Settings,
+    /// The tiles; none where the pair was matched as a whole.
+    pub tiles: Option<Tiles>,
+    /// Bytes that the device allocated for the plan.
+    pub allocated_bytes: u64,
+    /// Most bytes that the program was predicted to hold at a time.
+    pub peak_bytes: u64,
+    /// What may be wrong with the pair or its labels.
+    pub warnings: Vec<Warning>,
+}
+
+impl Matcher {
+    /// Starts threads and opens the device that the options name.
+    ///
+    /// # Errors
+    /// [`Error::Options`] where options contradict each other, [`Error::Unavailable`] where there is no such device,
+    /// [`Error::System`] where threads cannot be started.
+    pub fn new(options: &Options) -> Result<Self, Error> {
+        options.check()?;
+        let pool = system::thread_pool(options.threads)?;
+        let opened = pool.install(|| devices::open(&options.backend, options.device.as_deref()))?;
+        if let Some(threads) = options.threads.filter(|&threads| opened.info.workers != threads) {
+            let what = format!("`backend` {} has no threads; rayon has", opened.name);
+            return Err(Error::Options(format!("`threads` {threads}: {what}")));
+        }
+        Ok(Self { options: options.clone(), pool, opened, beside: Beside::default(), prepared: None })
+    }
+
+    /// Says what the program holds beside this matcher; a memory limit then includes it.
+    #[must_use]
+    pub fn beside(self, beside: Beside) -> Self {
+        Self { beside, ..self }
+    }
+
+    /// The options.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn device(&self) -> &DeviceInfo {
+        &self.opened.info
+    }
+
+    /// The device's name in options and records: its backend's, with its index unless that is 0.
+    #[must_use]
+    pub fn device_name(&self) -> &str {
+        &self.opened.name
+    }
+
+    /// Matches two rectified images of one size.
+    ///
+    /// # Errors
+    /// [`Error::Core`] where the images differ in size, [`Error::OutOfMemory`], and those of the device.
+    pub fn compute(&mut self, left: &Image, right: &Image) -> Result<Disparity, Error> {
+        let pair = StereoPair::new(left.clone(), right.clone())?;
+        let planned = self.plan(&pair)?;
+        self.run(&pair, planned, Start::Cold, &Watch::default())
+    }
+
+    /// Plans a pair: a quick look at it finds labels, where they are [`crate::Labels::Auto`], and what may be wrong.
+    ///
+    /// # Errors
+    /// [`Error::Core`] where the options ask for an impossible model or plan.
+    pub fn plan(&self, pair: &StereoPair) -> Result<Planned, Error> {
+        self.plan_within(pair, &Survey::of(pair)?, &|_| true)
+    }
+
+    /// Plans a pair that was surveyed already, for outputs that `hold` a first disparity or not.
+    ///
+    /// # Errors
+    /// As [`Matcher::plan`].
+    pub fn plan_within(
+        &self,
+        pair: &StereoPair,
+        survey: &Survey,
+        hold: &dyn Fn(i32) -> bool,
+    ) -> Result<Planned, Error> {
+        let (options, size) = (&self.options, pair.size());
+        let found = labels(options, size, survey, hold);
+        let plan = plan::plan(options, size, found.unwrap_or_else(|| quarter_of_width(options, size)))?;
+        Ok(Planned { warnings: warning::of(options, survey, &plan, found.is_some()), plan })
+    }
+
+    /// Matches a pair as planned. Progress goes to `watch`, in message entries.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] where the plan does not fit, [`Error::Stopped`], and those of the device.
+    pub fn run(
+        &mut self,
+        pair: &StereoPair,
+        planned: Planned,
+        start: Start,
+        watch: &Watch<'_>,
+    ) -> Result<Disparity, Error> {
+        let Self { options, pool, opened, beside, prepared } = self;
+        let Planned { plan, warnings } = planned;
+        // What was prepared for another plan is freed first.
+        let before = prepared.take().filter(|prepared| *prepared.tiled.plan() == plan);
+        let (ready, finished, energy) = pool.install(|| {
+            let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, opened, watch), Ok)?;
+            let finished = ready.solve(options, opened, pair, start, watch)?;
+            let energy = Energy::of(pair, ready.tiled.plan().model(), ready.tiled.labels())?;
+            Ok::<_, Error>((ready, finished, energy))
+        })?;
+        watch.check()?;
+        let answer = Disparity {
+            map: finished.map,
+            confidence: finished.confidence,
+            times: finished.times,
+            energy,
+            settings: plan::described(options, ready.tiled.tiling(), opened)?,
+            tiles: Tiles::of(ready.tiled.tiling()),
+            allocated_bytes: ready.tiled.allocated_bytes(),
+            peak_bytes: ready.peak_bytes,
+            warnings,
+        };
+        // Labels of tiles make room for writing the answer.
+        *prepared = Some(ready).filter(|ready| ready.tiled.tiling().is_whole());
+        Ok(answer)
+    }
+
+    /// SHA-256 of all messages of the last pair: from the left, right, up and down, each `[height][width][labels]`.
+    ///
+    /// # Errors
+    /// [`Error::Core`] where nothing was matched, or the image was matched in tiles, whose messages are gone.
+    pub fn messages_sha256(&mut self) -> Result<String, Error> {
+        let gone = bp_core::Error::Plan("messages are kept of images that are matched as a whole only");
+        let prepared = self.prepared.as_mut().ok_or(gone)?;
+        let mut hash = Sha256::new();
+        for side in Side::ALL {
+            hash.update(self.pool.install(|| prepared.tiled.messages(side))?);
+        }
+        Ok(bp_io::hex(&hash.finalize()))
+    }
+}
+
+impl fmt::Debug for Matcher {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { options, opened, .. } = self;
+        out.debug_struct("Matcher").field("options", options).field("device", &opened.info).finish_non_exhaustive()
+    }
+}
+
+impl Prepared {
+    fn new(options: &Options, beside: Beside, plan: &Plan, opened: &Opened, watch: &Watch<'_>) -> Result<Self, Error> {
+        let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, opened, watch)?;
+        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, peak_bytes })
+    }
+
+    fn solve(
+        &mut self,
+        options: &Options,
+        opened: &Opened,
+        pair: &StereoPair,
+        start: Start,
+        watch: &Watch<'_>,
+    ) -> Result<Finished, Error> {
+        let (tiled, device) = (&mut self.tiled, opened.device.as_ref());
+        let updates = tiled.tiling().message_updates();
+        let total = updates.saturating_mul(if options.needs_right() { 2 } else { 1 });
+        let mut done = 0_u64;
+        finished(options, pair, |pair: &StereoPair| -> Result<(Times, DisparityMap), Error> {
+            let observer = &mut |progress: Progress| watch.progress(done.saturating_add(progress.done), total);
+            let times = match start {
+                Start::Cold => tiled.solve_observed(device, pair, observer)?,
+                Start::Warm => tiled.solve_warm_observed(device, pair, observer)?,
+            };
+            done = done.saturating_add(updates);
+            // The memory of tiles is for the map.
+            tiled.free_tiles();
+            Ok((times, tiled.disparities()))
+        })
+    }
+}

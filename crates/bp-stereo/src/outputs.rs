@@ -1,0 +1,206 @@
+//! The files that are made of a map.
+
+use std::path::{Path, PathBuf};
+
+use bp_core::{Calibration, DisparityMap, Image, Plan, Size, depth_map, points};
+use bp_io::{
+    Files, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
+    remove_sidecar, sidecar_of, write_picture_sidecar, write_points, write_sidecar,
+};
+
+use crate::{Error, Watch, description};
+
+/// Where the files of one map go.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    /// The disparity map.
+    pub map: Option<PathBuf>,
+    /// A coloured picture of it.
+    pub picture: Option<PathBuf>,
+    /// A depth map.
+    pub depth: Option<PathBuf>,
+    /// A point cloud.
+    pub points: Option<PathBuf>,
+    /// How far the map can be trusted.
+    pub confidence: Option<PathBuf>,
+}
+
+/// How files are made, the same for every pair.
+#[derive(Clone, Debug, Default)]
+pub struct Making {
+    /// How pictures look.
+    pub picture: Picture,
+    /// Whether no sidecar is written beside maps and pictures.
+    pub no_sidecar: bool,
+    /// The geometry of the cameras, which depth and points need.
+    pub geometry: Option<Geometry>,
+    /// How files get to their place.
+    pub files: Files,
+}
+
+/// What files are made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Content<'a> {
+    /// The map.
+    pub map: &'a DisparityMap,
+    /// How far it can be trusted, `[height][width]`.
+    pub confidence: Option<&'a [f32]>,
+    /// The left image, where points take its colours.
+    pub image: Option<&'a Image>,
+    /// What was matched, where it was.
+    pub plan: Option<&'a description::Settings>,
+    /// The files that the map was made of.
+    pub inputs: &'a [&'a Path],
+}
+
+impl Making {
+    /// The geometry of images of some size, where an option gives one.
+    fn calibration(&self, size: Size) -> Result<Option<Calibration>, Error> {
+        Ok(self.geometry.as_ref().map(|geometry| geometry.of(size)).transpose()?)
+    }
+}
+
+impl Outputs {
+    /// Fails where a file could not be written, would overwrite an input or another output, or lacks what it is made of, so
+    /// that a caller can say so before the work is done.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Options`].
+    pub fn check(&self, making: &Making, inputs: &[&Path]) -> Result<(), Error> {
+        let outputs = self.paths(making);
+        for (index, output) in outputs.iter().enumerate() {
+            making.files.check_writable(output)?;
+            inputs.iter().try_for_each(|input| check_distinct(input, output, "is read, and would be overwritten"))?;
+            let twice = "would be written twice (beside a map goes MAP.json)";
+            outputs[..index].iter().try_for_each(|other| check_distinct(other, output, twice))?;
+        }
+        self.maps().try_for_each(|map| MapFormat::of(map).map(drop))?;
+        self.picture.as_deref().map_or(Ok(()), |picture| check_ending(picture, "a picture", "png"))?;
+        self.points.as_deref().map_or(Ok(()), |points| check_ending(points, "a point cloud", "ply"))?;
+        if (self.depth.is_some() || self.points.is_some()) && making.geometry.is_none() {
+            return Err(Error::Options("depth and points need `calib`, or `focal` and `baseline`".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Fails where a format cannot hold the disparities of a plan, or the calibration is for images of another size.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn check_plan(&self, making: &Making, plan: &Plan) -> Result<(), Error> {
+        let model = plan.model();
+        let [low, high] = [0, model.labels() as u16 - 1].map(|label| model.disparity(label) as f32);
+        self.check_map(making, (low, high), plan.image_size())
+    }
+
+    /// The same for a map of disparities from the first to the second of `range`.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn check_map(&self, making: &Making, range: (f32, f32), size: Size) -> Result<(), Error> {
+        self.check_range(range.0, range.1)?;
+        making.calibration(size).map(drop)
+    }
+
+    /// Fails where a format cannot hold disparities from `low` to `high`.
+    fn check_range(&self, low: f32, high: f32) -> Result<(), Error> {
+        Ok(self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))?)
+    }
+
+    /// Whether the formats can hold a disparity.
+    #[must_use]
+    pub fn hold(&self, disparity: i32) -> bool {
+        self.check_range(disparity as f32, disparity as f32).is_ok()
+    }
+
+    /// Writes all files. `watch` hears what is odd about them.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn write(&self, making: &Making, content: &Content<'_>, watch: &Watch<'_>) -> Result<(), Error> {
+        let writer = Writer { making, content, watch };
+        self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &Raster::disparities(content.map), None))?;
+        self.picture.as_deref().map_or(Ok(()), |path| writer.picture(path))?;
+        if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
+            writer.map(path, &Raster { size: content.map.size(), values, quantity: Quantity::Confidence }, None)?;
+        }
+        let Some(calibration) = making.calibration(content.map.size())? else { return Ok(()) };
+        self.depth.as_deref().map_or(Ok(()), |path| writer.depth(path, &calibration))?;
+        if let (Some(path), Some(image)) = (&self.points, content.image) {
+            write_points(&making.files, path, points(content.map, image, &calibration)?)?;
+        }
+        Ok(())
+    }
+
+    /// All files that are written.
+    #[must_use]
+    pub fn paths(&self, making: &Making) -> Vec<PathBuf> {
+        let sidecars = self.maps().chain(self.picture.as_deref()).filter(|_| !making.no_sidecar).map(sidecar_of);
+        let files = [&self.map, &self.picture, &self.depth, &self.points, &self.confidence].into_iter().flatten();
+        files.cloned().chain(sidecars).collect()
+    }
+
+    /// The files that hold a value a pixel.
+    fn maps(&self) -> impl Iterator<Item = &Path> {
+        [&self.map, &self.depth, &self.confidence].into_iter().flatten().map(PathBuf::as_path)
+    }
+}
+
+/// Writes one file after another.
+struct Writer<'a> {
+    making: &'a Making,
+    content: &'a Content<'a>,
+    watch: &'a Watch<'a>,
+}
+
+impl Writer<'_> {
+    /// Where maps come from, for their sidecars.
+    fn origin<'b>(&'b self, calibration: Option<&'b Calibration>) -> Origin<'b, description::Settings> {
+        let Content { plan, inputs, .. } = *self.content;
+        let labels = |plan: &description::Settings| {
+            let first = i64::from(plan.min_disparity);
+            [first, first + plan.labels as i64 - 1]
+        };
+        Origin { plan, labels: plan.map(labels), calibration, inputs }
+    }
+
+    /// Writes a map and its sidecar.
+    fn map(&self, path: &Path, raster: &Raster<'_>, calibration: Option<&Calibration>) -> Result<(), Error> {
+        // The sidecar of an earlier map must not stand beside the new one, even where this ends in between.
+        remove_sidecar(path)?;
+        if raster.range().is_none() {
+            self.watch.warn(&format!("{}: no pixel is known", path.display()));
+        }
+        let files = &self.making.files;
+        raster.write(files, path)?;
+        if !self.making.no_sidecar {
+            write_sidecar(files, path, raster, &self.origin(calibration))?;
+        }
+        Ok(())
+    }
+
+    fn picture(&self, path: &Path) -> Result<(), Error> {
+        remove_sidecar(path)?;
+        let Making { picture, files, .. } = self.making;
+        picture.write(files, path, self.content.map)?;
+        if !self.making.no_sidecar {
+            let raster = Raster::disparities(self.content.map);
+            write_picture_sidecar(files, path, &raster, picture.colours, &self.origin(None))?;
+        }
+        Ok(())
+    }
+
+    fn depth(&self, path: &Path, calibration: &Calibration) -> Result<(), Error> {
+        let mut depths = depth_map(self.content.map, calibration);
+        if MapFormat::of(path)? == MapFormat::Png16 {
+            let beyond = |depth: &&mut f32| depth.is_finite() && depth.round() > f32::from(u16::MAX);
+            let unknown = depths.iter_mut().filter(beyond).map(|depth| *depth = DisparityMap::UNKNOWN).count();
+            if unknown > 0 {
+                let what = "pixels are farther than the 65535 mm that a 16-bit PNG holds, and become unknown there";
+                self.watch.warn(&format!("{}: {unknown} {what}", path.display()));
+            }
+        }
+        let raster = Raster { size: self.content.map.size(), values: &depths, quantity: Quantity::Depth };
+        self.map(path, &raster, Some(calibration))
+    }
+}

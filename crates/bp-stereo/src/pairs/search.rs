@@ -1,0 +1,163 @@
+//! Pairs that lie below a folder in a known layout.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ffi::OsStr,
+    path::{Path, PathBuf},
+};
+
+use walkdir::WalkDir;
+
+use super::{Found, Pair, natural};
+
+/// What the two images of a folder are called, the surest sign of a pair first: a folder of nine views has im0 and im1
+/// too, but its pair is im2 and im6.
+const IN_ONE_FOLDER: [[&str; 2]; 5] =
+    [["view1", "view5"], ["im2", "im6"], ["im0", "im1"], ["left", "right"], ["imL", "imR"]];
+
+/// Folders beside one another that hold images of equal names.
+const IN_TWO_FOLDERS: [[&str; 2]; 3] = [["left", "right"], ["image_2", "image_3"], ["image_0", "image_1"]];
+
+/// Endings of images, in the order in which one of several is taken; a `.pfm` in such folders is a disparity map.
+const ENDINGS: [&str; 8] = ["png", "ppm", "pgm", "pnm", "tif", "tiff", "jpg", "jpeg"];
+
+/// Images by their folders, which are relative to where the search began.
+type Folders = BTreeMap<PathBuf, Images>;
+
+/// Names of files.
+type Images = BTreeSet<String>;
+
+/// The image of a name, or else the one whose name differs by upper and lower case alone: cameras write VIEW1.PNG.
+fn named<'a>(images: &'a Images, name: &str) -> Option<&'a String> {
+    images.get(name).or_else(|| images.iter().find(|image| image.eq_ignore_ascii_case(name)))
+}
+
+/// The pairs below `root`, but not in `output`, in the natural order of their names.
+pub(super) fn search(root: &Path, output: &Path) -> Found {
+    let mut found = Found::default();
+    let folders = images(root, output, &mut found.notes);
+    for (folder, images) in &folders {
+        in_one_folder(folder, images, &mut found);
+        in_two_folders(folder, &folders, &mut found);
+    }
+    let text = |pair: &Pair| pair.name.to_string_lossy().into_owned();
+    found.pairs.sort_by(|a, b| natural::compare(&text(a), &text(b)));
+    let below = |pair: &mut Pair| (pair.left, pair.right) = (root.join(&pair.left), root.join(&pair.right));
+    found.pairs.iter_mut().for_each(below);
+    found
+}
+
+/// All images below a folder; what cannot be read is told.
+fn images(root: &Path, output: &Path, notes: &mut Vec<String>) -> Folders {
+    let output = output.canonicalize().ok();
+    let is_output = |path: &Path| output.is_some() && path.canonicalize().ok() == output;
+    let mut folders = Folders::new();
+    let entries = WalkDir::new(root).min_depth(1).follow_links(true).sort_by_file_name().into_iter();
+    for entry in entries.filter_entry(|entry| !(entry.file_type().is_dir() && is_output(entry.path()))) {
+        let entry = match entry {
+            Ok(entry) => entry,
+            Err(error) => {
+                notes.push(format!("passed over: {error}"));
+                continue;
+            }
+        };
+        let below = entry.path().strip_prefix(root).unwrap_or(entry.path());
+        if !entry.file_type().is_file() || !below.extension().is_some_and(is_ending) {
+            continue;
+        }
+        let (Some(folder), Some(name), Some(_)) =
+            (below.parent(), below.file_name().and_then(OsStr::to_str), below.to_str())
+        else {
+            notes.push(format!("passed over: {} is no name in UTF-8, as records hold it", entry.path().display()));
+            continue;
+        };
+        folders.entry(folder.to_owned()).or_default().insert(name.to_owned());
+    }
+    folders
+}
+
+fn is_ending(ending: &OsStr) -> bool {
+    ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// The one pair of a folder whose images are called as in a known data set.
+fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
+    let mut taken: Option<[&String; 2]> = None;
+    let mut lonely = Vec::new();
+    for (layout, ending) in IN_ONE_FOLDER.iter().flat_map(|layout| ENDINGS.map(|ending| (layout, ending))) {
+        let names = layout.map(|name| format!("{name}.{ending}"));
+        match (names.each_ref().map(|name| named(images, name)), taken) {
+            ([Some(left), Some(right)], None) => taken = Some([left, right]),
+            ([Some(left), Some(right)], Some([first, second])) => found.notes.push(format!(
+                "{}: {first} and {second} are taken as its pair, not {left} and {right}",
+                folder.join("").display()
+            )),
+            ([Some(here), None], _) => lonely.push((here, names[1].clone())),
+            ([None, Some(here)], _) => lonely.push((here, names[0].clone())),
+            ([None, None], _) => {}
+        }
+    }
+    match taken.map(|names| names.map(|name| folder.join(name))) {
+        Some([left, right]) => found.pairs.push(Pair { name: left.with_extension(""), left, right }),
+        None => {
+            found.notes.extend(lonely.into_iter().map(|(here, missing)| {
+                format!("passed over: {} has no {missing} beside it", folder.join(here).display())
+            }))
+        }
+    }
+}
+
+/// The pairs of a folder and the one beside it, where they are called as in a known data set.
+fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
+    for layout in IN_TWO_FOLDERS {
+        let Some(side) = layout.iter().position(|&name| folder.file_name().is_some_and(|own| own == name)) else {
+            continue;
+        };
+        let (images, other) = (&folders[folder], layout[1 - side]);
+        let Some(partners) = folders.get(&folder.with_file_name(other)) else {
+            found.notes.push(format!("passed over: {} has no folder {other} with images beside it", folder.display()));
+            continue;
+        };
+        let lonely = images.iter().filter(|image| partner(image, images, partners).is_none());
+        found.notes.extend(
+            lonely.map(|image| {
+                format!("passed over: {} has no image of its name in {other}", folder.join(image).display())
+            }),
+        );
+        if side == 0 {
+            pairs_of_equal_names((folder, images), (&folder.with_file_name(other), partners), found);
+        }
+    }
+}
+
+/// The image beside one of a folder: another one of that folder may have it for its own by its very name.
+fn partner<'a>(image: &str, images: &Images, partners: &'a Images) -> Option<&'a String> {
+    named(partners, image).filter(|partner| *partner == image || !images.contains(*partner))
+}
+
+fn pairs_of_equal_names((folder, images): (&Path, &Images), (other, partners): (&Path, &Images), found: &mut Found) {
+    let mut taken = BTreeMap::new();
+    for image in images {
+        let Some(partner) = partner(image, images, partners) else { continue };
+        let name = folder.join(image).with_extension("");
+        if let Some(first) = taken.insert(name.clone(), image) {
+            let (first, image) = (folder.join(first), folder.join(image));
+            found.notes.push(format!("passed over: {} beside {}", image.display(), first.display()));
+            continue;
+        }
+        found.pairs.push(Pair { name, left: folder.join(image), right: other.join(partner) });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_names_come_before_names_that_differ_by_case() {
+        let images = |names: &[&str]| -> Images { names.iter().map(|&name| name.to_owned()).collect() };
+        let (left, right) = (images(&["A.png", "a.png", "b.PNG"]), images(&["A.png", "B.png"]));
+        let found = ["A.png", "a.png", "b.PNG"].map(|name| partner(name, &left, &right).map(String::as_str));
+        assert_eq!(found, [Some("A.png"), None, Some("B.png")]);
+    }
+}

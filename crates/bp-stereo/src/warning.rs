@@ -1,0 +1,153 @@
+//! What may be wrong with a pair or its labels, found before it is matched.
+
+use std::fmt;
+
+use bp_core::{
+    Plan,
+    survey::{RowOffsets, SeenDisparities, Survey},
+};
+
+use crate::{Labels, Options};
+
+/// Something that may be wrong.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// Both images are the same.
+    Identical,
+    /// Hardly anything matches.
+    Unlike,
+    /// Too little matches to find labels; the default is taken.
+    NoLabelsFound,
+    /// The images look exchanged.
+    Exchanged,
+    /// Corresponding rows are apart.
+    Rows(RowOffsets),
+    /// There are disparities beyond the labels.
+    Beyond(Beyond),
+    /// Some labels match nothing inside the right image.
+    Unused(Unused),
+}
+
+/// Disparities beyond the labels, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Beyond {
+    /// The least and the largest disparity seen.
+    pub seen: [i32; 2],
+    /// The disparity of the first and of the last label.
+    pub labels: [i32; 2],
+    /// What would include them.
+    advice: &'static str,
+    /// What would find labels by itself, where that was not asked for.
+    automatic: &'static str,
+}
+
+/// Labels that match nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unused {
+    /// Number of labels.
+    pub labels: usize,
+    /// Pixels of a row.
+    pub width: usize,
+    /// Which of them: "first", "last" or "all".
+    pub which: &'static str,
+}
+
+/// Warnings of a coarse look at a pair, of its plan, and of labels that were not found.
+pub(crate) fn of(options: &Options, survey: &Survey, plan: &Plan, found_labels: bool) -> Vec<Warning> {
+    // Who asks for negative disparities means them.
+    let exchanged = survey.exchanged && options.min_disparity.is_none_or(|first| first >= 0);
+    let mut warnings = Vec::new();
+    let mut add = |is_so: bool, warning| warnings.extend(is_so.then_some(warning));
+    add(survey.identical, Warning::Identical);
+    add(survey.unlike, Warning::Unlike);
+    add(!found_labels, Warning::NoLabelsFound);
+    add(exchanged, Warning::Exchanged);
+    warnings.extend(survey.rows.map(Warning::Rows));
+    // What was seen of other pairs is not to be relied on, or would be told twice.
+    let trusted = survey.rows.is_none() && !exchanged;
+    let beyond = survey.seen.filter(|_| trusted).and_then(|seen| beyond(options, seen, plan));
+    warnings.extend(beyond.map(Warning::Beyond));
+    warnings.extend(unused(plan).map(Warning::Unused));
+    warnings
+}
+
+fn beyond(options: &Options, seen: SeenDisparities, plan: &Plan) -> Option<Beyond> {
+    let model = plan.model();
+    let (first, last) = (model.min_disparity(), model.disparity(model.labels() as u16 - 1));
+    let advice = match seen.beyond(model) {
+        [false, false] => return None,
+        [true, _] if first > seen.largest => "lower `min_disparity`",
+        [_, true] if last < seen.least && options.min_disparity.is_some() => "raise `min_disparity`",
+        [true, false] => "lower `min_disparity`",
+        [false, true] => "raise `labels`",
+        [true, true] => "lower `min_disparity` and raise `labels`",
+    };
+    let automatic = match (options.labels, options.min_disparity) {
+        (Labels::Auto, None) => "",
+        (Labels::Auto, Some(_)) => ", or leave it to `labels` auto",
+        _ => ", or use `labels` auto",
+    };
+    Some(Beyond { seen: [seen.least, seen.largest], labels: [first, last], advice, automatic })
+}
+
+fn unused(plan: &Plan) -> Option<Unused> {
+    let (model, width) = (plan.model(), plan.image_size().width);
+    let labels = model.labels();
+    let matches_any = |label: u16| (model.disparity(label).unsigned_abs() as usize) < width;
+    let last = labels as u16 - 1;
+    let which = match (matches_any(0), matches_any(last)) {
+        (true, true) => return None,
+        (true, false) => "last",
+        (false, true) => "first",
+        (false, false) if (0..labels as u16).any(matches_any) => "last",
+        (false, false) => "all",
+    };
+    Some(Unused { labels, width, which })
+}
+
+impl Warning {
+    /// The warning about a pair of this name, in a sentence.
+    #[must_use]
+    pub fn about(&self, pair: &str) -> String {
+        match self {
+            Self::Identical => format!("{pair} are the same image: nothing in it is nearer or farther"),
+            Self::Unlike => {
+                format!(
+                    "hardly anything in {pair} matches: they show different scenes, are far from rectified, or are blank"
+                )
+            }
+            Self::NoLabelsFound => format!("`labels` auto: too little in {pair} matches, so the default is used"),
+            Self::Exchanged => {
+                format!("{pair} look exchanged: swap them, or give a negative `min_disparity` if that is meant")
+            }
+            Self::Rows(rows) => format!("rows of {pair} do not correspond ({}): rectify them first", apart(*rows)),
+            Self::Beyond(Beyond { seen, labels, advice, automatic }) => {
+                let seen = format!("{pair} have disparities from about {} to {} px", seen[0], seen[1]);
+                format!("{seen}, but the labels reach from {} to {}: {advice}{automatic}", labels[0], labels[1])
+            }
+            Self::Unused(Unused { which: "all", .. }) => {
+                "with this `min_disparity` no label matches anything inside the right image".to_owned()
+            }
+            Self::Unused(Unused { labels, width, which }) => {
+                format!("{labels} labels for images {width} pixels wide: the {which} ones match nowhere")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(&self.about("the images"))
+    }
+}
+
+/// How rows are apart, in words.
+fn apart(RowOffsets { whole, left, right, top, bottom }: RowOffsets) -> String {
+    let off = |rows: i32| format!("{} px too {}", rows.abs(), if rows < 0 { "high" } else { "low" });
+    if whole != 0 && [left, right, top, bottom].iter().all(|&part| part == whole) {
+        return format!("the second lies {}", off(whole));
+    }
+    let [left, right, top, bottom] = [left, right, top, bottom].map(off);
+    format!("the second lies {left} at the left, {right} at the right, {top} at the top, {bottom} at the bottom")
+}
