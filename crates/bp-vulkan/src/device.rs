@@ -217,7 +217,8 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule};
+    use bp_testkit::noise_pair;
 
     use super::*;
 

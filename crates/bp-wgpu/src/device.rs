@@ -84,7 +84,8 @@ impl Device for WgpuDevice {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule};
+    use bp_testkit::noise_pair;
 
     use super::*;
 
