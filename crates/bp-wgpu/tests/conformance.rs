@@ -2,7 +2,7 @@
 
 use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
-use bp_shaders::{
+use bp_gpu::{
     Limits,
     conformance::{conforms, conforms_cut_up, opened, refuses, runs_plans_at_once, tells_times},
 };
