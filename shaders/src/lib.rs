@@ -1,29 +1,44 @@
-//! GPU kernels in WGSL, and what a device does with them for a plan.
+//! The WGSL text of the GPU kernels.
 //!
-//! Both GPU backends run the same [`Program`]: buffers, pipelines and commands in terms that any API has. A backend
-//! only allocates, compiles, records and submits, which is what [`Queue`] asks for; [`GpuSolver`] does the rest.
+//! Each kernel has a file of its own, named after it. Some text is shared by several kernels; `bp_gpu::Kernel::source`
+//! puts the parts of a kernel together.
 
-mod answer;
-pub mod cache;
-mod check;
-mod compose;
-#[cfg(feature = "conformance")]
-pub mod conformance;
-mod copy_rate;
-mod kernel;
-mod layout;
-mod limits;
-pub mod missing;
-mod parameters;
-mod program;
-mod queue;
-mod solver;
+macro_rules! wgsl {
+    ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
+        $($(#[$doc])* pub const $name: &str = include_str!(concat!("../", $file));)*
+    };
+}
 
-pub use check::check;
-pub use copy_rate::copy_rate;
-pub use kernel::{Access, Kernel, Pipeline, WORKGROUP};
-pub use limits::Limits;
-pub use parameters::Parameters;
-pub use program::{BindGroup, Buffer, Command, Memory, Program, Segment};
-pub use queue::{PATIENCE, Queue};
-pub use solver::GpuSolver;
+// The kernels.
+wgsl! {
+    /// Computes what the profile compares, for every pixel of one image.
+    FEATURES = "features.wgsl";
+    /// Computes the grey values of the left image.
+    GREYS = "greys.wgsl";
+    /// Computes the data costs of the image.
+    MATCH_COST = "match_cost.wgsl";
+    /// Computes the grey values of a coarser grid.
+    COARSEN_GREYS = "coarsen_greys.wgsl";
+    /// Computes the data costs of a coarser grid.
+    COARSEN = "coarsen.wgsl";
+    /// Computes the first messages of a grid.
+    REFINE = "refine.wgsl";
+    /// Updates messages.
+    UPDATE_MESSAGES = "update_messages.wgsl";
+    /// Selects labels.
+    SELECT_LABELS = "select_labels.wgsl";
+}
+
+// What several kernels share.
+wgsl! {
+    /// The parameters and helpers of all kernels.
+    SHARED = "shared.wgsl";
+    /// Reading the pixels of an image.
+    IMAGE = "image.wgsl";
+    /// Writing data costs.
+    COSTS = "costs.wgsl";
+    /// Reading messages and summing them.
+    MESSAGES = "messages.wgsl";
+    /// Finding the edges whose smoothness cost is lower.
+    WEAK_EDGES = "weak_edges.wgsl";
+}

@@ -29,8 +29,6 @@
 
 mod backend;
 pub mod census;
-#[cfg(feature = "conformance")]
-pub mod conformance;
 mod cost;
 mod depth;
 mod driver;
@@ -48,7 +46,6 @@ mod plan;
 mod settings;
 mod smoothness;
 pub mod survey;
-pub mod synthetic;
 mod tiles;
 pub mod worked_example;
 

@@ -13,8 +13,6 @@ mod codes;
 mod range;
 mod rows;
 mod shrink;
-#[cfg(test)]
-mod tests;
 
 use coarse::Matches;
 

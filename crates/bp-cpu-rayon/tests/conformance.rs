@@ -1,12 +1,10 @@
 //! The rayon backend against the reference, on every instruction set that this processor has.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use bp_core::{
-    Algorithm, Backend, Driver, Model, Plan, Profile, Schedule,
-    conformance::{Answer, Case, assert_conforms, assert_same_at_random, noise_pair, random_case, solve},
-};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule};
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
+use bp_testkit::{Answer, Case, Difference, compare_at_random, conform, noise_pair, random_case, solve};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::LazyLock;
 
@@ -21,10 +19,9 @@ fn solve_on(device: usize, pool: usize, case: &Case) -> Answer {
 }
 
 #[test]
-fn every_instruction_set_conforms() {
-    for device in 0..Rayon.devices().len() {
-        POOLS[device % 4].install(|| assert_conforms(&Scalar, Rayon.open(device).unwrap().as_ref()));
-    }
+fn every_instruction_set_conforms() -> Result<(), Difference> {
+    (0..Rayon.devices().len())
+        .try_for_each(|device| POOLS[device % 4].install(|| conform(&Scalar, Rayon.open(device).unwrap().as_ref())))
 }
 
 #[test]
@@ -33,8 +30,8 @@ fn rayon_equals_scalar_with_any_number_of_threads() {
     for seed in 0..300 {
         let (device, pool) = (seed as usize % devices, seed as usize / devices % 4);
         let opened = Rayon.open(device).unwrap();
-        let refused = POOLS[pool].install(|| assert_same_at_random(&Scalar, &[opened.as_ref()], [seed]));
-        assert_eq!(refused, 0, "{seed}");
+        let refused = POOLS[pool].install(|| compare_at_random(&Scalar, &[opened.as_ref()], [seed]));
+        assert_eq!(refused, Ok(0), "{seed}");
         // Threads may take turns differently the second time.
         let case = random_case(seed);
         assert!(solve_on(device, pool, &case) == solve_on(device, pool, &case), "{seed} {:?}", case.plan);

@@ -4,9 +4,9 @@
 use bp_core::{
     Algorithm, Backend, DisparityMap, Driver, GroundTruth, MapErrors, Model, Plan, Profile, Schedule, StereoPair,
     maps::{self, Finish},
-    synthetic::{self, Scene},
 };
 use bp_cpu_rayon::Rayon;
+use bp_testkit::synthetic::{self, Scene};
 
 /// A third of the full size has disparities up to 37.
 const LABELS: usize = 48;

@@ -2,8 +2,9 @@
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, conformance::noise_pair};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule};
 use bp_cpu_rayon::Rayon;
+use bp_testkit::noise_pair;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
 #[global_allocator]

@@ -3,10 +3,11 @@
 
 use bp_core::{
     Algorithm, Backend, Cut, Device, Driver, HALO, Likeness, MessageStart, Model, Plan, Profile, Progress, Schedule,
-    Settings, Side, Size, StereoPair, Tiled, Tiling, conformance::noise_pair, synthetic,
+    Settings, Side, Size, StereoPair, Tiled, Tiling,
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
+use bp_testkit::{noise_pair, synthetic};
 
 fn devices() -> [Box<dyn Device>; 2] {
     [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()]

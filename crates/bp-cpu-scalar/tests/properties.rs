@@ -6,9 +6,9 @@ use std::ops::ControlFlow;
 use bp_core::{
     Algorithm, BAND_ROWS, Backend, Cut, DataCost, Driver, Energy, Error, Image, MessageStart, Model, Plan, Profile,
     Schedule, Settings, Size, StereoPair,
-    conformance::{Answer, Case, Oracle, assert_same, noise_pair, solve},
 };
 use bp_cpu_scalar::Scalar;
+use bp_testkit::{Answer, Case, Oracle, compare, noise_pair, solve};
 use proptest::prelude::*;
 
 fn plan_settings(grids: usize, steps: u32, schedule: Schedule) -> Settings {
@@ -100,7 +100,7 @@ proptest! {
 
     #[test]
     fn u8_equals_unbounded_integers(case in any_case()) {
-        assert_same(&Oracle, &Scalar, &case);
+        compare(&Oracle, &Scalar, &case).unwrap();
     }
 
     /// On a chain, belief propagation is dynamic programming: beliefs are min-marginals up to a constant a node.
@@ -275,7 +275,7 @@ fn sums_hold_the_extreme_costs() {
     let pair = StereoPair::new(view(255), view(0)).unwrap();
     for profile in Profile::ALL {
         let plan = Plan::new(pair.size(), Model::new(profile, 4).unwrap(), plan_settings(14, 1, Schedule::Sync));
-        assert_same(&Oracle, &Scalar, &Case { pair: pair.clone(), plan: plan.unwrap() });
+        compare(&Oracle, &Scalar, &Case { pair: pair.clone(), plan: plan.unwrap() }).unwrap();
     }
 }
 

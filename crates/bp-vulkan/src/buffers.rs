@@ -5,7 +5,7 @@ use std::{ptr::NonNull, slice, sync::Arc};
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::{Buffer, Memory};
+use bp_gpu::{Buffer, Memory};
 
 use crate::{device::Gpu, limits::memory_type, object::Owned};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::{Command, Memory, Program};
+use bp_gpu::{Command, Memory, Program};
 
 use crate::{device::Gpu, object::Owned, resources::Resources};
 

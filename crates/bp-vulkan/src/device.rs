@@ -11,7 +11,7 @@ use std::{
 
 use ash::{prelude::VkResult, vk};
 use bp_core::{Device, Error, Plan, Solver};
-use bp_shaders::{GpuSolver, Limits, Program};
+use bp_gpu::{GpuSolver, Limits, Program};
 
 use crate::{
     error::{failed, not_allocated},
@@ -63,7 +63,7 @@ impl Device for VulkanDevice {
 
     fn copy_rate(&self) -> Result<Option<f64>, Error> {
         self.gpu.check()?;
-        let rate = bp_shaders::copy_rate(&self.limits(), |program| {
+        let rate = bp_gpu::copy_rate(&self.limits(), |program| {
             Ok(Box::new(VulkanQueue::new(&self.gpu, &self.pipelines, program)?))
         });
         rate.map(Some)
@@ -217,7 +217,8 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule};
+    use bp_testkit::noise_pair;
 
     use super::*;
 

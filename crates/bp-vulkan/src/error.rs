@@ -2,7 +2,7 @@
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::PATIENCE;
+use bp_gpu::PATIENCE;
 
 /// The error of a call that was `doing` something on a device.
 pub(crate) fn failed(device: &str, doing: &'static str, result: vk::Result) -> Error {

@@ -5,7 +5,7 @@ use std::{ffi::CStr, sync::LazyLock};
 
 use ash::{Entry, ext, khr, vk};
 use bp_core::{DeviceInfo, DeviceKind};
-use bp_shaders::missing;
+use bp_gpu::missing;
 use uuid::Uuid;
 
 use crate::{limits, validation};

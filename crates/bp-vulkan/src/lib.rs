@@ -1,4 +1,4 @@
-//! GPU backend through Vulkan, by raw ash: allocates, compiles, records and submits what `bp_shaders` asks for.
+//! GPU backend through Vulkan, by raw ash: allocates, compiles, records and submits what `bp_gpu` asks for.
 //!
 //! `instance` lists devices and `device` opens them. A prepared program is a `queue` of work over its `resources`:
 //! `buffers`, bind groups and `pipelines`, which naga translates in `spirv`. `commands` records, `timeline` submits
@@ -21,7 +21,7 @@ mod timer;
 pub mod validation;
 
 use bp_core::{Backend, Device, DeviceInfo, Error};
-use bp_shaders::{Limits, missing};
+use bp_gpu::{Limits, missing};
 use device::VulkanDevice;
 use instance::{Adapter, Instance};
 
@@ -40,7 +40,7 @@ impl Vulkan {
             let instance = Instance::new()?;
             let adapter = pick(instance.adapters()?, device)?;
             let opened = VulkanDevice::open(instance, adapter, change)?;
-            bp_shaders::check(&opened)?;
+            bp_gpu::check(&opened)?;
             Ok(Box::new(opened) as Box<dyn Device>)
         };
         open().map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })

@@ -1,7 +1,7 @@
 //! What a device allows, and which of its memory is taken for what.
 
 use ash::vk;
-use bp_shaders::{Limits, Memory};
+use bp_gpu::{Limits, Memory};
 
 use crate::device::Gpu;
 

@@ -13,7 +13,7 @@ use std::{
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::{Kernel, Pipeline, cache};
+use bp_gpu::{Kernel, Pipeline, cache};
 
 use crate::{device::Gpu, object::Owned, spirv};
 

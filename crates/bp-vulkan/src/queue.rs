@@ -8,7 +8,7 @@ use std::{
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::{Buffer, Command, Memory, Program, Queue, Segment};
+use bp_gpu::{Buffer, Command, Memory, Program, Queue, Segment};
 
 use crate::{
     buffers::Buffers,

@@ -8,7 +8,7 @@ use std::{
 
 use ash::vk;
 use bp_core::Error;
-use bp_shaders::{BindGroup, Program};
+use bp_gpu::{BindGroup, Program};
 
 use crate::{
     buffers::Buffers,

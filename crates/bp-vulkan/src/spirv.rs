@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bp_shaders::{Kernel, Pipeline};
+use bp_gpu::{Kernel, Pipeline};
 use naga::{
     ShaderStage,
     back::{
@@ -61,7 +61,7 @@ mod tests {
     use std::{collections::HashSet, io::Write as _, process::Command};
 
     use bp_core::{Algorithm, Model, Plan, Profile, Schedule, Size};
-    use bp_shaders::{Limits, Program};
+    use bp_gpu::{Limits, Program};
 
     use super::*;
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 use bp_core::Error;
 
-use bp_shaders::PATIENCE;
+use bp_gpu::PATIENCE;
 
 use crate::{device::Gpu, object::Owned, validation};
 

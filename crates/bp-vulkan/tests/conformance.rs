@@ -2,10 +2,11 @@
 
 use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
-use bp_shaders::{
+use bp_gpu::{
     Limits,
     conformance::{conforms, conforms_cut_up, opened, refuses, runs_plans_at_once, tells_times},
 };
+use bp_testkit::Difference;
 use bp_vulkan::Vulkan;
 
 fn open(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
@@ -13,18 +14,18 @@ fn open(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
 }
 
 #[test]
-fn the_first_device_conforms() {
-    conforms(&Scalar, open);
+fn the_first_device_conforms() -> Result<(), Difference> {
+    conforms(&Scalar, open)
 }
 
 #[test]
-fn the_first_device_conforms_cut_up() {
-    conforms_cut_up(&Scalar, open);
+fn the_first_device_conforms_cut_up() -> Result<(), Difference> {
+    conforms_cut_up(&Scalar, open)
 }
 
 #[test]
-fn plans_on_one_device_run_at_once() {
-    runs_plans_at_once(&Scalar, open);
+fn plans_on_one_device_run_at_once() -> Result<(), Difference> {
+    runs_plans_at_once(&Scalar, open)
 }
 
 #[test]

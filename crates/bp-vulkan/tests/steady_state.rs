@@ -2,7 +2,8 @@
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Driver, Error, Model, Plan, Profile, Schedule, conformance::noise_pair};
+use bp_core::{Algorithm, Backend, Driver, Error, Model, Plan, Profile, Schedule};
+use bp_testkit::noise_pair;
 use bp_vulkan::Vulkan;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 

@@ -1,9 +1,7 @@
 //! Plans under the Khronos validation layer, synchronisation included: it has nothing to say.
 
-use bp_core::{
-    Algorithm, Backend, Model, Plan, Profile, Schedule,
-    conformance::{Case, noise_pair, solve},
-};
+use bp_core::{Algorithm, Backend, Model, Plan, Profile, Schedule};
+use bp_testkit::{Case, noise_pair, solve};
 use bp_vulkan::{
     Vulkan,
     validation::{self, Messages},

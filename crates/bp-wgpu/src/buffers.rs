@@ -1,7 +1,7 @@
 //! The buffers of a program.
 
 use bp_core::Error;
-use bp_shaders::{BindGroup, Memory, Program};
+use bp_gpu::{BindGroup, Memory, Program};
 use wgpu::{
     BindGroupDescriptor, BindGroupEntry, Buffer, BufferBinding, BufferDescriptor, BufferSize, BufferUsages,
     CommandEncoder, MapMode, SubmissionIndex,
@@ -15,7 +15,7 @@ pub(crate) const PARAMETER_BYTES: Option<BufferSize> = BufferSize::new(Program::
 /// Makes the buffers of a program, and fills that of the parameters.
 pub(crate) fn make(gpu: &Gpu, program: &Program) -> Result<Vec<Buffer>, Error> {
     gpu.guard(program.bytes(), || {
-        let make = |buffer: &bp_shaders::Buffer| self::buffer(gpu, buffer.name, buffer.bytes, usage(buffer.memory));
+        let make = |buffer: &bp_gpu::Buffer| self::buffer(gpu, buffer.name, buffer.bytes, usage(buffer.memory));
         let buffers: Vec<_> = program.buffers.iter().map(make).collect();
         gpu.queue.write_buffer(&buffers[Program::PARAMETERS], 0, &program.parameters);
         Ok(buffers)

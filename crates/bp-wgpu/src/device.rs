@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bp_core::{Device, Error, Plan, Solver};
-use bp_shaders::{GpuSolver, Limits, Program};
+use bp_gpu::{GpuSolver, Limits, Program};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
 use crate::{clock::Clock, error::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue, vulkan};
@@ -75,7 +75,7 @@ impl Device for WgpuDevice {
     }
 
     fn copy_rate(&self) -> Result<Option<f64>, Error> {
-        let rate = bp_shaders::copy_rate(&self.limits(), |program| {
+        let rate = bp_gpu::copy_rate(&self.limits(), |program| {
             Ok(Box::new(WgpuQueue::new(&self.gpu, &self.pipelines, program)?))
         });
         rate.map(Some)
@@ -84,7 +84,8 @@ impl Device for WgpuDevice {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Driver, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Driver, Model, Profile, Schedule};
+    use bp_testkit::noise_pair;
 
     use super::*;
 

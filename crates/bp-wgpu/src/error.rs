@@ -8,7 +8,7 @@ use std::{
 };
 
 use bp_core::Error;
-use bp_shaders::PATIENCE;
+use bp_gpu::PATIENCE;
 use wgpu::{ErrorFilter, PollError, PollType, SubmissionIndex};
 
 /// An open device of wgpu's, shared by all that is prepared on it.

@@ -1,7 +1,7 @@
 //! The adapters there are.
 
 use bp_core::{DeviceInfo, DeviceKind};
-use bp_shaders::missing;
+use bp_gpu::missing;
 use wgpu::{Adapter, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
 
 use crate::vulkan;

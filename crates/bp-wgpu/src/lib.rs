@@ -19,7 +19,7 @@ mod recording;
 mod vulkan;
 
 use bp_core::{Backend, Device, DeviceInfo, Error};
-use bp_shaders::Limits;
+use bp_gpu::Limits;
 
 /// The backend.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,7 +36,7 @@ impl Wgpu {
             let adapters = instance::adapters();
             let adapter = adapters.get(device).ok_or_else(|| instance::missing(adapters.len()))?;
             let opened = device::WgpuDevice::open(adapter, change)?;
-            bp_shaders::check(&opened)?;
+            bp_gpu::check(&opened)?;
             Ok(Box::new(opened) as Box<dyn Device>)
         };
         open().map_err(|reason| Error::Unavailable { backend: self.name(), device, reason })

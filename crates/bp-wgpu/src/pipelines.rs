@@ -6,7 +6,7 @@ use std::{
 };
 
 use bp_core::Error;
-use bp_shaders::{Access, Kernel, Pipeline, cache};
+use bp_gpu::{Access, Kernel, Pipeline, cache};
 use wgpu::{
     Adapter, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
     ComputePipeline, ComputePipelineDescriptor, Features, PipelineCache, PipelineCacheDescriptor,

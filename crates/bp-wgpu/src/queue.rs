@@ -7,7 +7,7 @@ use std::{
 };
 
 use bp_core::{Error, memory};
-use bp_shaders::{Program, Queue};
+use bp_gpu::{Program, Queue};
 use wgpu::{BufferUsages, CommandEncoder, SubmissionIndex};
 
 use crate::{

@@ -1,7 +1,7 @@
 //! The commands of a program. wgpu runs a recording only once, so that they are encoded anew for every solve.
 
 use bp_core::Error;
-use bp_shaders::{Command, Program};
+use bp_gpu::{Command, Program};
 use wgpu::{
     BindGroup, Buffer, CommandEncoder, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
     SubmissionIndex,

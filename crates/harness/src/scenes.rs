@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use bp_core::{DisparityMap, GroundTruth, Image, StereoPair, synthetic};
+use bp_core::{DisparityMap, GroundTruth, Image, StereoPair};
+use bp_testkit::synthetic;
 use serde::Deserialize;
 
 use crate::{

@@ -7,7 +7,8 @@ mod problems;
 mod record;
 mod tables;
 
-use bp_core::{Error, synthetic};
+use bp_core::Error;
+use bp_testkit::synthetic;
 use jiff::Timestamp;
 
 pub(crate) use charts::{CHART_NAMES, Chart, charts};

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use bp_core::{DisparityMap, Error, GroundTruth, Image, Size, StereoPair, synthetic};
+use bp_core::{DisparityMap, Error, GroundTruth, Image, Size, StereoPair};
+use bp_testkit::synthetic;
 
 use crate::Failure;
 

@@ -2,9 +2,7 @@
 
 use std::{io::Write, time::Instant};
 
-use bp_core::conformance;
-
-use crate::{args::ConformArgs, backends, failure::Failure, panics::caught, tell};
+use crate::{args::ConformArgs, backends, failure::Failure, tell};
 
 /// Runs the command: all backends, though one may fail.
 pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
@@ -25,10 +23,9 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
 fn check(opened: &backends::Opened) -> Result<(), Failure> {
     let reference = backends::reference()?;
     let start = Instant::now();
-    // The suite is made for tests and panics on a difference, which here is an answer like any other.
-    let run = || conformance::assert_conforms(reference.device.as_ref(), opened.device.as_ref());
-    caught(run).map_err(Failure::other)?;
-    let (cases, seconds) = (conformance::cases().count(), start.elapsed().as_secs_f64());
+    let conforms = bp_testkit::conform(reference.device.as_ref(), opened.device.as_ref());
+    conforms.map_err(|difference| Failure::other(difference.to_string()))?;
+    let (cases, seconds) = (bp_testkit::cases().count(), start.elapsed().as_secs_f64());
     let what = format!("{cases} cases as {} to the bit, and what comes after another pair", reference.name);
     writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
     Ok(())

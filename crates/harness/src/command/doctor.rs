@@ -151,7 +151,7 @@ fn gpu(kinds: &[DeviceKind]) -> Check {
 #[cfg(any(feature = "vulkan", feature = "wgpu"))]
 fn cache() -> Check {
     let advice = "without it kernels may be compiled at every start; set XDG_CACHE_HOME to a folder of yours";
-    let Some(folder) = bp_shaders::cache::folder() else {
+    let Some(folder) = bp_gpu::cache::folder() else {
         return Check::note("cache", "no folder for compiled kernels: there is no home folder", advice);
     };
     let written = std::fs::create_dir_all(&folder).and_then(|()| tempfile::tempfile_in(&folder));

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use bp_core::synthetic;
+use bp_testkit::synthetic;
 
 use crate::{
     args::ScenesArgs,

@@ -3,14 +3,13 @@
 use arbitrary::Unstructured;
 use bp_core::{
     Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, Likeness, MAX_GRIDS,
-    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling,
-    conformance::{Case, assert_same, solve},
-    depth_map,
+    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
     maps::{Finish, MEDIANS, confidence},
     survey::Survey,
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
+use bp_testkit::{Case, compare, solve};
 
 /// Most data costs of a pair, so that hundreds are matched in a second though every comparison is watched.
 const VOLUME: usize = 4096;
@@ -52,8 +51,9 @@ fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     let Drawn { case: Case { pair, plan }, tile, memory, .. } = drawn;
     let mirrored = Case { pair: pair.mirrored(), plan: plan.clone() };
     let [slow, fast] = devices;
-    assert_same(slow, fast, &drawn.case);
-    assert_same(slow, fast, &mirrored);
+    for case in [&drawn.case, &mirrored] {
+        compare(slow, fast, case).unwrap_or_else(|difference| panic!("{difference}"));
+    }
     let [left, right] = [solve(fast, &drawn.case)?.labels, solve(fast, &mirrored)?.labels];
     let energy = Energy::of(pair, plan.model(), &left)?;
     assert!(energy.total() <= most(plan), "{energy:?}");

@@ -1,14 +1,12 @@
-//! What the tests of both GPU backends share: the suite of [`bp_core::conformance`] on devices whose limits were lowered, so
+//! What the tests of both GPU backends share: the suite of [`bp_testkit`] on devices whose limits were lowered, so
 //! that small plans are cut up like large ones, and what else a device has to keep to.
 //!
 //! `open` opens the backend's first device with changed limits; it gives `None` where there is none, see [`opened`].
 
 use std::{env, thread, time::Duration};
 
-use bp_core::{
-    Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule,
-    conformance::{Case, assert_conforms, assert_same, assert_same_at_random, noise_pair},
-};
+use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule};
+use bp_testkit::{Case, Difference, compare, compare_at_random, conform, noise_pair};
 
 use crate::Limits;
 
@@ -30,20 +28,33 @@ pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>>
 
 /// The whole suite, and random cases.
 ///
+/// # Errors
+/// The first difference from the reference.
+///
 /// # Panics
-/// Where the device differs from the reference.
-pub fn conforms(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
-    let Some(device) = open(&|_| ()) else { return };
-    assert_conforms(reference, device.as_ref());
-    assert_eq!(assert_same_at_random(reference, &[device.as_ref()], 0..100), 0, "plans refused");
+/// Where the device refuses a plan.
+pub fn conforms(
+    reference: &dyn Device,
+    open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
+) -> Result<(), Difference> {
+    let Some(device) = open(&|_| ()) else { return Ok(()) };
+    conform(reference, device.as_ref())?;
+    assert_eq!(compare_at_random(reference, &[device.as_ref()], 0..100)?, 0, "plans refused");
+    Ok(())
 }
 
 /// Every algorithm under every schedule, on an image of several bands that is cut into strips, with dispatches of a few
 /// rows and submissions of a few dispatches; then random cases, each with buffers as small as it can do with.
 ///
+/// # Errors
+/// The first difference from the reference.
+///
 /// # Panics
-/// Where the device differs from the reference.
-pub fn conforms_cut_up(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
+/// Where the device refuses many plans.
+pub fn conforms_cut_up(
+    reference: &dyn Device,
+    open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
+) -> Result<(), Difference> {
     let lowered = [16, 32, 64, 128, 512, 2048].map(|kib| {
         open(&|limits| {
             limits.binding_bytes = kib << 10;
@@ -51,13 +62,14 @@ pub fn conforms_cut_up(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits
             (limits.workgroups, limits.dispatch_entries) = (18, 5000);
         })
     });
-    let Some(devices) = lowered.into_iter().collect::<Option<Vec<_>>>() else { return };
+    let Some(devices) = lowered.into_iter().collect::<Option<Vec<_>>>() else { return Ok(()) };
     for (case, device) in banded_cases().iter().flat_map(|case| [(case, &devices[1]), (case, &devices[2])]) {
-        assert_same(reference, device.as_ref(), case);
+        compare(reference, device.as_ref(), case)?;
     }
     let devices: Vec<_> = devices.iter().map(Box::as_ref).collect();
-    let refused = assert_same_at_random(reference, &devices, 1000..1100);
+    let refused = compare_at_random(reference, &devices, 1000..1100)?;
     assert!(refused <= 5, "{refused} plans refused");
+    Ok(())
 }
 
 fn banded_cases() -> Vec<Case> {
@@ -70,16 +82,22 @@ fn banded_cases() -> Vec<Case> {
 
 /// Solvers share a device's queue and its kernels.
 ///
+/// # Errors
+/// The first difference from the reference.
+///
 /// # Panics
-/// Where the device differs from the reference.
-pub fn runs_plans_at_once(reference: &dyn Device, open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
-    let Some(device) = open(&|_| ()) else { return };
+/// Where a thread of the device panics.
+pub fn runs_plans_at_once(
+    reference: &dyn Device,
+    open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
+) -> Result<(), Difference> {
+    let Some(device) = open(&|_| ()) else { return Ok(()) };
+    let (cases, device) = (banded_cases(), device.as_ref());
     thread::scope(|scope| {
-        for cases in banded_cases().chunks(18) {
-            let (cases, device) = (cases.to_vec(), device.as_ref());
-            scope.spawn(move || cases.iter().for_each(|case| assert_same(reference, device, case)));
-        }
-    });
+        let run = |cases: &[Case]| cases.iter().try_for_each(|case| compare(reference, device, case));
+        let threads: Vec<_> = cases.chunks(18).map(|cases| scope.spawn(move || run(cases))).collect();
+        threads.into_iter().try_for_each(|thread| thread.join().expect("no device panics"))
+    })
 }
 
 /// What a device cannot run is refused when it is prepared or opened, as the kind of error that it is.

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
-use bp_shaders::{Access, Command, Kernel, Limits, Parameters, Program};
+use bp_gpu::{Access, Command, Kernel, Limits, Parameters, Program};
 
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
     let weak_edges = (profile == Profile::Census).then_some(10);

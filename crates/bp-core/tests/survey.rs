@@ -1,10 +1,13 @@
+//! What a survey says of made-up scenes, and of pairs that are wrong in one way.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
 use std::sync::LazyLock;
 
-use super::*;
-use crate::{
-    Image, Model, Profile, Size,
-    synthetic::{self, Scene},
+use bp_core::{
+    Image, MAX_LABELS, Model, Profile, Size, StereoPair,
+    survey::{DisparityRange, SeenDisparities, Survey},
 };
+use bp_testkit::synthetic::{self, Scene};
 
 fn noise(x: usize, y: usize) -> u8 {
     let mixed = (x as u32 ^ (y as u32) << 16).wrapping_mul(0x9e37_79b1);
@@ -99,7 +102,7 @@ fn labels_that_leave_out_what_was_seen_are_told_at_their_end() {
     assert_eq!(beyond(range.min_disparity, range.labels), [false, false]);
     let from_zero = range.starting_at(0);
     assert_eq!((from_zero.min_disparity, from_zero.max_disparity() / 16), (0, range.max_disparity() / 16));
-    assert_eq!(range.starting_at(i32::MIN).labels, crate::MAX_LABELS);
+    assert_eq!(range.starting_at(i32::MIN).labels, MAX_LABELS);
     assert_eq!(range.starting_at(i32::MAX).labels, 16);
     assert_eq!(beyond(0, 64), [false, false]);
     assert_eq!(beyond(0, 40), [false, true]);

@@ -2,14 +2,15 @@
 
 use std::ops::Range;
 
-use super::OracleSolver;
-use crate::{BAND_ROWS, Side};
+use bp_core::{BAND_ROWS, Side};
+
+use super::state::State;
 
 const EVEN: usize = 0;
 const ODD: usize = 1;
 
-impl OracleSolver {
-    /// One loop of [`crate::Schedule::Sweep`].
+impl State {
+    /// One loop of [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, grid: usize) {
         for rows in self.bands(grid) {
             self.sweep_band(grid, rows);

@@ -69,24 +69,22 @@ impl Kernel {
     #[must_use]
     pub fn source(self) -> String {
         let own = match self {
-            Self::Features => include_str!("../features.wgsl"),
-            Self::Greys => include_str!("../greys.wgsl"),
-            Self::MatchCost => include_str!("../match_cost.wgsl"),
-            Self::CoarsenGreys => include_str!("../coarsen_greys.wgsl"),
-            Self::Coarsen => include_str!("../coarsen.wgsl"),
-            Self::Refine => include_str!("../refine.wgsl"),
-            Self::UpdateMessages => include_str!("../update_messages.wgsl"),
-            Self::SelectLabels => include_str!("../select_labels.wgsl"),
+            Self::Features => bp_shaders::FEATURES,
+            Self::Greys => bp_shaders::GREYS,
+            Self::MatchCost => bp_shaders::MATCH_COST,
+            Self::CoarsenGreys => bp_shaders::COARSEN_GREYS,
+            Self::Coarsen => bp_shaders::COARSEN,
+            Self::Refine => bp_shaders::REFINE,
+            Self::UpdateMessages => bp_shaders::UPDATE_MESSAGES,
+            Self::SelectLabels => bp_shaders::SELECT_LABELS,
         };
         let of_several = match self {
-            Self::Features | Self::Greys => [include_str!("../image.wgsl"), ""],
-            Self::MatchCost | Self::Coarsen => [include_str!("../costs.wgsl"), ""],
-            Self::UpdateMessages | Self::SelectLabels => {
-                [include_str!("../messages.wgsl"), include_str!("../weak_edges.wgsl")]
-            }
+            Self::Features | Self::Greys => [bp_shaders::IMAGE, ""],
+            Self::MatchCost | Self::Coarsen => [bp_shaders::COSTS, ""],
+            Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::WEAK_EDGES],
             Self::CoarsenGreys | Self::Refine => ["", ""],
         };
-        [include_str!("../shared.wgsl"), of_several[0], of_several[1], own].concat()
+        [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
     }
 
     /// What it does with the storage buffers bound to group 0 from binding 1 on, in order. Binding 0 is one block of

@@ -1,6 +1,6 @@
 //! The WGSL files are valid, and declare what the Rust side says they do.
 
-use bp_shaders::{Access, Kernel, Parameters};
+use bp_gpu::{Access, Kernel, Parameters};
 use naga::{
     AddressSpace, Module, StorageAccess, TypeInner,
     front::wgsl,
@@ -21,7 +21,7 @@ fn every_kernel_is_valid_wgsl() {
         checked.unwrap_or_else(|error| panic!("{}: {}", kernel.name(), error.emit_to_string(&kernel.source())));
         let [entry] = module.entry_points.as_slice() else { panic!("{}: one entry point", kernel.name()) };
         assert_eq!(entry.name, kernel.name());
-        assert_eq!(entry.workgroup_size, [bp_shaders::WORKGROUP, 1, 1]);
+        assert_eq!(entry.workgroup_size, [bp_gpu::WORKGROUP, 1, 1]);
     }
 }
 

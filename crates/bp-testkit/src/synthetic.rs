@@ -12,7 +12,7 @@ mod surface;
 mod tests;
 mod texture;
 
-use crate::{DisparityMap, Image, Size, StereoPair};
+use bp_core::{DisparityMap, Image, Size, StereoPair};
 use render::{Exposure, World};
 use surface::View;
 

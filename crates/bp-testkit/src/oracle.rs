@@ -1,92 +1,26 @@
-//! The same model computed the obvious way: unbounded integers, messages by their definition, nothing clipped but where
-//! that is part of the definition.
+//! The same model computed the obvious way: in unbounded integers, with messages by their definition, and clipped only
+//! where the definition says so.
 
+mod state;
 mod sweep;
 
 use std::ops::Range;
 
-use crate::{DataCost, Device, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair};
+use bp_core::{DataCost, Device, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair};
+use state::{Grid, State};
 
 /// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs, except
-/// those that [`Settings::coarse_clip`](crate::Settings::coarse_clip) says to.
+/// those that [`Settings::coarse_clip`](bp_core::Settings::coarse_clip) says to.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Oracle;
 
 impl Device for Oracle {
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
-        let grid = |grid: usize| Grid {
-            greys: vec![0; plan.size(grid).pixels()],
-            sums: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
-            costs: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
-            received: vec![
-                [const { Vec::new() }; 4].map(|_: Vec<i64>| vec![0; plan.model().labels()]);
-                plan.size(grid).pixels()
-            ],
-        };
-        Ok(Box::new(OracleSolver { grids: (0..plan.grids()).map(grid).collect(), plan: plan.clone() }))
+        Ok(Box::new(State::new(plan)))
     }
 }
 
-type Messages = Vec<[Vec<i64>; 4]>;
-
-/// Grey values `[node]`, costs `[node][label]`, the sums they were made from, which coarser grids are summed from too, and
-/// received messages `[node][side][label]`.
-struct Grid {
-    greys: Vec<i64>,
-    sums: Vec<Vec<i64>>,
-    costs: Vec<Vec<i64>>,
-    received: Messages,
-}
-
-struct OracleSolver {
-    plan: Plan,
-    grids: Vec<Grid>,
-}
-
-impl OracleSolver {
-    /// The nodes of a grid: index, column and row.
-    fn nodes(&self, grid: usize) -> impl Iterator<Item = (usize, (usize, usize))> + use<> {
-        let width = self.plan.size(grid).width;
-        (0..self.plan.size(grid).pixels()).map(move |node| (node, (node % width, node / width)))
-    }
-
-    /// Makes the costs of a grid from their sums.
-    fn set_costs(&mut self, grid: usize) {
-        let clips = grid > 0 && self.plan.settings().coarse_clip;
-        let truncation = i64::from(self.plan.model().truncation());
-        let Grid { sums, costs, .. } = &mut self.grids[grid];
-        costs.clone_from(sums);
-        for costs in costs.iter_mut().filter(|_| clips) {
-            let least = costs.iter().copied().min().unwrap_or(0);
-            costs.iter_mut().for_each(|cost| *cost = (*cost - least).min(truncation + truncation / 2));
-        }
-    }
-
-    /// The smoothness cost of labels a and d at the ends of the edge from (x, y) to that side.
-    fn smoothness(&self, grid: usize, (x, y): (usize, usize), side: Side) -> impl Fn(usize, usize) -> i64 + use<> {
-        let (model, width) = (self.plan.model(), self.plan.size(grid).width);
-        let (slope, truncation) = (i64::from(model.slope()), i64::from(model.truncation()));
-        let grey = |(x, y): (usize, usize)| self.grids[grid].greys[y * width + x];
-        let difference = self.plan.neighbour(grid, (x, y), side).map_or(0, |other| grey((x, y)) - grey(other));
-        let is_weak = model.weak_edges().is_some_and(|threshold| difference.abs() > threshold.into());
-        let (slope, truncation) = if is_weak { (slope / 2, truncation / 2) } else { (slope, truncation) };
-        move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
-    }
-
-    /// What the node at `from` sends, given what it `received`: all but what came from the receiver, `to`.
-    fn message(&self, grid: usize, from: (usize, usize), received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
-        let costs = &self.grids[grid].costs[from.1 * self.plan.size(grid).width + from.0];
-        let smoothness = self.smoothness(grid, from, to);
-        let sources = || Side::ALL.into_iter().filter(|&side| side != to);
-        let h: Vec<i64> = (0..costs.len())
-            .map(|a| costs[a] + sources().map(|side| received[side as usize][a]).sum::<i64>())
-            .collect();
-        let offer = |a: usize, d: usize| h[a] + smoothness(a, d);
-        let message: Vec<i64> = (0..h.len()).map(|d| (0..h.len()).map(|a| offer(a, d)).min().unwrap_or(0)).collect();
-        let least = message.iter().copied().min().unwrap_or(0);
-        message.into_iter().map(|value| value - least).collect()
-    }
-
+impl State {
     /// One step that reads only messages of before it. Under `checkerboard` that is the same as in place, since the
     /// nodes that send receive nothing in that half-step.
     fn step(&mut self, grid: usize, step: u32) {
@@ -122,7 +56,7 @@ impl OracleSolver {
     }
 }
 
-impl Solver for OracleSolver {
+impl Solver for State {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
         data_cost.load(pair, seed)?;

@@ -1,8 +1,9 @@
 //! From surfaces to two photographs and their ground truth.
 
+use bp_core::Size;
+
 use super::surface::{Hit, Surface, View};
 use super::texture::uniform;
-use crate::Size;
 use std::ops::RangeInclusive;
 use std::ptr;
 

@@ -1,7 +1,8 @@
 //! What backends are compared on.
 
-use super::Case;
-use crate::{Algorithm, Cut, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+use bp_core::{Algorithm, Cut, MessageStart, Model, Profile, Schedule, Settings, Size, StereoPair};
+
+use crate::{Case, noise_pair};
 
 /// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels,
 /// with the smoothness that strains 8 bits most and with weak edges; strips of a higher image with aprons of every kind.
@@ -40,7 +41,7 @@ fn strips() -> impl Iterator<Item = Case> {
 }
 
 fn case(pair: &StereoPair, model: Model, settings: Settings) -> Option<Case> {
-    Some(Case { plan: Plan::new(pair.size(), model, settings).ok()?, pair: pair.clone() })
+    Case::new(pair.clone(), model, settings).ok()
 }
 
 fn models(labels: usize) -> Vec<Model> {
@@ -85,29 +86,4 @@ fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
         Settings { cut: Some(cut), grids: 1, steps, ..ours }
     });
     std::iter::once(ours).chain(grids).chain(unclipped).chain(cuts)
-}
-
-/// A pair of coloured noise, the same for the same arguments. Blocks of 4x4 pixels are shifted by 0, 1 or 2, so that
-/// children of a coarse node disagree strongly; every fifth pixel matches nothing.
-///
-/// # Panics
-/// Where the size is no image's.
-#[must_use]
-pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
-    let hash = |i: u64| {
-        let mut z = (seed << 32 ^ i).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z ^ (z >> 27)
-    };
-    let view = |right: bool| {
-        let pixel = |i: usize| {
-            let shift = if right { (i % width / 4 + i / width / 4) % 3 } else { 0 };
-            let unmatched = right && i.is_multiple_of(5);
-            let [r, g, b, ..] = hash(if unmatched { !(i as u64) } else { (i + shift) as u64 }).to_le_bytes();
-            [r, g, b]
-        };
-        Image::from_rgb(width, height, (0..width * height).map(pixel).collect())
-    };
-    let pair = view(false).and_then(|left| StereoPair::new(left, view(true)?));
-    pair.unwrap_or_else(|error| panic!("{error}"))
 }

@@ -2,8 +2,9 @@
 
 use fastrand::Rng;
 
-use super::{Case, noise_pair};
-use crate::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, image::APRON};
+use bp_core::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, image::APRON};
+
+use crate::{Case, noise_pair};
 
 /// Most data costs of a case, unless one row has more: a tenth of a second for the reference.
 const VOLUME: usize = 60_000;
@@ -81,8 +82,9 @@ fn one_of<T: Copy>(random: &mut Rng, all: &[T]) -> T {
 
 #[cfg(test)]
 mod tests {
+    use bp_core::Size;
+
     use super::*;
-    use crate::Size;
 
     #[test]
     fn every_kind_of_plan_is_drawn() {

@@ -134,7 +134,8 @@ impl Solver for GpuSolver {
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use bp_core::{Algorithm, Model, Profile, Schedule, conformance::noise_pair};
+    use bp_core::{Algorithm, Model, Profile, Schedule};
+    use bp_testkit::noise_pair;
 
     use super::*;
     use crate::Limits;

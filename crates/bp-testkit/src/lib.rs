@@ -1,0 +1,33 @@
+//! What tests and experiments need, and users do not: a suite that every backend passes, and made-up stereo scenes.
+//!
+//! A backend's own test opens its device and returns what [`conform`] returns:
+//!
+//! ```
+//! use bp_core::Backend;
+//! use bp_testkit::{Difference, Oracle, compare, random_case};
+//!
+//! # fn main() -> Result<(), Difference> {
+//! let device = bp_cpu_scalar::Scalar.open(0).expect("the reference runs everywhere");
+//! compare(&Oracle, device.as_ref(), &random_case(4))
+//! # }
+//! ```
+//!
+//! The [`Oracle`] is slow and obviously right. A backend may also be compared with a device that passed the suite itself.
+
+mod case;
+mod cases;
+mod difference;
+mod noise;
+mod oracle;
+mod random;
+mod suite;
+pub mod synthetic;
+mod videos;
+
+pub use case::{Answer, Case, solve};
+pub use cases::cases;
+pub use difference::{Difference, Fault};
+pub use noise::noise_pair;
+pub use oracle::Oracle;
+pub use random::random_case;
+pub use suite::{compare, compare_at_random, conform};

@@ -1,0 +1,28 @@
+//! Pairs of noise.
+
+use bp_core::{Image, StereoPair};
+
+/// A pair of coloured noise, the same for the same arguments. Blocks of 4x4 pixels are shifted by 0, 1 or 2, so that
+/// children of a coarse node disagree strongly; every fifth pixel matches nothing.
+///
+/// # Panics
+/// Where the size is no image's.
+#[must_use]
+pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
+    let hash = |i: u64| {
+        let mut z = (seed << 32 ^ i).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z ^ (z >> 27)
+    };
+    let view = |right: bool| {
+        let pixel = |i: usize| {
+            let shift = if right { (i % width / 4 + i / width / 4) % 3 } else { 0 };
+            let unmatched = right && i.is_multiple_of(5);
+            let [r, g, b, ..] = hash(if unmatched { !(i as u64) } else { (i + shift) as u64 }).to_le_bytes();
+            [r, g, b]
+        };
+        Image::from_rgb(width, height, (0..width * height).map(pixel).collect())
+    };
+    let pair = view(false).and_then(|left| StereoPair::new(left, view(true)?));
+    pair.unwrap_or_else(|error| panic!("{error}"))
+}

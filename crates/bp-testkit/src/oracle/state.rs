@@ -1,0 +1,84 @@
+//! The model as defined, computed in the obvious way: what the oracle knows between two kernels.
+
+use bp_core::{Plan, Side};
+
+type Messages = Vec<[Vec<i64>; 4]>;
+
+/// The values of one grid: greys `[node]`, sums of data costs and the costs made from them `[node][label]`, and received
+/// messages `[node][side][label]`.
+pub(super) struct Grid {
+    pub(super) greys: Vec<i64>,
+    pub(super) sums: Vec<Vec<i64>>,
+    pub(super) costs: Vec<Vec<i64>>,
+    pub(super) received: Messages,
+}
+
+/// The values of all grids of a plan.
+pub(super) struct State {
+    pub(super) plan: Plan,
+    pub(super) grids: Vec<Grid>,
+}
+
+impl State {
+    /// Zeros everywhere.
+    pub(super) fn new(plan: &Plan) -> Self {
+        let grid = |grid: usize| Grid {
+            greys: vec![0; plan.size(grid).pixels()],
+            sums: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
+            costs: vec![vec![0; plan.model().labels()]; plan.size(grid).pixels()],
+            received: vec![
+                [const { Vec::new() }; 4].map(|_: Vec<i64>| vec![0; plan.model().labels()]);
+                plan.size(grid).pixels()
+            ],
+        };
+        Self { grids: (0..plan.grids()).map(grid).collect(), plan: plan.clone() }
+    }
+
+    /// The nodes of a grid: index, column and row.
+    pub(super) fn nodes(&self, grid: usize) -> impl Iterator<Item = (usize, (usize, usize))> + use<> {
+        let width = self.plan.size(grid).width;
+        (0..self.plan.size(grid).pixels()).map(move |node| (node, (node % width, node / width)))
+    }
+
+    /// Makes the costs of a grid from their sums.
+    pub(super) fn set_costs(&mut self, grid: usize) {
+        let clips = grid > 0 && self.plan.settings().coarse_clip;
+        let truncation = i64::from(self.plan.model().truncation());
+        let Grid { sums, costs, .. } = &mut self.grids[grid];
+        costs.clone_from(sums);
+        for costs in costs.iter_mut().filter(|_| clips) {
+            let least = costs.iter().copied().min().unwrap_or(0);
+            costs.iter_mut().for_each(|cost| *cost = (*cost - least).min(truncation + truncation / 2));
+        }
+    }
+
+    /// The smoothness cost of labels a and d at the ends of the edge from (x, y) to that side.
+    pub(super) fn smoothness(
+        &self,
+        grid: usize,
+        (x, y): (usize, usize),
+        side: Side,
+    ) -> impl Fn(usize, usize) -> i64 + use<> {
+        let (model, width) = (self.plan.model(), self.plan.size(grid).width);
+        let (slope, truncation) = (i64::from(model.slope()), i64::from(model.truncation()));
+        let grey = |(x, y): (usize, usize)| self.grids[grid].greys[y * width + x];
+        let difference = self.plan.neighbour(grid, (x, y), side).map_or(0, |other| grey((x, y)) - grey(other));
+        let is_weak = model.weak_edges().is_some_and(|threshold| difference.abs() > threshold.into());
+        let (slope, truncation) = if is_weak { (slope / 2, truncation / 2) } else { (slope, truncation) };
+        move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
+    }
+
+    /// What the node at `from` sends, given what it `received`: all but what came from the receiver, `to`.
+    pub(super) fn message(&self, grid: usize, from: (usize, usize), received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
+        let costs = &self.grids[grid].costs[from.1 * self.plan.size(grid).width + from.0];
+        let smoothness = self.smoothness(grid, from, to);
+        let sources = || Side::ALL.into_iter().filter(|&side| side != to);
+        let h: Vec<i64> = (0..costs.len())
+            .map(|a| costs[a] + sources().map(|side| received[side as usize][a]).sum::<i64>())
+            .collect();
+        let offer = |a: usize, d: usize| h[a] + smoothness(a, d);
+        let message: Vec<i64> = (0..h.len()).map(|d| (0..h.len()).map(|a| offer(a, d)).min().unwrap_or(0)).collect();
+        let least = message.iter().copied().min().unwrap_or(0);
+        message.into_iter().map(|value| value - least).collect()
+    }
+}

@@ -1,0 +1,108 @@
+//! The suite that every backend passes: labels and messages equal to the bit, on every kind of plan.
+
+use std::ops::ControlFlow;
+
+use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule};
+
+use crate::{
+    Answer, Case, Difference, Fault, cases, difference::same, noise_pair, random_case, solve, videos::compare_videos,
+};
+
+/// Bytes that a device may allocate beside its plan: scratch memory.
+const SCRATCH_BYTES: u64 = 4096;
+
+/// Runs the whole suite on the `tested` device.
+///
+/// # Errors
+/// The first difference.
+pub fn conform(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
+    cases().try_for_each(|case| compare(reference, tested, &case))?;
+    compare_videos(reference, tested)?;
+    short_cases().try_for_each(|case| {
+        forgets(tested, &case)?;
+        allocates_as_planned(tested, &case.plan)
+    })
+}
+
+/// Checks that two devices give the same labels and messages for a case.
+///
+/// # Errors
+/// The first difference, or the error of a device that failed.
+pub fn compare(reference: &dyn Device, tested: &dyn Device, case: &Case) -> Result<(), Difference> {
+    let failed = |error: Error| Difference::new(error.into(), &case.plan);
+    let expected = solve(reference, case).map_err(failed)?;
+    same(&expected, &solve(tested, case).map_err(failed)?, case)
+}
+
+/// Checks that devices give the reference's labels and messages for the random cases of these seeds. Each case runs on
+/// the first of the `tested` devices that does not refuse it as [`Error::Unsupported`], so list the smallest first.
+/// Returns the number of cases that all of them refuse.
+///
+/// # Errors
+/// The first difference, or the error of a device that failed otherwise.
+pub fn compare_at_random(
+    reference: &dyn Device,
+    tested: &[&dyn Device],
+    seeds: impl IntoIterator<Item = u64>,
+) -> Result<usize, Difference> {
+    let mut refused = 0;
+    for seed in seeds {
+        let case = random_case(seed);
+        let seeded = |difference| Difference { seed: Some(seed), ..difference };
+        let is_refused = |found: &Result<Answer, Error>| matches!(found, Err(Error::Unsupported { .. }));
+        let answers = tested.iter().map(|device| solve(*device, &case));
+        match answers.into_iter().find(|found| !is_refused(found)) {
+            Some(found) => compare_answer(reference, found, &case).map_err(seeded)?,
+            None => refused += 1,
+        }
+    }
+    Ok(refused)
+}
+
+fn compare_answer(reference: &dyn Device, found: Result<Answer, Error>, case: &Case) -> Result<(), Difference> {
+    let failed = |error: Error| Difference::new(error.into(), &case.plan);
+    let found = found.map_err(failed)?;
+    same(&solve(reference, case).map_err(failed)?, &found, case)
+}
+
+/// Every algorithm, schedule and profile with one loop, after which the traces of old messages are not yet washed out.
+fn short_cases() -> impl Iterator<Item = Case> {
+    let pair = noise_pair(21, 17, 1);
+    let schedules = Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|schedule| (a, schedule)));
+    let all = schedules.flat_map(|(a, schedule)| Profile::ALL.map(|profile| (a, schedule, profile)));
+    all.map(move |(algorithm, schedule, profile)| {
+        let settings = algorithm.settings(pair.size(), 1, 1, schedule);
+        let case = Model::new(profile, 9).and_then(|model| Case::new(pair.clone(), model, settings));
+        case.unwrap_or_else(|error| panic!("{error}"))
+    })
+}
+
+/// Checks that a driver answers as a fresh one does, after another pair and after a solve that was stopped.
+fn forgets(device: &dyn Device, case: &Case) -> Result<(), Difference> {
+    let other = noise_pair(case.pair.size().width, case.pair.size().height, 2);
+    let again = || -> Result<[Answer; 2], Fault> {
+        let mut driver = Driver::new(device, case.plan.clone())?;
+        driver.solve(&other)?;
+        driver.solve(&case.pair)?;
+        let reused = Answer::of(&mut driver)?;
+        let stopped = driver.solve_observed(&other, &mut |_| ControlFlow::Break(()));
+        if stopped != Err(Error::Stopped) {
+            return Err(Fault::NotStopped);
+        }
+        driver.solve(&case.pair)?;
+        Ok([reused, Answer::of(&mut driver)?])
+    };
+    let expected = solve(device, case).map_err(|error| Difference::new(error.into(), &case.plan))?;
+    let found = again().map_err(|fault| Difference::new(fault, &case.plan))?;
+    found.iter().try_for_each(|found| same(&expected, found, case))
+}
+
+/// Checks that a device allocates what it planned, apart from some scratch memory.
+fn allocates_as_planned(device: &dyn Device, plan: &Plan) -> Result<(), Difference> {
+    let driver = Driver::new(device, plan.clone()).map_err(|error| Difference::new(error.into(), plan))?;
+    let (planned, allocated) = (device.planned_bytes(plan), driver.allocated_bytes());
+    if allocated.abs_diff(planned) > SCRATCH_BYTES {
+        return Err(Difference::new(Fault::Memory { allocated, planned }, plan));
+    }
+    Ok(())
+}

@@ -1,0 +1,82 @@
+//! Frames of a video that start from the messages of the frame before.
+
+use std::ops::ControlFlow;
+
+use bp_core::{Algorithm, Cut, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+
+use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve};
+
+/// Frames of a video: each but the first starts warm.
+const FRAMES: u64 = 3;
+
+/// Checks that devices give the same labels and messages on videos, and that the tested one forgets them.
+///
+/// # Errors
+/// The first difference. The tested device must also run the schedule `checkerboard`, and `sync` with an even number of
+/// steps.
+pub(crate) fn compare_videos(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
+    plans().try_for_each(|plan| {
+        let Size { width, height } = plan.image_size();
+        let frames: Vec<StereoPair> = (0..FRAMES).map(|seed| noise_pair(width, height, seed)).collect();
+        let schedule = plan.settings().schedule;
+        match (video(reference, &plan, &frames), video(tested, &plan, &frames)) {
+            (Err(Error::Plan(_)), Err(Error::Plan(_))) if schedule == Schedule::Sweep => Ok(()),
+            (Ok(_), Err(Error::Unsupported { .. })) if schedule == Schedule::Sync && plan.settings().steps % 2 == 1 => {
+                Ok(())
+            }
+            (Ok(expected), Ok(found)) => {
+                for ((expected, found), pair) in expected.iter().zip(&found).zip(&frames) {
+                    same(expected, found, &Case { pair: pair.clone(), plan: plan.clone() })?;
+                }
+                forgets(tested, &plan, &frames)
+            }
+            (expected, found) => {
+                Err(Difference::new(Fault::Refusal { expected: expected.err(), found: found.err() }, &plan))
+            }
+        }
+    })
+}
+
+fn plans() -> impl Iterator<Item = Plan> {
+    let sizes = [(1, 1), (1, 4), (7, 1), (13, 11), (67, 40)].map(|(width, height)| Size { width, height });
+    let all = sizes.into_iter().flat_map(|size| Schedule::ALL.map(|schedule| (size, schedule)));
+    all.flat_map(|(size, schedule)| {
+        let several = Settings { grids: 3, ..Algorithm::Cfbp.settings(size, 1, 1, schedule) };
+        let cut = Some(Cut { x: size.width / 3, y: size.height / 2, seed_start: true });
+        let shapes = [several, Settings { grids: 1, ..several }, Settings { grids: 1, cut, ..several }];
+        let counted = shapes.into_iter().flat_map(|shape| [1, 2, 3, 4].map(|steps| Settings { steps, ..shape }));
+        counted.filter_map(move |settings| Plan::new(size, Model::new(Profile::Census, 6).ok()?, settings).ok())
+    })
+}
+
+/// The answers to all frames, each but the first from a warm start.
+fn video(device: &dyn Device, plan: &Plan, frames: &[StereoPair]) -> Result<Vec<Answer>, Error> {
+    let mut driver = Driver::new(device, plan.clone())?;
+    let mut solve = |pair: &StereoPair| {
+        driver.solve_warm_observed(pair, &mut |_| ControlFlow::Continue(()))?;
+        Answer::of(&mut driver)
+    };
+    frames.iter().map(&mut solve).collect()
+}
+
+/// Checks that a cold solve after a video, and a warm one after a stopped solve, equal those of a fresh driver.
+fn forgets(device: &dyn Device, plan: &Plan, frames: &[StereoPair]) -> Result<(), Difference> {
+    let case = Case { pair: frames[0].clone(), plan: plan.clone() };
+    let [other, last] = [&frames[1], &frames[2]];
+    let again = || -> Result<[Answer; 2], Fault> {
+        let mut driver = Driver::new(device, plan.clone())?;
+        driver.solve(other)?;
+        driver.solve_warm_observed(last, &mut |_| ControlFlow::Continue(()))?;
+        driver.solve(&case.pair)?;
+        let cold = Answer::of(&mut driver)?;
+        let stopped = driver.solve_warm_observed(other, &mut |_| ControlFlow::Break(()));
+        if stopped != Err(Error::Stopped) {
+            return Err(Fault::NotStopped);
+        }
+        driver.solve_warm_observed(&case.pair, &mut |_| ControlFlow::Continue(()))?;
+        Ok([cold, Answer::of(&mut driver)?])
+    };
+    let found = again().map_err(|fault| Difference::new(fault, plan))?;
+    let expected = solve(device, &case).map_err(|error| Difference::new(error.into(), plan))?;
+    found.iter().try_for_each(|found| same(&expected, found, &case))
+}
