@@ -3,7 +3,7 @@
 use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, description::Asked};
+use crate::{Error, description::Derived};
 
 /// What is run. The first is ours, the others are those of Doan Van Tuan's PhD thesis (2019).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -194,13 +194,13 @@ impl Algorithm {
     }
 
     /// What the loops of a plan with so many labels were derived from.
-    pub(crate) fn asked(&self, labels: usize) -> Asked {
+    pub(crate) fn derived(&self, labels: usize) -> Derived {
         match self.loops() {
             Some(passing @ Loops::Total { .. }) => {
                 let z = self.kind().divides_loops().then(|| self.z().unwrap_or(Z));
-                Asked { k: Some(passing.k(labels)), z }
+                Derived { k: Some(passing.k(labels)), z }
             }
-            _ => Asked::default(),
+            _ => Derived::default(),
         }
     }
 

@@ -204,7 +204,7 @@ impl From<&bp_core::DeviceInfo> for Device {
 
 /// What an algorithm derived its loops from, where it did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct Derived {
     /// Loops asked for.
     pub k: Option<u32>,
     /// What they were divided by.
@@ -218,7 +218,7 @@ impl Settings {
         plan: &bp_core::Plan,
         device: Option<&dyn bp_core::Device>,
         algorithm: bp_core::Algorithm,
-        asked: Asked,
+        derived: Derived,
     ) -> Self {
         let (model, settings) = (plan.model(), plan.settings());
         Self {
@@ -229,8 +229,8 @@ impl Settings {
             truncation: model.truncation(),
             edge_threshold: model.weak_edges(),
             algorithm: algorithm.name().to_owned(),
-            k: asked.k,
-            z: asked.z,
+            k: derived.k,
+            z: derived.z,
             grids: settings.grids,
             steps_per_grid: settings.steps,
             schedule: settings.schedule.name().to_owned(),

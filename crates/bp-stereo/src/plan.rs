@@ -50,11 +50,11 @@ fn first(seen: SeenDisparities, hold: &dyn Fn(i32) -> bool) -> i32 {
 /// Describes a tiled plan.
 pub(crate) fn described(options: &Options, tiling: &Tiling, opened: &Opened) -> Result<description::Settings, Error> {
     let (plan, device) = (tiling.plan(), opened.device.as_ref());
-    let asked = options.algorithm.asked(plan.model().labels());
+    let derived = options.algorithm.derived(plan.model().labels());
     Ok(description::Settings {
         message_updates: tiling.message_updates(),
         planned_bytes: tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?,
         finish: description::Finish::of(options.finish()),
-        ..description::Settings::new(plan, Some(device), options.algorithm.kind(), asked)
+        ..description::Settings::new(plan, Some(device), options.algorithm.kind(), derived)
     })
 }

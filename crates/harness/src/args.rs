@@ -4,6 +4,7 @@ mod examples;
 mod finishing;
 mod many;
 mod matching;
+mod meaning;
 mod measuring;
 mod outputs;
 mod records;
@@ -16,10 +17,10 @@ use clap::{
 };
 
 pub(crate) use finishing::FinishArgs;
-pub(crate) use many::{Also, ManyArgs};
-pub(crate) use matching::{EvaluateArgs, Labels, MatchArgs, PlanArgs, TruthArgs};
+pub(crate) use many::ManyArgs;
+pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
-pub(crate) use outputs::{ConvertArgs, MakingArgs, OutputArgs};
+pub(crate) use outputs::{ConvertArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.

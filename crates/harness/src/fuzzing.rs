@@ -8,19 +8,19 @@ mod tiny;
 use std::path::{Component, Path};
 
 use bp_core::depth_map;
+use bp_io::{Geometry, Limits, MapFormat, Mask, Raster, parse_image, parse_map, parse_mask};
+use bp_stereo::pairs;
 
 use crate::{
     compare::{Comparison, page},
     export::{Format, export},
-    files::{Geometry, PixelLimit, Raster, image_of, map_of, mask_of},
     gate,
-    matching::listed_pairs,
     record::parse,
     report,
 };
 
 /// The most pixels that a file may hold here, so that none takes long.
-const LIMIT: PixelLimit = PixelLimit { pixels: 1 << 16 };
+const LIMIT: Limits = Limits { pixels: 1 << 16, memory: None };
 
 /// What messages call the bytes.
 const NAME: &str = "bytes";
@@ -45,7 +45,7 @@ pub const TARGETS: [(&str, Target); 8] = [
 /// # Panics
 /// Where it is larger than allowed.
 pub fn image(bytes: &[u8]) -> bool {
-    let Ok(image) = image_of(Path::new(NAME), bytes, LIMIT) else { return false };
+    let Ok(image) = parse_image(Path::new(NAME), bytes, LIMIT) else { return false };
     assert!(image.pixels().len() as u64 <= LIMIT.pixels, "{} pixels", image.size());
     true
 }
@@ -55,9 +55,11 @@ pub fn image(bytes: &[u8]) -> bool {
 /// # Panics
 /// Where a map is another one after it was written and read again.
 pub fn map(bytes: &[u8]) -> bool {
-    let Ok(map) = map_of(Path::new(NAME), bytes, None, LIMIT) else { return false };
-    for encoded in Raster::disparities(&map).floats() {
-        match map_of(Path::new(NAME), &encoded, None, LIMIT) {
+    let Ok(map) = parse_map(Path::new(NAME), bytes, None, LIMIT) else { return false };
+    let formats = [MapFormat::Pfm, MapFormat::Npy, MapFormat::Tiff];
+    for encoded in formats.into_iter().filter_map(|format| Raster::disparities(&map).floats(format)) {
+        let encoded = encoded.unwrap_or_else(|error| panic!("{error}"));
+        match parse_map(Path::new(NAME), &encoded, None, LIMIT) {
             Ok(again) => assert!(again == map, "{map:?} became {again:?}"),
             Err(failure) => panic!("{map:?}: {failure}"),
         }
@@ -70,7 +72,7 @@ pub fn map(bytes: &[u8]) -> bool {
 /// # Panics
 /// Where there is not one value a pixel.
 pub fn mask(bytes: &[u8]) -> bool {
-    let Ok((size, values)) = mask_of(Path::new(NAME), bytes, LIMIT) else { return false };
+    let Ok(Mask { size, values }) = parse_mask(Path::new(NAME), bytes, LIMIT) else { return false };
     assert_eq!(values.len(), size.pixels());
     true
 }
@@ -81,7 +83,7 @@ pub fn mask(bytes: &[u8]) -> bool {
 /// Where a depth is negative or no number.
 pub fn calibration(bytes: &[u8]) -> bool {
     let Ok(geometry) = Geometry::parse(Path::new(NAME), bytes) else { return false };
-    let size = geometry.file.as_ref().and_then(|(_, size)| *size);
+    let size = geometry.file.as_ref().and_then(|file| file.size);
     if let Ok(calibration) = geometry.of(size.unwrap_or(tiny::MAP)) {
         let depths = depth_map(&tiny::map(), &calibration);
         assert!(depths.iter().all(|&depth| depth >= 0.0), "{depths:?} by {calibration:?}");
@@ -94,8 +96,8 @@ pub fn calibration(bytes: &[u8]) -> bool {
 /// # Panics
 /// Where a name leads out of the output's folder.
 pub fn pair_list(bytes: &[u8]) -> bool {
-    let Ok(pairs) = listed_pairs(bytes, NAME) else { return false };
-    for name in pairs.iter().map(|pair| &pair.name) {
+    let Ok(found) = pairs::parse(bytes, NAME) else { return false };
+    for name in found.iter().map(|pair| &pair.name) {
         let inside = name.components().all(|part| matches!(part, Component::Normal(_)));
         assert!(inside && name.file_name().is_some(), "{}", name.display());
     }

@@ -3,18 +3,13 @@
 
 use std::{
     ops::ControlFlow,
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Mutex, PoisonError},
     time::Duration,
 };
 
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 
-use crate::{failure::Failure, notes};
-
-static STOPPED: AtomicBool = AtomicBool::new(false);
+use crate::{failure::Failure, notes, terminal::STOP};
 
 /// The bar that is shown: the first of those that there are, as a batch has one that its pairs have theirs below.
 static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
@@ -23,7 +18,7 @@ static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
 /// others are stopped by the system.
 pub(crate) fn listen() -> Result<(), Failure> {
     let stop = || {
-        if STOPPED.swap(true, Ordering::Relaxed) {
+        if STOP.stop() {
             std::process::exit(Failure::interrupted().code().into());
         }
     };
@@ -36,7 +31,7 @@ pub(crate) fn listen() -> Result<(), Failure> {
 
 /// Fails where the user has asked to stop.
 pub(crate) fn check() -> Result<(), Failure> {
-    if STOPPED.load(Ordering::Relaxed) { Err(Failure::interrupted()) } else { Ok(()) }
+    if STOP.is_stopped() { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
 /// Writes to standard error where a bar may be shown.
@@ -70,7 +65,7 @@ impl ProgressBar {
     /// Shows how much is done; breaks where the user has asked to stop.
     pub(crate) fn update(&self, done: u64) -> ControlFlow<()> {
         self.bar.set_position(done);
-        if STOPPED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if STOP.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// Starts from a run that was interrupted after so much: it says nothing about the time left.

@@ -8,6 +8,7 @@
 mod args;
 mod backends;
 pub mod bench;
+mod colour_bar;
 mod command;
 mod compare;
 mod export;
@@ -19,24 +20,22 @@ mod gate;
 mod heap;
 mod interrupt;
 mod machine;
-mod matching;
 mod notes;
-mod panics;
 pub mod record;
 pub mod report;
 pub mod reproduce;
 mod scenes;
 mod speed;
 mod summary;
+mod terminal;
 mod threads;
-pub mod watch;
 
 use std::process::ExitCode;
 
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
-use notes::{note, tell, warn, warn_of_pair};
+use notes::{note, tell};
 
 /// Runs the program; the exit codes are documented in `bp --help`.
 #[must_use]

@@ -3,9 +3,11 @@
 use std::{fs, io};
 
 use bp_core::DeviceKind;
+use bp_stereo::Memory;
+use bytesize::ByteSize;
 
 use sha2::{Digest, Sha256};
-use sysinfo::{CpuRefreshKind, MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, RefreshKind, System};
+use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
 use crate::{
     failure::Failure,
@@ -23,7 +25,7 @@ pub(crate) fn machine(name: Option<&str>) -> Machine {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let name = name.map_or_else(|| slug(&format!("{cpu} {cores} cores")), slug);
     let system_name = System::long_os_version().unwrap_or_else(|_| std::env::consts::OS.to_owned());
-    let memory_bytes = memory().map_or(0, |memory| memory.total);
+    let memory_bytes = Memory::of_machine().map_or(0, |memory| memory.total);
     Machine { name, cpu, cores, memory_bytes, system: system_name }
 }
 
@@ -41,46 +43,17 @@ pub(crate) fn kind(machine: &Machine) -> String {
     slug(&format!("{} {} cores", processor(machine), machine.cores))
 }
 
-/// Refuses what would not fit into [`available_memory`], before anything is allocated. Where that is not known,
-/// allocating will.
+/// Refuses what does not fit into the memory that a device can have now, before anything is allocated. Where that is not
+/// known, allocating will.
 pub(crate) fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
-    match available_memory(kind) {
-        Some(available) if needed > available => {
-            Err(Failure::out_of_memory(format!("{needed} bytes are needed and {available} available; {advice}")))
+    let iec = |bytes| ByteSize(bytes).display().iec();
+    match Memory::available_to(kind) {
+        Some(free) if needed > free => {
+            let what = format!("needs {}, but only {} is available; {advice}", iec(needed), iec(free));
+            Err(Failure::out_of_memory(what))
         }
         _ => Ok(()),
     }
-}
-
-/// Bytes of this machine's memory that a device of a kind can have now; `None` where the system does not tell, or the
-/// device has, or may have, memory of its own.
-pub(crate) fn available_memory(kind: DeviceKind) -> Option<u64> {
-    let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
-    memory().filter(|_| shares).map(|memory| memory.available)
-}
-
-/// Main memory in bytes.
-pub(crate) struct Memory {
-    pub(crate) total: u64,
-    /// What this process can have now.
-    pub(crate) available: u64,
-}
-
-/// This machine's memory, where the system tells.
-pub(crate) fn memory() -> Option<Memory> {
-    let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
-    let mut system = System::new_with_specifics(what).ok()?;
-    let allowed = left_to_group(&mut system).unwrap_or(u64::MAX);
-    Some(Memory { total: system.total_memory(), available: system.available_memory().min(allowed) })
-}
-
-/// Bytes that the control group of this process, a container or a cluster's job, has left: of what is used, files that are
-/// cached do not count, as the system gives them up. `None` where there is no limit.
-fn left_to_group(system: &mut System) -> Option<u64> {
-    let own = sysinfo::get_current_pid().ok()?;
-    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, ProcessRefreshKind::nothing());
-    let limits = system.process(own)?.cgroup_limits()?;
-    Some(limits.total_memory.saturating_sub(limits.rss))
 }
 
 /// The running program.

@@ -5,17 +5,13 @@ use std::{
     io::{self, Write},
     sync::{
         Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
+        atomic::{AtomicBool, Ordering},
     },
 };
 
 use crate::interrupt;
 
-/// How many warnings of pairs are told: a video may have one for every frame.
-const MOST_WARNINGS: usize = 20;
-
 static QUIET: AtomicBool = AtomicBool::new(false);
-static WARNED: AtomicUsize = AtomicUsize::new(0);
 static NOTED: Mutex<Option<HashSet<String>>> = Mutex::new(None);
 
 /// Tells nothing but errors where `quiet`; logs what the environment variable RUST_LOG asks for, by default nothing.
@@ -25,6 +21,13 @@ pub(crate) fn set_up(quiet: bool) {
     let target = env_logger::Target::Pipe(Box::new(BesideBar));
     // Another program that calls this one as a library may log by itself.
     let _ = env_logger::Builder::from_env(env).target(target).try_init();
+    // Panics that a reader of files turns into an error need no words of their own.
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |about| {
+        if !bp_io::is_caught() {
+            hook(about);
+        }
+    }));
 }
 
 /// Standard error, above the bar where there is one.
@@ -58,19 +61,5 @@ pub(crate) fn note(line: &str) {
     let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
     if !is_quiet() && noted.get_or_insert_default().insert(line.to_owned()) {
         tell(line);
-    }
-}
-
-/// Tells a warning likewise.
-pub(crate) fn warn(what: &str) {
-    note(&format!("warning: {what}"));
-}
-
-/// Tells a warning that names its pair; of many pairs only the first ones.
-pub(crate) fn warn_of_pair(what: &str) {
-    match WARNED.fetch_add(1, Ordering::Relaxed) {
-        ..MOST_WARNINGS => warn(what),
-        MOST_WARNINGS => note("further warnings of images and labels are not told; the pairs' records have them"),
-        _ => {}
     }
 }

@@ -1,17 +1,15 @@
 //! What a recorded run holds. These types are the JSON of `results/*/record.json`; `results/schema.json` is their
 //! schema.
 
-mod from_core;
 mod load;
-mod settings;
 
-pub(crate) use from_core::clocks;
+pub use bp_stereo::description::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
+pub(crate) use bp_stereo::description::{Derived, clocks};
 #[cfg(feature = "fuzzing")]
 pub(crate) use load::parse;
 pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, load, record_file};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-pub use settings::{Cut, Finish, Settings};
 
 /// Version of the schema; changes with every change of meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -144,32 +142,6 @@ pub struct Cell {
     pub outcome: Outcome,
 }
 
-/// A device.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Device {
-    /// Its name.
-    pub name: String,
-    /// What it is: "processor", "discrete GPU", "integrated GPU", "virtual GPU", "other device" or "software
-    /// rasteriser"; records from before there were GPU backends lack it.
-    #[serde(default)]
-    pub kind: Option<String>,
-    /// The interface that reaches it and its version, where there is one.
-    pub api: Option<String>,
-    /// Its driver and the driver's version, where there is one.
-    pub driver: Option<String>,
-    /// Memory of its own in bytes, where it has some.
-    #[serde(default)]
-    pub memory_bytes: Option<u64>,
-    /// The universally unique identifier that its driver gives it.
-    #[serde(default)]
-    pub uuid: Option<String>,
-    /// Whether it is a CPU that pretends to be a GPU.
-    pub software_rasteriser: bool,
-    /// How many threads work at once.
-    pub workers: usize,
-}
-
 /// Numbers, or why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -221,66 +193,6 @@ pub struct Sample {
     pub clocks: Vec<Clocked>,
 }
 
-/// A clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Clock {
-    /// The host's monotonic clock.
-    Wall,
-    /// The device's own clock.
-    Device,
-}
-
-/// Stage times by one clock.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Clocked {
-    /// The clock.
-    pub clock: Clock,
-    /// The times.
-    pub stages: Stages,
-}
-
-/// Milliseconds of each stage, over all grids.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
-pub struct Stages {
-    pub match_cost_ms: f64,
-    pub coarsen_ms: f64,
-    pub refine_ms: f64,
-    pub update_messages_ms: f64,
-    pub select_labels_ms: f64,
-}
-
-/// An energy in the units of its profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Energy {
-    /// Data and smoothness together.
-    pub total: u64,
-    /// Sum of the data costs.
-    pub data: u64,
-    /// Sum of the smoothness costs.
-    pub smoothness: u64,
-}
-
-/// Errors over a set of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Errors {
-    /// Pixels of known truth.
-    pub known: u64,
-    /// Those that were answered.
-    pub answered: u64,
-    /// Root of the mean squared error of answered pixels, in pixels.
-    pub rmse: f64,
-    /// Percentages of answered pixels wrong by more than 0.5, 1, 2 and 4 pixels.
-    pub bad: [f64; 4],
-    /// The same of known pixels, unanswered ones counted as wrong.
-    pub bad_or_unanswered: [f64; 4],
-}
-
 /// A labelling and its energy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -293,14 +205,6 @@ pub struct Labelling {
     pub ours: bool,
     /// Its energy.
     pub energy: Energy,
-}
-
-impl Stages {
-    /// The stages in their order.
-    pub(crate) fn in_order(&self) -> [f64; 5] {
-        let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
-        [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
-    }
 }
 
 impl Sample {

@@ -164,7 +164,7 @@ fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
     let map = |file: Result<(PathBuf, f32), Failure>| -> Result<DisparityMap, Failure> {
         let (path, scale) = file?;
         manifest.checked(folder, &path)?;
-        read_map(&path, Some(scale), PixelLimit::megapixels(PixelLimit::MEGAPIXELS))
+        Ok(read_map(&path, Some(scale), PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?)
     };
     let truth = GroundTruth::with_right(map(truth)?, &map(truth_right)?)?;
     let pair = StereoPair::new(left, right)?;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bp_core::maps::{Finish, MEDIANS};
+use bp_core::maps::MEDIANS;
 use clap::Args;
 
 use super::{named, switch};
@@ -32,24 +32,6 @@ pub(crate) struct FinishArgs {
     /// not. .pfm, .tif and .npy as 32-bit floats, .png 65535 times them. Matches the right image too.
     #[arg(long, value_name = "MAP")]
     pub(crate) confidence: Option<PathBuf>,
-}
-
-impl FinishArgs {
-    /// What is asked for.
-    pub(crate) fn finish(&self) -> Finish {
-        Finish {
-            check: self.check.is_some(),
-            speckles: self.speckle.map(|least| least as usize),
-            fill: self.fill.unwrap_or(true) && (self.check.is_some() || self.speckle.is_some()),
-            median: self.median,
-            subpixel: self.subpixel,
-        }
-    }
-
-    /// Whether the right image's map is needed.
-    pub(crate) fn needs_right(&self) -> bool {
-        self.check.is_some() || self.confidence.is_some()
-    }
 }
 
 /// The name of a median's window, one of [`MEDIANS`].

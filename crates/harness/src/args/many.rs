@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use bp_stereo::batch::{Also, Shard};
+
 use super::named;
-use crate::matching::Shard;
 
 /// Many pairs with one command.
 #[derive(Clone, Debug, Default, Args)]
@@ -42,43 +43,4 @@ pub(crate) struct ManyArgs {
     /// Match pairs again that are complete.
     #[arg(long, requires = "many")]
     pub(crate) force: bool,
-}
-
-/// What is written beside a map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Also {
-    /// A coloured picture.
-    Picture,
-    /// A depth map.
-    Depth,
-    /// A point cloud.
-    Points,
-    /// How far the map can be trusted.
-    Confidence,
-}
-
-impl Also {
-    /// All of these.
-    const ALL: [Self; 4] = [Self::Picture, Self::Depth, Self::Points, Self::Confidence];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Picture => "picture",
-            Self::Depth => "depth",
-            Self::Points => "points",
-            Self::Confidence => "confidence",
-        }
-    }
-}
-
-impl ManyArgs {
-    /// Whether there may be more than one pair.
-    pub(crate) fn is_given(&self) -> bool {
-        self.pairs.is_some() || self.video.is_some()
-    }
-
-    /// How many pairs in turn depend on the first of them: they are done together or not at all.
-    pub(crate) fn chain(&self) -> usize {
-        self.warm_start.unwrap_or(1) as usize
-    }
 }

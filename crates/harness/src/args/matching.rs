@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
-use bp_core::{Algorithm, MAX_LABELS, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
+use bp_core::{Algorithm, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
-use super::{FinishArgs, ManyArgs, OutputArgs, named, positive, switch, threads};
-use crate::{backends, files::PixelLimit};
+use bp_io::Limits;
+use bp_stereo::Labels;
+
+use super::{FinishArgs, ManyArgs, OutputArgs, meaning::labels, named, positive, switch, threads};
+use crate::backends;
 
 /// `bp match`.
 #[derive(Clone, Debug, Args)]
@@ -30,7 +33,7 @@ pub(crate) struct MatchArgs {
     #[arg(long, conflicts_with = "many")]
     pub(crate) messages_hash: bool,
     /// Refuse images of more megapixels.
-    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
+    #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
     /// Keep within so much memory, images and answer included: larger pairs are matched strip by strip or tile by tile.
     /// Bytes, or 512M, 2G (powers of 1000), 512MiB, 2GiB (of 1024). [default: what is free]
@@ -127,31 +130,9 @@ pub(crate) struct PlanArgs {
     pub(crate) edge_threshold: Option<u8>,
 }
 
-/// Labels as they are asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Labels {
-    /// As many as the images need.
-    Auto,
-    /// So many.
-    Count(u16),
-}
-
 fn memory(text: &str) -> Result<ByteSize, String> {
     let whole_or_with_unit = text.parse().ok().filter(|_| text.starts_with(|c: char| c.is_ascii_digit()));
     whole_or_with_unit.ok_or_else(|| "must be a number of bytes, or such as 512M, 2G, 512MiB, 2GiB".to_owned())
-}
-
-fn labels(text: &str) -> Result<Labels, String> {
-    let count = || text.parse().ok().filter(|count| (1..=MAX_LABELS).contains(&usize::from(*count)));
-    let labels = if text == "auto" { Some(Labels::Auto) } else { count().map(Labels::Count) };
-    labels.ok_or_else(|| format!("must be auto or a number from 1 to {MAX_LABELS}"))
-}
-
-impl PlanArgs {
-    /// The algorithm.
-    pub(crate) fn algorithm(&self) -> Algorithm {
-        self.algorithm.unwrap_or(Algorithm::Sweep)
-    }
 }
 
 /// How ground truth is read.
@@ -183,7 +164,7 @@ pub(crate) struct EvaluateArgs {
     #[arg(long)]
     pub(crate) json: bool,
     /// Refuse images of more megapixels.
-    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
+    #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
     /// How ground truth is read.
     #[command(flatten)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{named, positive};
-use crate::files::{Colours, PixelLimit};
+use bp_io::{Colours, Limits};
 
 /// What is made of a map.
 #[derive(Clone, Debug, Args)]
@@ -74,7 +74,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "LEFT")]
     pub(crate) image: Option<PathBuf>,
     /// Refuse images of more megapixels.
-    #[arg(long, value_name = "N", default_value_t = PixelLimit::MEGAPIXELS)]
+    #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
     /// What else is written, and how.
     #[command(flatten)]

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
 
-use super::{Chosen, Opened};
+use super::Opened;
 
 /// Its device solves one problem, and is lost until it is opened again.
 #[derive(Default)]
@@ -44,6 +44,5 @@ impl Device for Once {
 
 /// Its device, open.
 pub(crate) fn open(backend: &'static Flaky) -> Result<Opened, Error> {
-    let info = backend.devices().pop();
-    Chosen { name: backend.name().to_owned(), backend, index: 0, info }.open()
+    Opened::of(backend, 0)
 }

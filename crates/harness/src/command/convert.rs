@@ -1,21 +1,18 @@
-//! `bp convert`: other files of a disparity map that is there.
+//! `bp convert`: other files from an existing disparity map.
 
 use std::path::{Path, PathBuf};
 
 use bp_core::{DisparityMap, Image};
+use bp_io::{Limits, read_image, read_map};
+use bp_stereo::Content;
 
-use crate::{
-    args::ConvertArgs,
-    failure::Failure,
-    files::{PixelLimit, read_image, read_map},
-    interrupt,
-    matching::{Content, Making, Outputs},
-};
+use super::match_pair::limits;
+use crate::{args::ConvertArgs, failure::Failure, terminal};
 
 /// Runs the command.
 pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
-    let making = Making::of(&args.outputs)?;
-    let outputs = Outputs::of(args.output.as_deref(), &args.outputs);
+    let making = args.outputs.making(false, false)?;
+    let outputs = args.outputs.outputs(args.output.as_deref());
     if outputs.paths(&making).is_empty() {
         return Err(Failure::usage("nothing to write: give --output, --picture, --depth or --points"));
     }
@@ -25,21 +22,23 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     if outputs.points.is_none() && args.image.is_some() {
         return Err(Failure::usage("--image is for --points: give --points too"));
     }
-    interrupt::listen()?;
-    let calib = &args.outputs.making.calib;
+    terminal::listen()?;
+    let calib = args.outputs.calibration();
     let inputs: Vec<&Path> =
-        [Some(&args.map), args.image.as_ref(), calib.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        [Some(&args.map), args.image.as_ref(), calib].into_iter().flatten().map(PathBuf::as_path).collect();
     outputs.check(&making, &inputs)?;
-    let limit = PixelLimit::megapixels(args.max_megapixels);
+    let limit = limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     outputs.check_map(&making, map.range().unwrap_or((0.0, 0.0)), map.size())?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;
-    interrupt::check()?;
-    outputs.write(&making, &Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs })
+    let watch = terminal::watch();
+    watch.check()?;
+    let content = Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs };
+    Ok(outputs.write(&making, &content, &watch)?)
 }
 
 /// Reads the left image of a map.
-fn read_image_of(map: &DisparityMap, path: &Path, limit: PixelLimit) -> Result<Image, Failure> {
+fn read_image_of(map: &DisparityMap, path: &Path, limit: Limits) -> Result<Image, Failure> {
     let image = read_image(path, limit)?;
     if image.size() == map.size() {
         return Ok(image);

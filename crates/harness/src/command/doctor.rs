@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use bp_core::{Backend, DeviceInfo, DeviceKind};
+use bp_stereo::Memory;
 use bytesize::ByteSize;
 use serde::Serialize;
 
@@ -101,7 +102,7 @@ fn processor() -> Check {
 
 fn memory() -> Check {
     let iec = |bytes| ByteSize(bytes).display().iec();
-    match machine::memory() {
+    match Memory::of_machine() {
         None => Check::note("memory", "the system does not tell", "--max-memory keeps `bp match` within a limit"),
         Some(memory) => Check::ok("memory", format!("{} available of {}", iec(memory.available), iec(memory.total))),
     }

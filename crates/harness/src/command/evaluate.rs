@@ -5,12 +5,13 @@ use std::{fmt::Write as _, io::Write as _, path::Path};
 use bp_core::{Errors, GroundTruth, THRESHOLDS};
 use serde::Serialize;
 
-use super::print_json;
+use bp_io::{Error, Limits, Mask, read_map, read_mask};
+use bp_stereo::description as record;
+
+use super::{match_pair::limits, print_json};
 use crate::{
     args::{EvaluateArgs, TruthArgs},
     failure::Failure,
-    files::{PixelLimit, read_map, read_mask},
-    record,
 };
 
 /// What `--json` prints.
@@ -38,7 +39,7 @@ impl From<Errors> for ErrorReport {
 
 /// Runs the command.
 pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
-    let limit = PixelLimit::megapixels(args.max_megapixels);
+    let limit = limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
     let errors = truth.errors(&map).map_err(|_| {
@@ -55,24 +56,24 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
 }
 
 /// Reads ground truth, and what tells which of its pixels are visible.
-pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: PixelLimit) -> Result<GroundTruth, Failure> {
+pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Result<GroundTruth, Failure> {
     let truth = read_map(path, options.scale, limit)?;
     if truth.range().is_none() {
-        return Err(Failure::reading(path, &"ground truth without a known pixel"));
+        return Err(Error::reading(path, &"ground truth without a known pixel").into());
     }
     if let Some(right) = &options.ground_truth_right {
         let map = read_map(right, options.scale, limit)?;
-        return GroundTruth::with_right(truth, &map).map_err(|error| Failure::reading(right, &error));
+        return GroundTruth::with_right(truth, &map).map_err(|error| Error::reading(right, &error).into());
     }
     if let Some(mask) = &options.mask {
-        let (size, visible) = read_mask(mask, limit)?;
+        let Mask { size, values: visible } = read_mask(mask, limit)?;
         if size != truth.size() {
-            return Err(Failure::reading(mask, &format!("{size} pixels where the truth has {}", truth.size())));
+            return Err(Error::reading(mask, &format!("{size} pixels, but the truth has {}", truth.size())).into());
         }
         if !visible.contains(&true) {
-            return Err(Failure::reading(mask, &"no pixel is 255, so none would count"));
+            return Err(Error::reading(mask, &"no pixel is 255, so none would count").into());
         }
-        return GroundTruth::with_mask(truth, visible).map_err(|error| Failure::reading(mask, &error));
+        return GroundTruth::with_mask(truth, visible).map_err(|error| Error::reading(mask, &error).into());
     }
     Ok(GroundTruth::new(truth))
 }

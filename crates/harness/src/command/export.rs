@@ -6,7 +6,7 @@ use crate::{
     args::ExportArgs,
     export,
     failure::Failure,
-    files::{check_distinct, check_writable, write_text},
+    files::{check_writable, write_text},
     note,
     record::{load, record_file},
 };
@@ -14,7 +14,7 @@ use crate::{
 /// Runs the command.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     if let Some(output) = &args.output {
-        check_distinct(&record_file(&args.record), output, "is read, and would be overwritten")?;
+        bp_io::check_distinct(&record_file(&args.record), output, "is read, and would be overwritten")?;
         check_writable(output)?;
     }
     let record = load(&args.record)?;

@@ -1,119 +1,162 @@
-//! `bp match`: the disparity map of one's own pair.
+//! `bp match`: disparity maps of one's own pairs.
 
 use std::{
     io::Write as _,
     path::{Path, PathBuf},
 };
 
-use bp_core::{Errors, GroundTruth, Plan, Size, StereoPair, survey::Survey};
+use bp_core::{DeviceKind, GroundTruth, Size, StereoPair, survey::Survey};
+use bp_io::{Limits, read_image};
+use bp_stereo::{
+    AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Memory, Outputs, Planned, Start, batch,
+};
 
-use super::{evaluate, print_json};
+use super::{
+    evaluate,
+    match_report::{Asked, Report, text},
+    match_summary, print_json,
+};
 use crate::{
-    args::{Labels, MatchArgs, PlanArgs},
-    failure::Failure,
-    files::{PixelLimit, read_image},
-    heap, interrupt,
-    matching::{self, Content, Making, Outputs, Report, Session, batch, labels, plan, warnings},
-    note, threads, warn_of_pair,
+    args::MatchArgs,
+    failure::{Failure, as_options},
+    heap,
+    notes::note,
+    terminal,
 };
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     heap::return_large_buffers();
-    check_options(args)?;
-    let (Some(left), Some(right)) = (&args.left, &args.right) else { return batch::match_all(args) };
+    match (args.batch()?, &args.left, &args.right) {
+        (None, Some(left), Some(right)) => match_one(args, [left, right]),
+        (Some(options), ..) => match_many(args, &options),
+        _ => Err(Failure::usage("give two images, --pairs or --video")),
+    }
+}
+
+fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Failure> {
+    let making = args.making()?;
+    terminal::listen()?;
+    let summary = batch::run(options, &making, &terminal::watch());
+    terminal::finish();
+    let summary = summary?;
+    if args.json {
+        print_json(&summary)?;
+    } else {
+        write!(std::io::stdout(), "{}", match_summary::text(&summary))?;
+    }
+    match summary.failures.len() {
+        0 => Ok(()),
+        failed => {
+            let path = batch::summary_path(&options.output, options.shard);
+            Err(Failure::input(format!("{failed} of {} pairs failed; see {}", summary.pairs, path.display())))
+        }
+    }
+}
+
+/// One pair: its images, and what is made of them.
+struct Job<'a> {
+    args: &'a MatchArgs,
+    files: [&'a PathBuf; 2],
+    pair: StereoPair,
+    truth: Option<GroundTruth>,
+    outputs: Outputs,
+    making: Making,
+}
+
+fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
+    let (options, outputs, making) = (args.options()?, args.outputs(), args.making()?);
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let confidence = args.finish.confidence.clone();
-    let outputs = Outputs { confidence, ..Outputs::of(Some(&args.output), &args.outputs) };
-    let making = Making::of(&args.outputs)?;
     let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
-    let limit = PixelLimit::megapixels(args.max_megapixels);
-    let pair = read_pair(left, right, limit)?;
-    let survey = Survey::of(&pair)?;
-    let (plan, warnings) = planned(&args.plan, [left, right], pair.size(), &survey, (&outputs, &making))?;
-    if args.plan.labels == Some(Labels::Auto) {
-        let (model, labels) = (plan.model(), plan.model().labels());
-        let (low, high) = (model.min_disparity(), model.disparity(labels as u16 - 1));
-        note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
-    }
-    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limit)).transpose()?;
-    interrupt::listen()?;
-    let outputs = (&outputs, &making);
-    let report = threads::run_on(args.plan.threads, || run(args, &pair, plan, truth.as_ref(), warnings, outputs))?;
-    if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", matching::text(&report))?) }
+    let limits = limits(args.max_megapixels);
+    let pair = read_pair(files, limits)?;
+    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limits)).transpose()?;
+    terminal::listen()?;
+    let whole = args.messages_hash.then_some("messages_hash");
+    let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, whole };
+    let mut matcher = Matcher::new(&options)?.beside(beside);
+    let job = Job { args, files, pair, truth, outputs, making };
+    let report = job.run(&mut matcher)?;
+    if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", text(&report))?) }
 }
 
-/// Refuses options that do nothing without others, or contradict one another.
-fn check_options(args: &MatchArgs) -> Result<(), Failure> {
-    plan::check_options(&args.plan)?;
-    if args.finish.fill.is_some() && args.finish.check.is_none() && args.finish.speckle.is_none() {
-        return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
+impl Job<'_> {
+    /// Plans and matches the pair, and writes its files.
+    fn run(&self, matcher: &mut Matcher) -> Result<Report, Failure> {
+        let planned = self.plan(matcher)?;
+        let warnings = planned.warnings.iter().map(|warning| as_options(&warning.about(&self.name()))).collect();
+        let (answer, times) = self.matched(matcher, planned)?;
+        terminal::finish();
+        let errors = self.truth.as_ref().map(|truth| truth.errors(&answer.map)).transpose()?;
+        let messages_sha256 = self.args.messages_hash.then(|| matcher.messages_sha256()).transpose()?;
+        let content = Content {
+            map: &answer.map,
+            confidence: answer.confidence.as_deref(),
+            image: Some(self.pair.left()),
+            plan: Some(&answer.settings),
+            inputs: &sources(self.args).collect::<Vec<_>>(),
+        };
+        self.outputs.write(&self.making, &content, &terminal::watch())?;
+        let asked = Asked { size: self.pair.size(), warnings, errors, messages_sha256 };
+        Ok(Report::new(matcher, answer, &times, asked, self.outputs.paths(&self.making)))
     }
-    let truth_options =
-        args.truth.ground_truth_right.is_some() || args.truth.mask.is_some() || args.truth.scale.is_some();
-    if args.ground_truth.is_none() && truth_options {
-        return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
-    }
-    // Clap does not ask for --video where --pairs or two images stand in its place.
-    if args.many.warm_start.is_some() && args.many.video.is_none() {
-        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
-    }
-    Ok(())
-}
 
-/// The plan for a pair, which its outputs can hold, and what may be wrong with the two: that is told too.
-pub(crate) fn planned(
-    args: &PlanArgs,
-    files: [&Path; 2],
-    size: Size,
-    survey: &Survey,
-    (outputs, making): (&Outputs, &Making),
-) -> Result<(Plan, Vec<String>), Failure> {
-    let range = labels::range(args, size, survey, outputs);
-    let plan = plan::plan(args, size, range.unwrap_or_else(|| labels::default(args, size)))?;
-    let warnings = warnings::of(args, survey, &plan, files, range.is_none());
-    // Told first: exchanged images may be why the outputs cannot hold what is asked for.
-    warnings.iter().for_each(|warning| warn_of_pair(warning));
-    outputs.check_model(making, plan.model(), size)?;
-    Ok((plan, warnings))
-}
+    /// The pair's plan, which its outputs can hold. What may be wrong is shown first: exchanged images may be why they cannot.
+    fn plan(&self, matcher: &Matcher) -> Result<Planned, Failure> {
+        let survey = Survey::of(&self.pair)?;
+        let planned = matcher.plan_within(&self.pair, &survey, &|disparity| self.outputs.hold(disparity))?;
+        planned.warnings.iter().for_each(|warning| terminal::warn(&as_options(&warning.about(&self.name()))));
+        self.outputs.check_plan(&self.making, &planned.plan)?;
+        if matcher.options().labels == Labels::Auto {
+            let model = planned.plan.model();
+            let labels = model.labels();
+            let (low, high) = (model.min_disparity(), model.disparity(labels as u16 - 1));
+            note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
+        }
+        Ok(planned)
+    }
 
-/// Matches the pair and writes its files.
-fn run(
-    args: &MatchArgs,
-    pair: &StereoPair,
-    plan: Plan,
-    truth: Option<&GroundTruth>,
-    warnings: Vec<String>,
-    (outputs, making): (&Outputs, &Making),
-) -> Result<Report, Failure> {
-    let mut session = Session::open(args)?;
-    let answer = session.solve(pair, plan)?;
-    let errors: Option<Errors> = truth.map(|truth| truth.errors(&answer.map)).transpose()?;
-    let inputs: Vec<&Path> = sources(args).collect();
-    let (image, plan) = (Some(pair.left()), Some(&answer.settings));
-    let confidence = answer.confidence.as_deref();
-    outputs.write(making, &Content { map: &answer.map, confidence, image, plan, inputs: &inputs })?;
-    Ok(Report::new(pair, session.opened(), answer, errors, warnings, outputs.paths(making)))
+    /// The last answer of as many matches as the arguments ask for, and the times of all. Only one answer is in memory at a
+    /// time.
+    fn matched(&self, matcher: &mut Matcher, planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
+        let mut times = Vec::new();
+        loop {
+            let answer = matcher.run(&self.pair, planned.clone(), Start::Cold, &terminal::watch())?;
+            times.push(answer.times);
+            if times.len() >= self.args.repeat as usize {
+                return Ok((answer, times));
+            }
+        }
+    }
+
+    /// Both images, as messages name them.
+    fn name(&self) -> String {
+        let [left, right] = self.files;
+        format!("{} and {}", left.display(), right.display())
+    }
 }
 
 /// The files that the outputs are made of.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
-    [&args.left, &args.right].into_iter().flatten().chain(&args.outputs.making.calib).map(PathBuf::as_path)
+    [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }
 
-/// Reads both images of a pair.
-pub(crate) fn read_pair(left: &Path, right: &Path, limit: PixelLimit) -> Result<StereoPair, Failure> {
+/// How much a file may hold, and how much memory reading it may take.
+pub(super) fn limits(megapixels: u32) -> Limits {
+    Limits::megapixels(megapixels).within(Memory::available_to(DeviceKind::Processor))
+}
+
+fn read_pair([left, right]: [&PathBuf; 2], limits: Limits) -> Result<StereoPair, Failure> {
     let named = |error| Failure::input(format!("{} and {}: {error}", left.display(), right.display()));
-    StereoPair::new(read_image(left, limit)?, read_image(right, limit)?).map_err(named)
+    StereoPair::new(read_image(left, limits)?, read_image(right, limits)?).map_err(named)
 }
 
-fn read_truth(args: &MatchArgs, path: &Path, size: Size, limit: PixelLimit) -> Result<GroundTruth, Failure> {
-    let truth = evaluate::read_truth(path, &args.truth, limit)?;
+fn read_truth(args: &MatchArgs, path: &Path, size: Size, limits: Limits) -> Result<GroundTruth, Failure> {
+    let truth = evaluate::read_truth(path, &args.truth, limits)?;
     let found = truth.disparities().size();
     if found == size {
         return Ok(truth);
     }
-    Err(Failure::input(format!("{}: {found} pixels where the images have {size}", path.display())))
+    Err(Failure::input(format!("{}: {found} pixels, but the images have {size}", path.display())))
 }

@@ -11,9 +11,11 @@ use super::{
     results::Results,
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, ours::CENSUS},
 };
+use bp_io::{Colours, encode_picture};
+
 use crate::{
     failure::Failure,
-    files::{Colours, PixelLimit, encode_picture, read_map},
+    files::{PixelLimit, read_map},
 };
 
 /// Space around and between maps, and for words and the bar, in pixels of the drawing.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use bp_core::{Algorithm, Driver, Energy, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels};
+use bp_io::StoredGrey;
 
 use crate::{
     backends,
@@ -58,7 +59,8 @@ fn load_pair(folder: &Path, scene: &str) -> Result<StereoPair, Failure> {
 fn load_labels(folder: &Path, scene: &str, method: &str, size: Size) -> Result<Vec<u16>, Failure> {
     let path = folder.join(format!("mrf-benchmark/{scene}/{scene}-{method}.png"));
     Manifest::read()?.checked(folder, &path)?;
-    let (found, values, _) = read_stored_grey(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+    let StoredGrey { size: found, values, .. } =
+        read_stored_grey(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
     if found != size || values.iter().any(|value| value % 17 != 0) {
         return Err(Failure::reading(&path, &"not a label map of this scene"));
     }

@@ -3,6 +3,7 @@
 use std::{ops::ControlFlow, time::Instant};
 
 use bp_core::{Driver, Energy, Times};
+use bp_io::{Files, Raster};
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -13,10 +14,10 @@ use super::{
 use crate::{
     backends::{Asked, Opened},
     failure::Failure,
-    files::{Raster, hex},
+    files::hex,
     interrupt::ProgressBar,
     machine,
-    record::{self, Cell, Measurement, Outcome, Record, Sample, Settings},
+    record::{self, Cell, Derived, Measurement, Outcome, Record, Sample, Settings},
     scenes::{Scene, Source},
 };
 
@@ -103,7 +104,12 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
                 plan: planned.name.to_owned(),
                 backend: name.clone(),
                 device: opened.map(|opened| (&opened.info).into()),
-                settings: Settings::new(&plan, device_of_plan, planned.algorithm, (planned.k(run.k), planned.z)),
+                settings: Settings::new(
+                    &plan,
+                    device_of_plan,
+                    planned.algorithm,
+                    Derived { k: planned.k(run.k), z: planned.z },
+                ),
                 outcome: device.as_ref().map_or_else(|e| Outcome::Unavailable(e.clone()), |_| Outcome::Pending),
             }
         }));
@@ -138,7 +144,7 @@ fn sample_cell(
         }
         Err(failure) if failure.is_interrupted() => return Err(failure),
         Err(failure) => {
-            device.note(&failure);
+            device.note(failure.cause());
             bar.line(&format!("{name:<11}{plan:<10}{:<8} {failure}", device.name));
             if record.cells[index].measured().is_some() {
                 return Ok(Some(format!("{name}, {plan} on {}: round {}: {failure}", device.name, round + 1)));
@@ -227,7 +233,7 @@ fn first_measurement(
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
-    Raster::disparities(&disparities).write(&storage.folder().join(&map))?;
+    Raster::disparities(&disparities).write(&Files::default(), &storage.folder().join(&map))?;
     Ok(Measurement {
         samples: Vec::new(),
         allocated_bytes: driver.allocated_bytes(),

@@ -18,7 +18,7 @@ use crate::{
     files::hex,
     interrupt::{self, ProgressBar},
     machine,
-    record::{Settings, clocks},
+    record::{Derived, Settings, clocks},
 };
 
 /// A contestant whose first solve takes more milliseconds takes part in [`FEW_ROUNDS`]: others would take too long, and
@@ -71,7 +71,7 @@ pub(super) fn contest(
     rounds: u32,
     work: &mut Work,
 ) -> Result<Contest, Failure> {
-    let settings = Settings::new(&plan, None, problem.algorithm(), (None, None));
+    let settings = Settings::new(&plan, None, problem.algorithm(), Derived::default());
     let mut turns = Turns { name: problem.name(), plan, pair, rounds, work, answer: None };
     let mut entrants = Vec::new();
     for opened in devices.iter_mut() {
@@ -186,7 +186,7 @@ impl Turns<'_> {
         if failure.is_interrupted() {
             return Err(failure);
         }
-        opened.note(&failure);
+        opened.note(failure.cause());
         self.work.skip(u64::from(left) * self.plan.message_updates());
         self.work.bar.line(&format!("{:<12}{:<10}{failure}", self.name, opened.name));
         let beyond = failure.is_beyond_device();

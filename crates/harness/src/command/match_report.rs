@@ -1,25 +1,29 @@
-//! What is told of a match, as text or as JSON.
+//! What `bp match` says of a pair, as text or as JSON.
 
 use std::{fmt::Write as _, path::PathBuf, time::Duration};
 
-use bp_core::{Errors, Stage, StereoPair, Tiling};
-use serde::{Deserialize, Serialize};
-
-use super::{Answer, Sample};
-use crate::{
-    backends::Opened,
-    command::evaluate::{self, ErrorReport},
-    record,
+use bp_core::{Errors, Size, Stage};
+use bp_stereo::{
+    AnswerTimes, Disparity, Matcher, Tiles,
+    description::{self, Clocked, Energy, Settings, clocks},
 };
+use bytesize::ByteSize;
+use serde::Serialize;
+
+use super::evaluate::{self, ErrorReport};
+
+/// Version of what `--json` prints; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
 
 /// What `--json` prints.
 #[derive(Serialize)]
-pub(crate) struct Report {
+pub(super) struct Report {
+    schema_version: u32,
     width: usize,
     height: usize,
     backend: String,
-    device: record::Device,
-    settings: record::Settings,
+    device: description::Device,
+    settings: Settings,
     /// None where the pair was matched as a whole.
     tiles: Option<Tiles>,
     allocated_bytes: u64,
@@ -31,8 +35,8 @@ pub(crate) struct Report {
     /// were matched.
     total_ms: f64,
     finishing_ms: f64,
-    clocks: Vec<record::Clocked>,
-    energy: record::Energy,
+    clocks: Vec<Clocked>,
+    energy: Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
     /// What may be wrong with the images or the labels, as standard error tells it.
@@ -41,70 +45,55 @@ pub(crate) struct Report {
     written: Vec<String>,
 }
 
-/// What a pair was cut into.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Tiles {
-    /// Beside each other.
-    columns: usize,
-    /// Above each other.
-    rows: usize,
-    /// The most that one matches, in pixels.
-    width: usize,
-    height: usize,
-    /// How near the answer is to the whole image's.
-    answer: String,
-}
-
-impl Tiles {
-    /// What is told of a tiling.
-    pub(crate) fn of(tiling: &Tiling) -> Option<Self> {
-        let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
-        let answer = tiling.likeness().name().to_owned();
-        (!tiling.is_whole()).then_some(Self { columns, rows, width: size.width, height: size.height, answer })
-    }
+/// What a report has beside an answer.
+pub(super) struct Asked {
+    pub(super) size: Size,
+    pub(super) warnings: Vec<String>,
+    pub(super) errors: Option<Errors>,
+    pub(super) messages_sha256: Option<String>,
 }
 
 impl Report {
-    /// What is told of an answer.
-    pub(crate) fn new(
-        pair: &StereoPair,
-        opened: &Opened,
-        answer: Answer,
-        errors: Option<Errors>,
-        warnings: Vec<String>,
+    /// The report of the last answer of several, whose times are these.
+    pub(super) fn new(
+        matcher: &Matcher,
+        answer: Disparity,
+        times: &[AnswerTimes],
+        asked: Asked,
         written: Vec<PathBuf>,
     ) -> Self {
-        let median = median(&answer.samples);
+        let median = median(times);
         Self {
-            width: pair.size().width,
-            height: pair.size().height,
-            backend: opened.name.clone(),
-            device: (&opened.info).into(),
+            schema_version: SCHEMA_VERSION,
+            width: asked.size.width,
+            height: asked.size.height,
+            backend: matcher.device_name().to_owned(),
+            device: matcher.device().into(),
             settings: answer.settings,
             tiles: answer.tiles,
             allocated_bytes: answer.allocated_bytes,
             peak_bytes: answer.peak_bytes,
-            samples_ms: answer.samples.iter().map(total_ms).collect(),
+            samples_ms: times.iter().map(total_ms).collect(),
             total_ms: total_ms(&median),
             finishing_ms: milliseconds(median.finishing),
-            clocks: record::clocks(&median.matching),
+            clocks: clocks(&median.matching),
             energy: answer.energy.into(),
-            errors: errors.map(Into::into),
-            messages_sha256: answer.messages_sha256,
-            warnings,
+            errors: asked.errors.map(Into::into),
+            messages_sha256: asked.messages_sha256,
+            warnings: asked.warnings,
             written: written.iter().map(|path| path.display().to_string()).collect(),
         }
     }
 }
 
 /// The sample of median total; of an even number, the lower one of the two in the middle.
-fn median(samples: &[Sample]) -> Sample {
+fn median(samples: &[AnswerTimes]) -> AnswerTimes {
     let mut sorted = samples.to_vec();
-    sorted.sort_by_key(Sample::total);
+    sorted.sort_by_key(AnswerTimes::total);
     sorted[(samples.len() - 1) / 2]
 }
 
-fn total_ms(sample: &Sample) -> f64 {
+fn total_ms(sample: &AnswerTimes) -> f64 {
     milliseconds(sample.total())
 }
 
@@ -121,10 +110,10 @@ fn spread(samples_ms: &[f64]) -> String {
 }
 
 /// The report as text.
-pub(crate) fn text(report: &Report) -> String {
+pub(super) fn text(report: &Report) -> String {
     let mut text = String::new();
     let Report { width, height, settings, .. } = report;
-    let record::Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
+    let Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
     let last = min_disparity + *labels as i32 - 1;
     let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
     let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
@@ -135,7 +124,7 @@ pub(crate) fn text(report: &Report) -> String {
         let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
     }
     let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
-    for record::Clocked { clock, stages } in &report.clocks {
+    for Clocked { clock, stages } in &report.clocks {
         let _ = writeln!(text, "{:<12}{clock:?} clock", "");
         for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {
             let _ = writeln!(text, "{:<14}{:<16}{ms:>10.1} ms", "", stage.name());
@@ -144,12 +133,11 @@ pub(crate) fn text(report: &Report) -> String {
     if settings.finish.is_some() {
         let _ = writeln!(text, "{:<14}{:<16}{:>10.1} ms", "", "after matching", report.finishing_ms);
     }
-    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    let (planned, allocated) = (mebibytes(settings.planned_bytes), mebibytes(report.allocated_bytes));
-    let peak = mebibytes(report.peak_bytes);
-    let all = format!("{peak:.1} MiB with images and answer");
-    let _ = writeln!(text, "{:<10}{allocated:.1} MiB allocated, {planned:.1} MiB predicted, {all}", "memory");
-    let record::Energy { total, data, smoothness } = report.energy;
+    let [planned, allocated, peak] = [settings.planned_bytes, report.allocated_bytes, report.peak_bytes]
+        .map(|bytes| ByteSize(bytes).display().iec());
+    let all = format!("{peak} with images and answer");
+    let _ = writeln!(text, "{:<10}{allocated} allocated, {planned} predicted, {all}", "memory");
+    let Energy { total, data, smoothness } = report.energy;
     let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
     if let Some(hash) = &report.messages_sha256 {
         let _ = writeln!(text, "{:<10}sha256 {hash}", "messages");
