@@ -126,7 +126,7 @@ fn depth_is_focal_length_times_baseline_through_disparity() {
     let warning = succeeds(&folder, "convert map.pfm --depth far.png --focal 1870 --baseline 160 --doffs 10.5");
     assert!(warning.contains("far.png") && warning.contains("65535"), "{warning}");
     let warning = succeeds(&folder, "convert map.pfm --depth none.pfm --focal 1870 --baseline 160 --doffs -999");
-    assert!(warning.contains("none.pfm: nothing is known"), "{warning}");
+    assert!(warning.contains("none.pfm: no pixel is known"), "{warning}");
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn geometry_that_cannot_be_used_is_told_before_the_work() {
         );
     }
     for (options, words) in [
-        ("--depth d.pfm", ["--depth", "--calib"]),
+        ("--depth d.pfm", ["depth", "--calib"]),
         ("--points p.ply --focal 9", ["--baseline", "required"]),
         ("--depth d.pfm --focal 0 --baseline 9", ["--focal", "above 0"]),
         ("--depth d.pfm --focal 9 --baseline nan", ["--baseline", "above 0"]),

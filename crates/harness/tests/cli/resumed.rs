@@ -131,7 +131,7 @@ fn a_second_process_for_the_same_pairs_is_refused() {
     let run = slow(&folder, 200);
     let mut first = folder.command(&format!("{run} --output out")).stdout(Stdio::null()).spawn().unwrap();
     wait_for(|| folder.path("out/records/p0.json").exists());
-    folder.fails(&format!("match --pairs list --output out {TINY}"), 1, &["1-of-1.lock", "another bp match"]);
+    folder.fails(&format!("match --pairs list --output out {TINY}"), 1, &["1-of-1.lock", "another process"]);
     first.kill().unwrap();
     first.wait().unwrap();
     assert!(folder.run(&format!("match --pairs list --output out {TINY} --quiet")).status.success());
@@ -211,7 +211,7 @@ fn a_signal_ends_a_batch_between_pairs_without_a_trace() {
         assert!(kill.success());
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
-        assert!(text(&output.stderr).contains("the same command goes on"), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("the same command again"), "{}", text(&output.stderr));
         let found = files(&folder.path("out"));
         let maps = maps(&folder.path("out")).len();
         assert!(maps > 0 && maps < 200 && found.len() == 3 * maps + 1, "{found:?}");

@@ -36,12 +36,12 @@ fn a_memory_limit_is_kept_by_strips_then_by_tiles_or_refused() {
     let video = format!("match --video l%d.png r%d.png --output video {video} --labels 8 --max-memory {limit}");
     folder.json(&format!("{video} --json"));
     folder.fails(&format!("{video} --warm-start"), 3, &["--warm-start needs the whole image"]);
-    let words = ["at least", "--max-memory allows 99999", "--labels"];
+    let words = ["at least", "97.7 KiB is allowed by --max-memory", "--labels"];
     folder.fails("match high-left.png high-right.png --labels 8 -o c.pfm --max-memory 99999", 6, &words);
     folder.fails(
         "match high-left.png high-right.png --algorithm cfbp -o c.pfm --max-memory 9M",
         6,
-        &["--algorithm sweep", "9000000"],
+        &["--algorithm sweep", "8.6 MiB"],
     );
 }
 

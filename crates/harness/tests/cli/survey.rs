@@ -46,13 +46,13 @@ fn wrong_pairs_and_labels_are_told_with_what_to_do() {
     let folder = views();
     assert_eq!(warnings(&folder, "a.png b.png"), "");
     for (arguments, words) in [
-        ("b.png a.png", ["b.png and a.png look exchanged", "the other way round"]),
+        ("b.png a.png", ["b.png and a.png look exchanged", "swap them"]),
         ("a.png low.png", ["rows of a.png and low.png do not correspond", "2 px too low): rectify"]),
         ("a.png other.png", ["hardly anything in a.png and other.png matches", "different scenes"]),
         ("a.png b.png --labels 6", ["disparities from about 9 to 9 px", "raise --labels"]),
         ("a.png b.png --min-disparity 12", ["reach from 12 to", "lower --min-disparity"]),
         ("a.png b.png --min-disparity 12 --labels auto", ["lower --min-disparity", "or leave it to --labels auto"]),
-        ("a.png b.png --min-disparity -30 --labels 9", ["raise --min-disparity", "or take --labels auto"]),
+        ("a.png b.png --min-disparity -30 --labels 9", ["raise --min-disparity", "or use --labels auto"]),
         ("a.png a.png", ["a.png and a.png are the same image", "nearer"]),
         ("a.png b.png --labels 100", ["100 labels for images 90 pixels wide", "the last ones match nowhere"]),
         (
