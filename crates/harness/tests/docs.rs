@@ -20,10 +20,19 @@ fn read(page: &Path) -> String {
 
 /// All pages, by their paths from the root.
 fn pages() -> BTreeSet<PathBuf> {
-    let files = walkdir::WalkDir::new(root().join("docs")).into_iter().map(|entry| entry.unwrap().into_path());
-    let pages = files.filter(|path| path.extension().is_some_and(|ending| ending == "md"));
-    let pages = pages.map(|path| path.strip_prefix(root()).unwrap().to_owned());
+    let pages =
+        files(Path::new("docs")).into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "md"));
     pages.chain(PAGES_ELSEWHERE.map(PathBuf::from)).collect()
+}
+
+/// All files below a folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap());
+    let below = entries.map(|entry| {
+        let path = folder.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() { files(&path) } else { vec![path] }
+    });
+    below.flatten().collect()
 }
 
 /// The text without code blocks and `code`, where brackets are no links and `#` begins no heading.

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use bp_core::synthetic;
+use bp_testkit::synthetic;
 use image::DynamicImage;
 
 fn open(name: &str) -> DynamicImage {
@@ -13,7 +13,7 @@ fn open(name: &str) -> DynamicImage {
 #[test]
 fn the_sample_is_the_doll_at_half_size_to_the_pixel() {
     let scene = synthetic::scene(0, 2);
-    let again = "run: cargo run -p harness --example sample_pair -- bench-data/sample";
+    let again = "run: cargo run -p bp-testkit --example sample_pair -- bench-data/sample";
     for (name, image) in [("left.png", scene.pair.left()), ("right.png", scene.pair.right())] {
         assert!(open(name).into_rgb8().into_raw() == image.pixels().as_flattened(), "{name}; {again}");
     }

@@ -1,11 +1,12 @@
-//! Renders the sample pair: `cargo run -p harness --example sample_pair -- bench-data/sample`.
+//! Renders the sample pair: `cargo run -p bp-testkit --example sample_pair -- bench-data/sample`.
 //!
 //! The pair is the project's own, so anybody may use it for anything. It is the synthetic scene "doll" at half size, with
 //! its ground truth and a calibration. The files are the same on every machine.
 
 use std::{env, error::Error, fs, path::Path};
 
-use bp_core::{Size, synthetic};
+use bp_core::Size;
+use bp_testkit::synthetic;
 use image::{
     ExtendedColorType, ImageEncoder,
     codecs::png::{CompressionType, FilterType, PngEncoder},
