@@ -54,3 +54,12 @@ pub use system::{Memory, thread_pool};
 pub use tiles::Tiles;
 pub use warning::{Beyond, Unused, Warning};
 pub use watch::{Event, Stop, Stopped, Watch};
+
+/// Compiles the examples of the project's pages.
+#[cfg(doctest)]
+mod pages {
+    #[doc = include_str!("../../../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../../docs/library.md")]
+    struct Library;
+}

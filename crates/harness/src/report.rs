@@ -103,7 +103,7 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
 #[cfg(feature = "fuzzing")]
 pub(crate) fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
     let report = Report::of(Results::new(record)?, Vec::new())?;
-    Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), &report.results)])
+    Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), Path::new(""), &report.results)])
 }
 
 /// `bp report`.
@@ -118,17 +118,18 @@ pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
         }
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|error| Failure::reading(path, &error))?;
-            let part = readme::part(run, &Results::new(&record)?);
+            let part = readme::part(path, run, &Results::new(&record)?);
             let missing = || Failure::reading(path, &format!("the markers {BEGIN} and {END} are not in it"));
             write_text(path, &readme::splice(&text, &part).ok_or_else(missing)?)
         }
     }
 }
 
-/// A README with the part that comes from a run made anew; `None` where it has no markers or the run cannot be read.
-/// For checking that what is committed is what the record says.
+/// The text of a page with the part that comes from a run made anew; `None` where it has no markers or the run cannot be
+/// read. `root` is the folder that the paths of page and run start from. For checking that what is committed is what the
+/// record says.
 #[must_use]
-pub fn renewed_readme(text: &str, run: &Path, shown_as: &Path) -> Option<String> {
-    let record = load(run).ok()?;
-    readme::splice(text, &readme::part(shown_as, &Results::new(&record).ok()?))
+pub fn renewed_page(text: &str, root: &Path, page: &Path, run: &Path) -> Option<String> {
+    let record = load(&root.join(run)).ok()?;
+    readme::splice(text, &readme::part(page, run, &Results::new(&record).ok()?))
 }

@@ -79,15 +79,16 @@ fn reports_are_made_from_their_records() {
     }
 }
 
-/// The README shows what the record says.
+/// docs/thesis.md shows what the record says.
 #[test]
-fn the_readme_is_made_from_a_record() {
-    let text = fs::read_to_string(root().join("README.md")).unwrap();
-    let (_, rest) = text.split_once("--readme README.md` from `").expect("the note below the README's table");
+fn the_page_on_the_thesis_is_made_from_a_record() {
+    let page = Path::new("docs/thesis.md");
+    let text = fs::read_to_string(root().join(page)).unwrap();
+    let (_, rest) = text.split_once("--readme docs/thesis.md` from `").expect("the note below the page's table");
     let (record, _) = rest.split_once('`').unwrap();
     let run = Path::new(record).parent().unwrap();
-    let renewed = harness::report::renewed_readme(&text, &root().join(run), run);
-    assert!(renewed.as_deref() == Some(&text), "run: cargo run -- report {} --readme README.md", run.display());
+    let renewed = harness::report::renewed_page(&text, &root(), page, run);
+    assert!(renewed.as_deref() == Some(&text), "run: bp report {} --readme {}", run.display(), page.display());
 }
 
 /// Prototypes of the same models in single precision, measured on the same six images at half size: visible pixels and
