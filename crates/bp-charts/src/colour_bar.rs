@@ -4,9 +4,9 @@ use plotters::{coord::types::RangedCoordf64, prelude::Ranged};
 
 use crate::{
     Error,
+    canvas::letters,
     number::in_full,
     picture::{Colour, Pixels, pixels},
-    sheet::letters,
 };
 
 /// Heights of bars in pixels: below, numbers would not fit, and above, nobody sees more.

@@ -3,8 +3,10 @@
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use crate::{
-    Axis, Error, Key, Level, Series, Value, entries,
-    sheet::{Canvas, Drawn, INK, MARGIN, Parts, ROW, Room, Sheet, TEXT_SIZE, WIDTH, text, widest},
+    Axis, Error, Key, Level, Series, Value,
+    canvas::{Canvas, Drawn, INK, MARGIN, ROW, TEXT_SIZE, WIDTH, text, widest},
+    data::entries,
+    sheet::{Parts, Room, Sheet},
     style::{MARKER_UNIT, colour, draw_marker, draw_path, draw_whisker},
 };
 

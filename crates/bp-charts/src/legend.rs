@@ -4,7 +4,7 @@ use plotters::style::text_anchor::HPos;
 
 use crate::{
     Level, Style,
-    sheet::{Canvas, Drawn, ROW, TEXT_SIZE, level_colour, text, widest},
+    canvas::{Canvas, Drawn, ROW, TEXT_SIZE, text, widest},
     style::{MARKER_UNIT, draw_dashes, draw_line, draw_marker},
 };
 
@@ -38,7 +38,7 @@ impl<'a> Legend<'a> {
             let x = left + self.entry * (place % columns) as f64;
             let y = top + ROW * ((place / columns) as f64 + 0.5);
             match key {
-                Look::Level(level) => draw_dashes(canvas, x, x + 24.0, y, level_colour(level))?,
+                Look::Level(level) => draw_dashes(canvas, x, x + 24.0, y, level.line_colour())?,
                 Look::Of(style) => {
                     draw_line(canvas, vec![(x, y), (x + 24.0, y)], *style)?;
                     draw_marker(canvas, (x + 12.0, y), *style, MARKER_UNIT)?;

@@ -6,8 +6,11 @@
 //! same on every machine.
 
 mod axis;
+mod canvas;
 mod colour_bar;
+mod data;
 mod dots;
+mod error;
 mod legend;
 mod number;
 mod picture;
@@ -17,73 +20,13 @@ mod style;
 
 pub use axis::Axis;
 pub use colour_bar::ColourBar;
+pub use data::{Key, Level, Series, Value};
 pub use dots::DotChart;
+pub use error::Error;
 pub use number::number;
 pub use picture::{Colour, Pixels, png};
 pub use plot::{Plot, Point};
 pub use style::{BLACK, Line, Marker, Style};
-
-/// Why a chart could not be drawn, in words.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct Error(String);
-
-/// A number and its interval, whose ends equal it where there is none.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Value {
-    /// The number.
-    pub value: f64,
-    /// Where its interval begins.
-    pub low: f64,
-    /// Where its interval ends.
-    pub high: f64,
-}
-
-impl From<f64> for Value {
-    /// The number without an interval.
-    fn from(value: f64) -> Self {
-        Self { value, low: value, high: value }
-    }
-}
-
-/// What has one name and one look.
-#[derive(Clone, Debug)]
-pub struct Series<P> {
-    /// Its name.
-    pub name: String,
-    /// Its look.
-    pub style: Style,
-    /// What is drawn.
-    pub points: Vec<P>,
-}
-
-/// An entry of a legend.
-#[derive(Clone, Debug)]
-pub struct Key {
-    /// What looks like this.
-    pub name: String,
-    /// The look.
-    pub style: Style,
-}
-
-/// What a legend names: the keys or, where there are none, the series.
-fn entries<'a, P>(keys: &'a [Key], series: &'a [Series<P>]) -> Vec<(&'a str, Style)> {
-    match keys {
-        [] => series.iter().map(|series| (series.name.as_str(), series.style)).collect(),
-        keys => keys.iter().map(|key| (key.name.as_str(), key.style)).collect(),
-    }
-}
-
-/// A value to compare with, drawn as a dashed line from left to right.
-#[derive(Clone, Debug)]
-pub struct Level {
-    /// Its name in the legend.
-    pub name: String,
-    /// Where it lies on the vertical axis.
-    pub value: f64,
-    /// The number of its colour; none for that of the text.
-    pub colour: Option<usize>,
-}
 
 #[cfg(test)]
 mod tests {
@@ -186,7 +129,7 @@ mod tests {
             let (_, rest) = svg.split_once("height=\"").unwrap();
             rest.split_once('"').unwrap().0.parse::<f64>().unwrap()
         };
-        assert!((height(30) - height(10) - 20.0 * sheet::ROW).abs() < 1e-9);
+        assert!((height(30) - height(10) - 20.0 * canvas::ROW).abs() < 1e-9);
     }
 
     /// Words are drawn in twice the chart's size, whatever fonts the machine has, and whatever is in a stranger's names.

@@ -5,9 +5,10 @@ use plotters::style::text_anchor::HPos;
 use crate::{
     Axis, Error, Key, Level, Line, Series, Value,
     axis::Scale,
-    entries,
+    canvas::{At, Canvas, Drawn, GRID, INK, MARGIN, ROW, TEXT_SIZE, WIDTH, text, widest},
+    data::entries,
     number::in_full,
-    sheet::{At, Canvas, Drawn, GRID, INK, MARGIN, Parts, ROW, Room, Sheet, TEXT_SIZE, WIDTH, text, widest},
+    sheet::{Parts, Room, Sheet},
     style::{MARKER_UNIT, colour, draw_line, draw_marker, draw_path, draw_whisker},
 };
 

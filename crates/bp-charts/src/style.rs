@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use plotters::{element::DashedPathElement, prelude::*};
 
-use crate::sheet::{At, Canvas, Drawn, FINE};
+use crate::canvas::{At, Canvas, Drawn, FINE};
 
 /// How a series looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

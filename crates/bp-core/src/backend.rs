@@ -6,7 +6,7 @@
 
 use std::{ops::Range, time::Duration};
 
-use crate::{Error, Plan, Seed, Stage, StereoPair};
+use crate::{Error, Plan, Seed, Side, Stage, StereoPair};
 
 /// A way to run plans: a processor, or an API that reaches several devices.
 pub trait Backend: Sync {
@@ -196,33 +196,4 @@ pub trait Solver: Send {
 
     /// Bytes that this solver allocated, counted.
     fn allocated_bytes(&self) -> u64;
-}
-
-/// Where a neighbour lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Side {
-    /// (x - 1, y).
-    Left,
-    /// (x + 1, y).
-    Right,
-    /// (x, y - 1).
-    Up,
-    /// (x, y + 1).
-    Down,
-}
-
-impl Side {
-    /// All sides, in the order in which messages are stored and hashed.
-    pub const ALL: [Self; 4] = [Self::Left, Self::Right, Self::Up, Self::Down];
-
-    /// The side seen from the neighbour.
-    #[must_use]
-    pub fn opposite(self) -> Self {
-        match self {
-            Self::Left => Self::Right,
-            Self::Right => Self::Left,
-            Self::Up => Self::Down,
-            Self::Down => Self::Up,
-        }
-    }
 }

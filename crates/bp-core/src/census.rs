@@ -1,9 +1,29 @@
 //! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
-use crate::{Image, Model, Seed, StereoPair, image::grey};
+use crate::{Image, Model, Node, StereoPair, image::grey};
 
 /// Half length of the strip that is compared around the centre: the thesis's "length scan".
 const HALF_LENGTH: usize = 10;
+
+/// A known match that CTBP and CTCSBP start from: the image is cut at (x, y), and `label` is what the census
+/// transform found for that pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seed {
+    /// Column of the cut.
+    pub x: usize,
+    /// Row of the cut.
+    pub y: usize,
+    /// Label of the match.
+    pub label: u16,
+}
+
+impl Seed {
+    /// Whether (x, y) is one of the up to four nodes around the point where the cuts cross.
+    #[must_use]
+    pub fn touches(&self, x: usize, y: usize) -> bool {
+        (x == self.x || x + 1 == self.x) && (y == self.y || y + 1 == self.y)
+    }
+}
 
 /// The census code of the pixel at (x, y): its eight neighbours in row order, from the highest bit to the lowest, 1
 /// where the neighbour's grey value is greater. Border pixels are repeated outward, see [`Image::grey_near`].
@@ -12,7 +32,7 @@ const HALF_LENGTH: usize = 10;
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    compare_window(image, (x, y), 1, grey) as u8
+    compare_window(image, Node { x, y }, 1, grey) as u8
 }
 
 /// The same of a colour channel, 0 for red to 2 for blue, in place of grey values.
@@ -21,7 +41,7 @@ pub fn code(image: &Image, x: usize, y: usize) -> u8 {
 /// Where (x, y) lies outside, or `channel` is above 2.
 #[must_use]
 pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
-    compare_window(image, (x, y), 1, |colour| colour[channel]) as u8
+    compare_window(image, Node { x, y }, 1, |colour| colour[channel]) as u8
 }
 
 /// As [`code`], with the 24 neighbours in a window of 5x5 pixels, in as many bits.
@@ -30,11 +50,12 @@ pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 
 /// Where (x, y) lies outside.
 #[must_use]
 pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
-    compare_window(image, (x, y), 2, grey)
+    compare_window(image, Node { x, y }, 2, grey)
 }
 
 /// A bit for each neighbour at most `reach` columns and rows away, by a value of colours.
-fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
+fn compare_window(image: &Image, node: Node, reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
+    let Node { x, y } = node;
     let centre = value(image.rgb(x, y));
     let last = image.size().width as isize - 1;
     let mut code = 0;
@@ -48,13 +69,14 @@ fn compare_window(image: &Image, (x, y): (usize, usize), reach: isize, value: im
     code
 }
 
-/// The match of the left pixel at (x, y): the smallest label whose strip of 21x3 census codes differs least, where the
+/// The match of a left pixel: the smallest label whose strip of 21x3 census codes differs least, where the
 /// strip, shortened at the image's border, lies inside both images. `None` where no label's does.
 ///
 /// # Panics
 /// Where (x, y) lies outside.
 #[must_use]
-pub fn find_match(pair: &StereoPair, model: &Model, (x, y): (usize, usize)) -> Option<Seed> {
+pub fn find_match(pair: &StereoPair, model: &Model, node: Node) -> Option<Seed> {
+    let Node { x, y } = node;
     let size = pair.size();
     let half_width = HALF_LENGTH.min(x).min(size.width - 1 - x);
     let half_height = 1.min(y).min(size.height - 1 - y);
@@ -117,7 +139,7 @@ mod tests {
     #[test]
     fn a_shifted_pair_gives_the_shift() {
         let model = Model::new(Profile::Census, 30).unwrap();
-        let found = find_match(&shifted_pair(80, 21, 13), &model, (40, 10));
+        let found = find_match(&shifted_pair(80, 21, 13), &model, Node { x: 40, y: 10 });
         assert_eq!(found, Some(Seed { x: 40, y: 10, label: 13 }));
     }
 
@@ -126,7 +148,7 @@ mod tests {
         let model = Model::new(Profile::Census, 3).unwrap();
         for (width, height) in [(1, 1), (1, 5), (2, 1), (2, 3)] {
             let pair = shifted_pair(width, height, 0);
-            let centre = (width / 2, height / 2);
+            let centre = Node { x: width / 2, y: height / 2 };
             assert_eq!(find_match(&pair, &model, centre).map(|seed| seed.label), Some(0), "{width}x{height}");
             assert_eq!(find_match(&pair, &model.with_min_disparity(5).unwrap(), centre), None);
         }

@@ -1,26 +1,6 @@
 //! Data costs D(p, d) of the profiles, before any normalising or clipping.
 
-use crate::{Error, Image, Model, Profile, Size, StereoPair, census, features, memory};
-
-/// A known match that CTBP and CTCSBP start from: the image is cut at (x, y), and `label` is what the census
-/// transform found for that pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seed {
-    /// Column of the cut.
-    pub x: usize,
-    /// Row of the cut.
-    pub y: usize,
-    /// Label of the match.
-    pub label: u16,
-}
-
-impl Seed {
-    /// Whether (x, y) is one of the up to four nodes around the point where the cuts cross.
-    #[must_use]
-    pub fn touches(&self, x: usize, y: usize) -> bool {
-        (x == self.x || x + 1 == self.x) && (y == self.y || y + 1 == self.y)
-    }
-}
+use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, features, memory};
 
 /// What a profile compares of every pixel, `[height][width]`, of both images.
 #[derive(Clone, Debug)]

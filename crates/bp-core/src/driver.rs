@@ -5,39 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{Device, DisparityMap, Error, Plan, Schedule, Side, Solver, StereoPair, census, memory};
-
-/// A timed stage: the kernel of the same name, over all grids.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Stage {
-    /// Data costs of the image.
-    MatchCost,
-    /// Data costs of the coarser grids.
-    Coarsen,
-    /// First messages of every grid.
-    Refine,
-    /// Message passing.
-    UpdateMessages,
-    /// Labels of least belief.
-    SelectLabels,
-}
-
-impl Stage {
-    /// All stages, in the order in which they first run.
-    pub const ALL: [Self; 5] = [Self::MatchCost, Self::Coarsen, Self::Refine, Self::UpdateMessages, Self::SelectLabels];
-
-    /// The name of stage and kernel.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MatchCost => "match_cost",
-            Self::Coarsen => "coarsen",
-            Self::Refine => "refine",
-            Self::UpdateMessages => "update_messages",
-            Self::SelectLabels => "select_labels",
-        }
-    }
-}
+use crate::{Device, DisparityMap, Error, Node, Plan, Schedule, Side, Solver, Stage, StereoPair, census, memory};
 
 /// Times of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -164,7 +132,7 @@ impl Driver {
         let mut times = Times::default();
         let start = Instant::now();
         let seed = plan.settings().cut.filter(|cut| cut.seed_start);
-        let seed = seed.and_then(|cut| census::find_match(pair, plan.model(), (cut.x, cut.y)));
+        let seed = seed.and_then(|cut| census::find_match(pair, plan.model(), Node { x: cut.x, y: cut.y }));
         timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
         for grid in 1..from.grids(plan) {
             timed(&mut times, Stage::Coarsen, || solver.coarsen(grid))?;

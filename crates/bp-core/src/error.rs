@@ -1,6 +1,9 @@
 //! What can go wrong, sorted by who can mend it.
 
-use crate::{MAX_LABELS, MAX_TRUNCATION, Size, image::MAX_SIDE};
+use crate::{
+    limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
+    size::Size,
+};
 
 /// An error of the model, a plan, a backend or the driver.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -2,22 +2,10 @@
 
 use std::{ops::Range, sync::Arc};
 
-use crate::Error;
-
-/// Most pixels per row or column: coordinates and disparities fit `i32` with room to add.
-pub const MAX_SIDE: usize = 1 << 24;
+use crate::{Error, Size, limits::MAX_SIDE};
 
 /// Most rows of an apron, see [`Image::strip`]: as far up and down as any data cost looks.
 pub const APRON: usize = 2;
-
-/// Width and height of an image or grid in pixels; both at least 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Size {
-    /// Pixels per row (m).
-    pub width: usize,
-    /// Pixels per column (n).
-    pub height: usize,
-}
 
 impl Size {
     /// A size.
@@ -33,24 +21,6 @@ impl Size {
             return Err(Error::TooLarge { size });
         }
         Ok(size)
-    }
-
-    /// Number of pixels.
-    #[must_use]
-    pub fn pixels(self) -> usize {
-        self.width * self.height
-    }
-
-    /// The next coarser grid: half the width and height, rounded up.
-    #[must_use]
-    pub fn coarser(self) -> Self {
-        Self { width: self.width.div_ceil(2), height: self.height.div_ceil(2) }
-    }
-}
-
-impl std::fmt::Display for Size {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}x{}", self.width, self.height)
     }
 }
 

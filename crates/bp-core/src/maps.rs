@@ -10,7 +10,7 @@ mod speckles;
 mod subpixel;
 mod window;
 
-pub use check::check_left_right;
+pub use check::{AGREE, check_left_right};
 pub use confidence::confidence;
 pub use fill::fill;
 pub use median::{MEDIANS, median};
@@ -18,9 +18,6 @@ pub use speckles::remove_speckles;
 pub use subpixel::subpixel;
 
 use crate::{DisparityMap, Error};
-
-/// Two disparities that differ by no more than this many pixels belong to one surface, and agree.
-pub const AGREE: f32 = 1.0;
 
 /// What is done to a disparity map after matching; by default nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

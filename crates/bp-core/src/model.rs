@@ -1,12 +1,9 @@
 //! The grid Markov random field: labels, data cost profile and smoothness.
 
-use crate::{Error, Smoothness};
-
-/// Most labels of a model.
-pub const MAX_LABELS: usize = 1024;
-
-/// Largest truncation K with which u8 messages are exact, see [`crate::exactness`].
-pub const MAX_TRUNCATION: u8 = 63;
+use crate::{
+    Error, Smoothness,
+    limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
+};
 
 /// A data cost D(p, d) with the smoothness that goes with it, all in whole units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -140,7 +137,7 @@ impl Model {
     /// # Errors
     /// [`Error::MinDisparity`] where it exceeds the longest side of an image either way.
     pub fn with_min_disparity(self, min_disparity: i32) -> Result<Self, Error> {
-        if min_disparity.unsigned_abs() as usize > crate::image::MAX_SIDE {
+        if min_disparity.unsigned_abs() as usize > MAX_SIDE {
             return Err(Error::MinDisparity { min_disparity });
         }
         Ok(Self { min_disparity, ..self })

@@ -2,9 +2,9 @@
 
 mod traffic;
 
-use crate::{BAND_ROWS, Error, MessageStart, Model, Schedule, Settings, Side, Size};
+use crate::{BAND_ROWS, Error, MessageStart, Model, Node, Schedule, Settings, Side, Size};
 
-/// Most grids of a plan: the longest side allowed, [`crate::image::MAX_SIDE`], halves to 1 in as many.
+/// Most grids of a plan: the longest side allowed, [`crate::MAX_SIDE`], halves to 1 in as many.
 pub const MAX_GRIDS: usize = 25;
 
 /// Settings checked against an image size and a model.
@@ -85,19 +85,20 @@ impl Plan {
         self.sizes[grid].pixels().saturating_mul(self.model.labels())
     }
 
-    /// The node of `grid` that (x, y) exchanges messages with on `side`; `None` at the border and across a cut.
+    /// The neighbour on `side` that a node of `grid` exchanges messages with; `None` at the border and across a cut.
     ///
     /// # Panics
     /// Where there is no such grid.
     #[must_use]
-    pub fn neighbour(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<(usize, usize)> {
+    pub fn neighbour(&self, grid: usize, node: Node, side: Side) -> Option<Node> {
         let size = self.size(grid);
+        let Node { x, y } = node;
         let (cut_x, cut_y) = self.settings().cut.map_or((0, 0), |cut| (cut.x, cut.y));
         match side {
-            Side::Left => (x > 0 && x != cut_x).then(|| (x - 1, y)),
-            Side::Right => (x + 1 < size.width && x + 1 != cut_x).then_some((x + 1, y)),
-            Side::Up => (y > 0 && y != cut_y).then(|| (x, y - 1)),
-            Side::Down => (y + 1 < size.height && y + 1 != cut_y).then_some((x, y + 1)),
+            Side::Left => (x > 0 && x != cut_x).then(|| Node { x: x - 1, y }),
+            Side::Right => (x + 1 < size.width && x + 1 != cut_x).then_some(Node { x: x + 1, y }),
+            Side::Up => (y > 0 && y != cut_y).then(|| Node { x, y: y - 1 }),
+            Side::Down => (y + 1 < size.height && y + 1 != cut_y).then_some(Node { x, y: y + 1 }),
         }
     }
 
@@ -136,8 +137,9 @@ impl Plan {
     /// Edges between two bands of [`Schedule::Sweep`]; there are none where a cut lies on the seam.
     fn seam_edges(&self, grid: usize) -> u64 {
         let Size { width, height } = self.sizes[grid];
-        let seams =
-            (BAND_ROWS..height).step_by(BAND_ROWS).filter(|&y| self.neighbour(grid, (0, y), Side::Up).is_some());
+        let seams = (BAND_ROWS..height)
+            .step_by(BAND_ROWS)
+            .filter(|&y| self.neighbour(grid, Node { x: 0, y }, Side::Up).is_some());
         width as u64 * seams.count() as u64
     }
 

@@ -20,9 +20,7 @@ use crate::{Error, StereoPair};
 
 pub use range::{DisparityRange, SeenDisparities};
 pub use rows::RowOffsets;
-
-/// Longest side of the shrunk images in pixels: half of it either way gives disparities that fit 8 bits.
-pub const LONGEST_SIDE: usize = 200;
+pub use shrink::LONGEST_SIDE;
 
 /// Least share of pixels with a match in a pair. Real pairs keep more than six tenths, two photographs of different
 /// things less than one in a hundred.

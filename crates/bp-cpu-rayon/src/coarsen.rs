@@ -5,9 +5,10 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
     costs::{self, Costs, Sum, Sums, Widen},
-    layout::{BLOCK, Layout, STRIP},
+    layout::Layout,
     match_cost::Matching,
-    sweep::Windows,
+    shape::{BLOCK, STRIP},
+    windows::Windows,
 };
 
 /// A coarse node's cost is the sum of its up to four children's unclipped costs, label by label. Layouts and costs are

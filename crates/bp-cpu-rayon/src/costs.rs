@@ -4,7 +4,7 @@ use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::layout::{BLOCK, STRIP, Shape};
+use crate::shape::{BLOCK, STRIP, Shape};
 
 /// Data costs as they are stored and as coarser grids are summed from, both `[height][plane][label][lane]`.
 pub(crate) struct Costs {

@@ -3,7 +3,10 @@
 use bp_core::{Error, Plan, Side, memory};
 use rayon::{prelude::*, slice::ChunksMut};
 
-use crate::layout::{BLOCK, Layout, Shape};
+use crate::{
+    layout::Layout,
+    shape::{BLOCK, Shape},
+};
 
 /// Planes of a row: the edges to the row above of both planes of nodes, then those inside the pairs of columns, then
 /// those between the pairs.

@@ -8,7 +8,7 @@ use bp_core::{
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::layout::{self, BLOCK};
+use crate::shape::{self, BLOCK, MIN_ROWS, every_second};
 
 /// Features of both images of a pair, by row, channel and column parity: `[height][channel][parity][lane]`.
 pub(crate) struct Features {
@@ -29,7 +29,7 @@ impl Features {
     /// Room for pairs of `size`.
     pub(crate) fn new(size: Size, model: &Model) -> Result<Self, Error> {
         let profile = model.profile();
-        let lanes = layout::lanes(size);
+        let lanes = shape::lanes(size);
         let rows = 2 * profile.channels() * size.height;
         let padded = || memory::filled("neighbours' values", padded_bytes(size, profile), 0);
         let inside = |parity: usize| {
@@ -85,12 +85,9 @@ impl Features {
     }
 }
 
-/// Fewest rows that are worth handing to another thread.
-pub(crate) const MIN_ROWS: usize = 32;
-
 /// Bytes that [`Features`] hold, predicted.
 pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
-    let (lanes, profile) = (layout::lanes(size), model.profile());
+    let (lanes, profile) = (shape::lanes(size), model.profile());
     let rows = 2 * profile.channels() * size.height;
     (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * padded_bytes(size, profile)) as u64
 }
@@ -239,11 +236,6 @@ impl View<'_> {
 #[inline(always)]
 fn mean(a: u8, b: u8) -> u8 {
     (u16::from(a) + u16::from(b)).div_ceil(2) as u8
-}
-
-#[inline(always)]
-pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
-    plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
 }
 
 /// Writes a row block by block: `values(x, out)` gives those of consecutive columns from x on, which are dealt to even and

@@ -4,10 +4,7 @@ use bp_core::{Error, Image, Model, Plan, image::grey, memory};
 use fearless_simd::{Level, Select, Simd, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use crate::{
-    features::{MIN_ROWS, every_second},
-    layout::{BLOCK, Shape},
-};
+use crate::shape::{BLOCK, MIN_ROWS, Shape, every_second};
 
 /// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes; none where no edge is
 /// weak.

@@ -1,63 +1,13 @@
-//! Where the values of a grid lie.
+//! The shape of a grid and the edges between its nodes.
 
 use std::ops::Deref;
 
-use bp_core::{Error, Plan, Side, Size, memory};
+use bp_core::{Error, Node, Plan, Side, memory};
 
-use crate::greys::{self, Around, Greys};
-
-/// Every row of lanes is a whole number of blocks; no vector is longer.
-pub(crate) const BLOCK: usize = 64;
-
-/// Lanes whose running minima stay in the first cache while all their labels pass by.
-pub(crate) const STRIP: usize = 8 * BLOCK;
-
-/// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
-/// plane in one row have one checkerboard colour, and the four neighbours of consecutive lanes are consecutive lanes, so
-/// a vector of nodes is one load everywhere. A plane holds values `[label][lane]`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
-    /// Size of the grid.
-    pub(crate) size: Size,
-    /// Number of labels.
-    pub(crate) labels: usize,
-    /// Lanes from one label to the next: those of a plane, and padding.
-    pub(crate) lanes: usize,
-}
-
-impl Shape {
-    /// The shape of a grid of `plan`.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Self {
-        let size = plan.size(grid);
-        Self { size, labels: plan.model().labels(), lanes: lanes(size) }
-    }
-
-    /// Number of nodes of a plane in a row.
-    pub(crate) fn nodes(&self, plane: usize) -> usize {
-        (self.size.width + 1 - plane) / 2
-    }
-
-    /// Entries of a plane of a row.
-    pub(crate) fn plane(&self) -> usize {
-        self.labels * self.lanes
-    }
-
-    /// Entries of both planes of a row.
-    pub(crate) fn row(&self) -> usize {
-        2 * self.plane()
-    }
-
-    /// The lanes of a plane in strips: where each starts, and how many lanes it has, whole blocks.
-    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let lanes = self.nodes(plane).next_multiple_of(BLOCK);
-        (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
-    }
-
-    /// The nodes of a row: column, plane and lane.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-        (0..self.size.width).map(|x| (x, x % 2, x / 2))
-    }
-}
+use crate::{
+    greys::{self, Around, Greys},
+    shape::{BLOCK, Shape},
+};
 
 /// Bytes that the [`Layout`] of a grid holds.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
@@ -94,14 +44,14 @@ impl Layout {
         let mask = |plane: usize, side: Side| -> Result<Vec<u8>, Error> {
             let mut mask = memory::filled("masks", shape.lanes + 2 * BLOCK, 0)?;
             for lane in 0..shape.nodes(plane) {
-                let joined = plan.neighbour(grid, (2 * lane + plane, 0), side).is_some();
+                let joined = plan.neighbour(grid, Node { x: 2 * lane + plane, y: 0 }, side).is_some();
                 mask[BLOCK + lane] = if joined { u8::MAX } else { 0 };
             }
             Ok(mask)
         };
         let mut joined_above = memory::filled("masks", shape.size.height, false)?;
         for (y, joined) in joined_above.iter_mut().enumerate() {
-            *joined = plan.neighbour(grid, (0, y), Side::Up).is_some();
+            *joined = plan.neighbour(grid, Node { x: 0, y }, Side::Up).is_some();
         }
         Ok(Self {
             shape,
@@ -142,11 +92,4 @@ impl Layout {
     pub(crate) fn joined_above(&self, y: usize) -> bool {
         self.joined_above.get(y).copied().unwrap_or(false)
     }
-}
-
-/// Lanes of a plane, padded to whole blocks; where labels would lie a multiple of 256 bytes apart, they would share few
-/// of a cache's sets, so there is one block more.
-pub(crate) fn lanes(size: Size) -> usize {
-    let blocks = size.width.div_ceil(2).div_ceil(BLOCK);
-    BLOCK * if blocks.is_multiple_of(4) { blocks + 1 } else { blocks }
 }

@@ -15,14 +15,18 @@ mod costs;
 mod edges;
 mod features;
 mod greys;
+mod half_steps;
 mod layout;
 mod match_cost;
+mod pass;
 mod refine;
 mod select_labels;
+mod shape;
 mod solver;
 mod sweep;
 mod update_messages;
 mod wavefront;
+mod windows;
 
 use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver, memory};
 use fearless_simd::Level;

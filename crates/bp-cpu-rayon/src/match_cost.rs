@@ -1,12 +1,13 @@
 //! Data costs of the image.
 
-use bp_core::{Plan, Profile, Seed};
+use bp_core::{Plan, Profile, Schedule, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
 use crate::{
     costs::{self, Costs, Sums},
     features::Features,
-    layout::{BLOCK, Layout, STRIP},
+    layout::Layout,
+    shape::{BLOCK, STRIP},
 };
 
 /// What a pair's data costs are computed from, row by row.
@@ -18,8 +19,13 @@ pub(crate) struct Matching<'a> {
     pub(crate) seed: Option<Seed>,
 }
 
+/// Whether the costs of a grid are stored. Those of a swept image are computed whenever they are needed.
+pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
+    grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
+}
+
 /// Whether all costs of grid 0 fit 8 bits.
-pub(crate) fn is_narrow(plan: &Plan) -> bool {
+fn is_narrow(plan: &Plan) -> bool {
     plan.sum_bytes(0) == 1
 }
 

@@ -3,10 +3,7 @@
 use bp_core::{MessageStart, Plan, Schedule, Side};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use crate::{
-    edges::Rows,
-    layout::{BLOCK, Layout},
-};
+use crate::{edges::Rows, layout::Layout, shape::BLOCK};
 
 /// The last messages of the next coarser grid.
 #[derive(Clone, Copy)]

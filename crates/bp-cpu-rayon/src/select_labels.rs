@@ -2,16 +2,11 @@
 
 use std::array;
 
-use bp_core::{MAX_TRUNCATION, Model, Plan, Schedule, Side, Smoothness};
+use bp_core::{MAX_TRUNCATION, Model, Node, Plan, Schedule, Side, Smoothness};
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use crate::{
-    edges::Rows,
-    greys::Around,
-    layout::{Layout, STRIP},
-    refine::slot,
-};
+use crate::{edges::Rows, greys::Around, layout::Layout, refine::slot, shape::STRIP};
 
 /// A distance of labels that costs the truncation whatever the slope is, unless that is 0.
 const FAR: usize = MAX_TRUNCATION as usize + 1;
@@ -56,7 +51,7 @@ impl<'a> Answer<'a> {
         for (((x, plane, lane), y), out) in nodes.zip(messages.chunks_exact_mut(self.layout.labels)) {
             let colour = (x + y) % 2;
             let went_away = one_an_edge && (side == Side::Up || side != Side::Down && colour == 1);
-            let there = plan.neighbour(0, (x, y), side).is_some() && !went_away;
+            let there = plan.neighbour(0, Node { x, y }, side).is_some() && !went_away;
             let values = if there { self.received[colour].towards(side, plane, y) } else { None };
             for (label, out) in out.iter_mut().enumerate() {
                 *out = values.map_or(0, |values| values[label * self.layout.lanes + lane]);

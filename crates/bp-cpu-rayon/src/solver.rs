@@ -10,14 +10,15 @@ use crate::{
     costs::{self, Costs},
     edges::{self, Edges, Rows},
     features::{self, Features},
-    greys::Around,
-    layout::{self, Layout, Shape},
-    match_cost::{Matching, is_narrow, match_cost},
-    refine::{Coarser, refine},
+    half_steps,
+    layout::{self, Layout},
+    match_cost::{Matching, is_stored, match_cost},
+    pass::Pass,
+    refine::Coarser,
     select_labels::{Answer, select_labels},
-    sweep::{self, Bands, CostSource, Windows},
-    update_messages::{Nodes, Sends, update_messages},
-    wavefront::{Part, Wavefront, fused_steps},
+    shape::Shape,
+    sweep::{Bands, CostSource},
+    windows::{self, Windows},
 };
 
 /// A prepared plan.
@@ -65,11 +66,6 @@ fn largest(plan: &Plan) -> [usize; 2] {
     if sets(plan, 0) == 0 { [2, 1] } else { [0, 1] }
 }
 
-/// Whether the costs of a grid are stored. Those of a swept image are computed as often as needed.
-pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
-    grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
-}
-
 /// Bytes that a solver will allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
@@ -79,7 +75,7 @@ pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let labels = 2 * plan.image_size().pixels() as u64;
     let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
-    let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), sweep::bytes(plan)];
+    let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), windows::bytes(plan)];
     costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
 
@@ -153,88 +149,6 @@ fn received_in(plan: &Plan) -> [usize; 2] {
     })
 }
 
-/// Which way a pass over the rows goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
-    Down,
-    Up,
-}
-
-/// What updating the messages of a grid needs besides those.
-pub(crate) struct Grid<'a> {
-    pub(crate) level: Level,
-    pub(crate) plan: &'a Plan,
-    pub(crate) layout: &'a Layout,
-    /// Row that `costs` start with.
-    pub(crate) first: usize,
-    pub(crate) costs: &'a [u8],
-    pub(crate) coarser: Option<Coarser<'a>>,
-    /// Whether it starts with the messages that it holds in place of the coarser grid's.
-    pub(crate) keeps_messages: bool,
-}
-
-impl Grid<'_> {
-    /// Gives nodes of a plane in row `y`, with which `rows` start, their first messages.
-    pub(crate) fn refine(&self, (plane, y): (usize, usize), sides: &[Side], rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane);
-        refine(self.level, self.plan, self.layout, self.coarser, (plane, y), sides, &mut slots);
-    }
-
-    /// Lets nodes of a plane in row `y`, with which `rows` start, send in a pass that goes some way.
-    pub(crate) fn send(&self, way: Way, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane);
-        self.drop_missing(y, &mut slots);
-        let mut nodes = self.nodes(plane, y);
-        if way == Way::Up {
-            slots.swap(2, 3);
-            nodes.around = nodes.around.map(Around::upwards);
-        }
-        update_messages(self.level, sends, &nodes, slots);
-    }
-
-    fn nodes(&self, plane: usize, y: usize) -> Nodes<'_> {
-        let (layout, model) = (self.layout, self.plan.model());
-        Nodes {
-            costs: &self.costs[(y - self.first) * layout.row() + plane * layout.plane()..][..layout.plane()],
-            masks: layout.masks(plane),
-            nodes: layout.nodes(plane),
-            lanes: layout.lanes,
-            smoothness: model.smoothness(),
-            around: layout.around(plane, y),
-        }
-    }
-
-    /// Zeros in the slots of neighbours above and below that are not there. Of those at the sides, masks take care.
-    fn drop_missing(&self, y: usize, [_, _, up, down]: &mut [&mut [u8]; 4]) {
-        for (row, slot) in [(y, up), (y + 1, down)] {
-            if !self.layout.joined_above(row) {
-                slot.fill(0);
-            }
-        }
-    }
-}
-
-/// Runs steps of either schedule of half-steps; `sends_first` is the colour of the nodes that send in step 0, and
-/// `last` is the half-step that goes to the second set.
-fn half_steps(grid: &Grid<'_>, steps: Range<usize>, sends_first: usize, sets: [&mut [u8]; 2], last: Option<usize>) {
-    let row_bytes = edges::row_bytes(grid.layout);
-    let [set, other] = sets.map(|rows| Part { row_bytes: if rows.is_empty() { 0 } else { row_bytes }, rows });
-    let step = |[rows, other]: [&mut [u8]; 2], y: usize, t: usize| {
-        let t = steps.start + t;
-        let place = ((y + t + sends_first) % 2, y);
-        if t == 0 && !grid.keeps_messages {
-            grid.refine(place, &Side::ALL, rows);
-        }
-        if last == Some(t) {
-            edges::copy(grid.layout, rows, other, place.0);
-            grid.send(Way::Down, place, Sends::All, other);
-        } else {
-            grid.send(Way::Down, place, Sends::All, rows);
-        }
-    };
-    Wavefront { height: grid.layout.size.height, steps: steps.len() }.run([set, other], &step);
-}
-
 impl Solver for RayonSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         self.features.load(self.level, pair);
@@ -288,8 +202,8 @@ impl Solver for RayonSolver {
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
         let coarser = self.coarser(grid);
         let keeps_messages = grid == 0 && self.keeps_messages;
-        let grid_of = Grid { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser, keeps_messages };
-        run(&grid_of, steps.start as usize..steps.end as usize, &mut messages);
+        let pass = Pass { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser, keeps_messages };
+        half_steps::run(&pass, steps.start as usize..steps.end as usize, &mut messages.sets);
         self.messages[grid % 2] = messages;
         Ok(())
     }
@@ -313,7 +227,7 @@ impl Solver for RayonSolver {
     fn fused_steps(&self) -> u32 {
         match self.plan.settings().schedule {
             Schedule::Sweep => u32::MAX,
-            Schedule::Sync | Schedule::Checkerboard => steps_at_a_time(&self.layouts[0]) as u32,
+            Schedule::Sync | Schedule::Checkerboard => half_steps::steps_at_a_time(&self.layouts[0]) as u32,
         }
     }
 
@@ -342,29 +256,6 @@ impl RayonSolver {
             let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
             self.bands(grid).keep_messages(&mut messages.sets[0]);
             self.messages[grid % 2] = messages;
-        }
-    }
-}
-
-fn steps_at_a_time(layout: &Layout) -> usize {
-    fused_steps(layout.row() + edges::row_bytes(layout))
-}
-
-/// Runs steps of the plan's schedule.
-fn run(grid: &Grid<'_>, steps: Range<usize>, messages: &mut Messages) {
-    let last = grid.plan.settings().steps as usize - 1;
-    let at_a_time = steps_at_a_time(grid.layout);
-    for start in steps.clone().step_by(at_a_time) {
-        let steps = start..(start + at_a_time).min(steps.end);
-        let [first, second] = messages.sets.each_mut().map(|set| set.rows_mut(grid.layout));
-        if grid.plan.settings().schedule == Schedule::Checkerboard {
-            half_steps(grid, steps, 0, [first, second], Some(last));
-        } else {
-            let halves = (steps.clone(), steps);
-            rayon::join(
-                || half_steps(grid, halves.0, 0, [first, &mut []], None),
-                || half_steps(grid, halves.1, 1, [second, &mut []], None),
-            );
         }
     }
 }

@@ -1,86 +1,19 @@
 //! [`bp_core::Schedule::Sweep`]: every band of rows by itself, in cache.
 
-use std::sync::{Mutex, PoisonError};
-
-use bp_core::{BAND_ROWS, Error, Plan, Schedule, Side, memory};
+use bp_core::{BAND_ROWS, Plan, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::{
     edges::{self, Edges, Rows},
-    layout::{Layout, Shape},
+    layout::Layout,
     match_cost::Matching,
+    pass::{Pass, Way},
     refine::Coarser,
     select_labels::Answer,
-    solver::{Grid, Way, is_stored},
     update_messages::Sends,
+    windows::{Window, Windows},
 };
-
-/// What one thread needs to sweep a band: room for its costs and messages, which are used up there. Those of the image
-/// are never stored as a whole.
-pub(crate) struct Window {
-    /// Costs of the rows of a band, where those of the grid are not stored.
-    pub(crate) costs: Vec<u8>,
-    /// The edges up from the first row, and those inside and down from all.
-    edges: Vec<u8>,
-}
-
-/// Windows for the threads that may sweep at once.
-pub(crate) struct Windows {
-    windows: Vec<Mutex<Window>>,
-}
-
-/// How many windows are held: one for each thread of the pool, but no more than there are bands, and none where nothing
-/// is swept.
-fn windows(plan: &Plan) -> usize {
-    let bands = plan.image_size().height.div_ceil(BAND_ROWS);
-    if plan.settings().schedule == Schedule::Sweep { rayon::current_num_threads().min(bands) } else { 0 }
-}
-
-/// Bytes of costs and of edges of a window.
-fn window_bytes(plan: &Plan) -> [usize; 2] {
-    let shape = Shape::new(plan, 0);
-    let rows = BAND_ROWS.min(shape.size.height);
-    let costs = if is_stored(plan, 0) { 0 } else { rows.saturating_mul(shape.row()) };
-    [costs, (rows + 1).saturating_mul(edges::row_bytes(&shape))]
-}
-
-/// Bytes that [`Windows`] hold, predicted.
-pub(crate) fn bytes(plan: &Plan) -> u64 {
-    let [costs, edges] = window_bytes(plan).map(|bytes| bytes as u64);
-    (windows(plan) as u64).saturating_mul(costs.saturating_add(edges))
-}
-
-impl Windows {
-    /// Room for the threads of the pool that this is called in.
-    pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
-        let [costs, edges] = window_bytes(plan);
-        let window = |_| {
-            let (costs, edges) = (memory::filled("data cost", costs, 0)?, memory::filled("messages", edges, 0)?);
-            Ok(Mutex::new(Window { costs, edges }))
-        };
-        Ok(Self { windows: (0..windows(plan)).map(window).collect::<Result<_, Error>>()? })
-    }
-
-    /// Works in a free window. Only in a larger pool than the plan was prepared in can there be none, and a thread waits.
-    pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
-        let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
-        let (before, after) = self.windows.split_at(own);
-        let free = after.iter().chain(before).find_map(|window| window.try_lock().ok());
-        // A window holds nothing that outlives a band, so that a panic in another band did it no harm.
-        let mut window = free.unwrap_or_else(|| self.windows[own].lock().unwrap_or_else(PoisonError::into_inner));
-        work(&mut window)
-    }
-
-    /// Bytes held.
-    pub(crate) fn bytes(&self) -> u64 {
-        let bytes = |window: &Mutex<Window>| {
-            let window = window.lock().unwrap_or_else(PoisonError::into_inner);
-            memory::bytes(&window.costs) + memory::bytes(&window.edges)
-        };
-        self.windows.iter().map(bytes).sum()
-    }
-}
 
 /// Where the costs of a grid come from.
 pub(crate) enum CostSource<'a> {
@@ -148,11 +81,11 @@ impl Bands<'_> {
             };
             let Self { level, plan, layout, coarser, .. } = *self;
             let band = Band {
-                grid: Grid { level, plan, layout, first, costs, coarser, keeps_messages: false },
+                pass: Pass { level, plan, layout, first, costs, coarser, keeps_messages: false },
                 first,
                 last: end - 1,
             };
-            (0..plan.settings().steps).for_each(|step| band.pass(step == 0, edges));
+            (0..plan.settings().steps).for_each(|step| band.sweep(step == 0, edges));
             then(costs, edges)
         })
     }
@@ -160,17 +93,17 @@ impl Bands<'_> {
 
 /// One band.
 struct Band<'a> {
-    grid: Grid<'a>,
+    pass: Pass<'a>,
     first: usize,
     last: usize,
 }
 
 impl Band<'_> {
     /// One loop. Nothing comes from above the band; from below come the first messages.
-    fn pass(&self, first_loop: bool, rows: &mut [u8]) {
-        let row_bytes = edges::row_bytes(self.grid.layout);
+    fn sweep(&self, first_loop: bool, rows: &mut [u8]) {
+        let row_bytes = edges::row_bytes(self.pass.layout);
         for plane in 0..2 {
-            edges::slots(self.grid.layout, rows, plane)[2].fill(0);
+            edges::slots(self.pass.layout, rows, plane)[2].fill(0);
         }
         for y in self.first..=self.last {
             self.forward(y, first_loop, &mut rows[(y - self.first) * row_bytes..]);
@@ -184,23 +117,23 @@ impl Band<'_> {
     fn forward(&self, y: usize, first_loop: bool, rows: &mut [u8]) {
         let (even, odd, last) = (y % 2, 1 - y % 2, y == self.last);
         if first_loop {
-            self.grid.refine((even, y), &[Side::Left, Side::Right, Side::Down], rows);
+            self.pass.refine((even, y), &[Side::Left, Side::Right, Side::Down], rows);
             if last {
-                self.grid.refine((odd, y), &[Side::Down], rows);
+                self.pass.refine((odd, y), &[Side::Down], rows);
             }
         }
-        self.grid.send(Way::Down, (even, y), if last { Sends::Sides } else { Sends::SidesAndOn }, rows);
+        self.pass.send(Way::Down, (even, y), if last { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !last {
-            self.grid.send(Way::Down, (odd, y), Sends::On, rows);
+            self.pass.send(Way::Down, (odd, y), Sends::On, rows);
         }
     }
 
     /// Odd nodes send to both sides and up, then even ones up; the first row sends nothing up.
     fn backward(&self, y: usize, rows: &mut [u8]) {
         let (even, odd, first) = (y % 2, 1 - y % 2, y == self.first);
-        self.grid.send(Way::Up, (odd, y), if first { Sends::Sides } else { Sends::SidesAndOn }, rows);
+        self.pass.send(Way::Up, (odd, y), if first { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !first {
-            self.grid.send(Way::Up, (even, y), Sends::On, rows);
+            self.pass.send(Way::Up, (even, y), Sends::On, rows);
         }
     }
 }

@@ -1,52 +1,42 @@
 //! Labels under the schedule `sweep`, decided one after another.
 
-use bp_core::{BAND_ROWS, Plan, Side, Smoothness};
+use bp_core::{BAND_ROWS, Side, Smoothness};
 
 use crate::{
-    costs::Costs,
-    greys::Greys,
-    messages::Messages,
-    select_labels::smallest_least,
-    sweep::{EVEN, ODD, row_nodes},
+    beliefs::smallest_least,
+    grid::Grid,
+    messages::{Messages, add},
+    row::{Parity, row_nodes},
 };
 
-/// Writes the label of every node in the order of [`bp_core::Schedule::Sweep`]. `sums` is room for one node's labels.
-pub(crate) fn decode(
-    plan: &Plan,
-    costs: &Costs,
-    greys: &Greys,
-    messages: &Messages,
-    labels: &mut [u16],
-    sums: &mut [u8],
-) {
-    let size = plan.image_size();
-    for (y, parity) in (0..size.height).flat_map(|y| [(y, EVEN), (y, ODD)]) {
-        for x in row_nodes(size.width, y, parity) {
-            let node = y * size.width + x;
-            sums.copy_from_slice(costs.of(node));
+/// Writes the label of every node in the order of [`bp_core::Schedule::Sweep`]. `sums` has room for one node's labels.
+///
+/// A neighbour that already has a label adds its smoothness cost; any other adds its message.
+pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], sums: &mut [u8]) {
+    let size = grid.size();
+    for (y, parity) in (0..size.height).flat_map(|y| [(y, Parity::Even), (y, Parity::Odd)]) {
+        for node in row_nodes(size, y, parity) {
+            let index = size.index(node);
+            sums.copy_from_slice(grid.costs.of(index));
             for side in Side::ALL {
                 let has_label = match side {
                     Side::Up => !y.is_multiple_of(BAND_ROWS),
-                    Side::Left | Side::Right => parity == ODD,
+                    Side::Left | Side::Right => parity == Parity::Odd,
                     Side::Down => false,
                 };
                 if !has_label {
-                    add_message(messages.received(node, side), sums);
-                } else if let Some((x, y)) = plan.neighbour(0, (x, y), side) {
-                    let other = y * size.width + x;
-                    add_smoothness(greys.smoothness(node, other), labels[other], sums);
+                    add(messages.received(index, side), sums);
+                } else if let Some(other) = grid.neighbour(node, side) {
+                    let other = size.index(other);
+                    add_smoothness(grid.greys.smoothness(index, other), labels[other], sums);
                 }
             }
-            labels[node] = smallest_least(sums);
+            labels[index] = smallest_least(sums);
         }
     }
 }
 
-fn add_message(message: &[u8], sums: &mut [u8]) {
-    sums.iter_mut().zip(message).for_each(|(sum, &message)| *sum = sum.saturating_add(message));
-}
-
-/// Adds the smoothness cost of every label beside `label`; it is at most K, which fits.
+/// Adds the smoothness cost of every label beside `label`. It is at most K, which fits 8 bits.
 fn add_smoothness(smoothness: Smoothness, label: u16, sums: &mut [u8]) {
     for (d, sum) in (0..).zip(sums) {
         *sum = sum.saturating_add(smoothness.of(d, label) as u8);

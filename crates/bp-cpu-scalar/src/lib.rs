@@ -4,13 +4,16 @@
 //! to the bit. One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`. What the
 //! schedule `sweep` does differently stands beside them in `sweep` and `decode`.
 
+mod beliefs;
 mod coarsen;
 mod costs;
 mod decode;
 mod greys;
+mod grid;
 mod match_cost;
 mod messages;
 mod refine;
+mod row;
 mod select_labels;
 mod solver;
 mod sums;

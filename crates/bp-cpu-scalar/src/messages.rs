@@ -2,6 +2,11 @@
 
 use bp_core::{Error, Plan, Schedule, Side, memory};
 
+/// Adds a message to one node's sums, a value a label.
+pub(crate) fn add(message: &[u8], sums: &mut [u8]) {
+    sums.iter_mut().zip(message).for_each(|(sum, &message)| *sum = sum.saturating_add(message));
+}
+
 /// What every node last received from each side: `[side][node][label]`, sides in the order of [`Side::ALL`]. The slots
 /// of neighbours that are not there stay 0, and so do those of messages used up under the schedule `sweep`.
 pub(crate) struct Messages {

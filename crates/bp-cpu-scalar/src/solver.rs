@@ -5,8 +5,8 @@ use std::ops::Range;
 use bp_core::{DataCost, Error, Plan, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
-    coarsen::coarsen, costs::Costs, greys::Greys, match_cost::match_cost, messages::Messages, refine::refine,
-    select_labels::select_labels, update_messages::update_messages,
+    coarsen::coarsen, costs::Costs, greys::Greys, grid::Grid, match_cost::match_cost, messages::Messages,
+    refine::refine, select_labels::select_labels, update_messages::update_messages,
 };
 
 /// A prepared plan.
@@ -72,13 +72,15 @@ impl Solver for ScalarSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];
-            update_messages(&self.plan, grid, step, &self.costs[grid], &self.greys[grid], messages, &mut self.h);
+            let grid = Grid { plan: &self.plan, index: grid, costs: &self.costs[grid], greys: &self.greys[grid] };
+            update_messages(&grid, step, messages, &mut self.h);
         }
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        select_labels(&self.plan, &self.costs[0], &self.greys[0], &self.messages[0], labels, &mut self.h);
+        let grid = Grid { plan: &self.plan, index: 0, costs: &self.costs[0], greys: &self.greys[0] };
+        select_labels(&grid, &self.messages[0], labels, &mut self.h);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! What goes up to a device and what comes down: pairs, labels and messages in their layouts there.
 
-use bp_core::{Error, Plan, Schedule, Seed, Side, Size, StereoPair, image::APRON};
+use bp_core::{Error, Node, Plan, Schedule, Seed, Side, Size, StereoPair, image::APRON};
 
 use crate::{Program, Queue, layout::colour};
 
@@ -57,14 +57,12 @@ pub(crate) fn read_messages(
     for (index, &strip) in grid.strips.iter().enumerate() {
         let buffers = program.last_sent(index, side.opposite());
         let planes = [queue.read(buffers[0])?, queue.read(buffers[1])?];
-        for node in
-            (0..size.pixels()).map(|i| (i % size.width, i / size.width)).filter(|&node| is_held(plan, node, side))
-        {
+        for node in size.nodes().filter(|&node| is_held(plan, node, side)) {
             let Some(sender) = plan.neighbour(0, node, side) else { continue };
-            if sender.1 < strip.first || sender.1 >= strip.first + strip.rows {
+            if sender.y < strip.first || sender.y >= strip.first + strip.rows {
                 continue;
             }
-            let received = &mut messages[(node.1 * size.width + node.0) * labels..][..labels];
+            let received = &mut messages[size.index(node) * labels..][..labels];
             for (label, message) in received.iter_mut().enumerate() {
                 *message = planes[colour(sender)][grid.byte(strip, sender, label)];
             }
@@ -74,11 +72,11 @@ pub(crate) fn read_messages(
 }
 
 /// Whether the node's edge on `side` holds the message to it: under [`Schedule::Sweep`] an edge holds one of the two.
-fn is_held(plan: &Plan, node: (usize, usize), side: Side) -> bool {
+fn is_held(plan: &Plan, node: Node, side: Side) -> bool {
     plan.settings().schedule != Schedule::Sweep
         || match side {
             Side::Down => true,
             Side::Up => false,
-            Side::Left | Side::Right => colour(node) == 0,
+            Side::Left | Side::Right => node.is_even(),
         }
 }

@@ -1,24 +1,19 @@
 //! Composes the program of a plan.
 
 mod buffers;
+mod composer;
+mod kernels;
 mod parts;
 mod recorder;
 mod sweep;
 
 use bp_core::{Error, Plan, Schedule};
+use buffers::Buffers;
+use composer::{Composer, PARAMETERS_ALIGNMENT};
 use indexmap::IndexSet;
+use recorder::Recorder;
 
-use crate::{
-    BindGroup, Buffer, Command, Kernel, Limits, Memory, Parameters, Pipeline, Program, WORKGROUP,
-    compose::{
-        buffers::{Buffers, StripBuffers},
-        recorder::{PartRecorder, Recorder},
-    },
-    layout::{self, Grid},
-};
-
-/// Alignment of dynamic offsets: the most that any device asks for.
-const PARAMETERS_ALIGNMENT: usize = 256;
+use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout};
 
 /// How many full dispatches a submission holds: few enough for watchdogs, for progress to be told and stopping to be quick,
 /// enough for handing over to take no time in comparison.
@@ -27,8 +22,33 @@ const DISPATCHES_PER_SUBMISSION: u64 = 8;
 /// Most marks that are kept.
 const MOST_MARKS: usize = 4096;
 
+impl Program {
+    /// The program of a plan.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where a device of these limits cannot run it, [`Error::OutOfMemory`] where its buffers
+    /// need more memory than there is.
+    pub fn new(plan: &Plan, limits: &Limits) -> Result<Self, Error> {
+        let program = compose(plan, limits)?;
+        match limits.memory_bytes {
+            Some(available) if program.bytes() > available => {
+                Err(Error::OutOfMemory { what: "device buffers", needed: program.bytes(), available: Some(available) })
+            }
+            _ => Ok(program),
+        }
+    }
+
+    /// Bytes that a matcher of this plan takes on a device of these limits, its labels on the host included; those of
+    /// the plan itself where the device cannot run it.
+    #[must_use]
+    pub fn planned_bytes(plan: &Plan, limits: &Limits) -> u64 {
+        let labels = 2 * plan.image_size().pixels() as u64;
+        compose(plan, limits).map_or_else(|_| plan.bytes(), |program| program.bytes().saturating_add(labels))
+    }
+}
+
 /// The program of a plan, whatever memory it needs.
-pub(crate) fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
+fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
     check_sums(plan, limits)?;
     let grids = layout::grids(plan, limits)?;
     let buffers = Buffers::new(plan, &grids);
@@ -81,33 +101,6 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
         }
         None => Ok(()),
     }
-}
-
-/// Which nodes a dispatch computes.
-#[derive(Clone, Copy)]
-struct Nodes {
-    grid: usize,
-    strip: usize,
-    colour: usize,
-}
-
-/// Which rows of a strip a kernel computes.
-#[derive(Clone, Copy)]
-struct Rows {
-    first: usize,
-    step: usize,
-    count: usize,
-}
-
-/// A program in the making.
-struct Composer<'a> {
-    plan: &'a Plan,
-    limits: &'a Limits,
-    grids: &'a [Grid],
-    buffers: &'a Buffers,
-    parameters: IndexSet<Parameters>,
-    pipelines: IndexSet<Pipeline>,
-    bind_groups: IndexSet<BindGroup>,
 }
 
 impl Composer<'_> {
@@ -169,95 +162,6 @@ impl Composer<'_> {
         let set = self.set(self.plan.settings().steps);
         self.buffers.strips[0].iter().map(|strip| strip.sent[set]).collect()
     }
-
-    /// Which set of message buffers holds what was sent before a step. Under [`Schedule::Sync`] a step reads one set and
-    /// writes the other.
-    fn set(&self, step: u32) -> usize {
-        if self.plan.settings().schedule == Schedule::Sync { step as usize % 2 } else { 0 }
-    }
-
-    /// Records dispatches of a kernel to rows of a strip, as many as the limits ask for.
-    fn dispatch(&mut self, part: &mut PartRecorder, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
-        let kernel = pipeline.kernel;
-        let pipeline = self.pipelines.insert_full(pipeline).0;
-        let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
-        let most = self.rows_per_dispatch(&work);
-        for done in (0..work.rows.count).step_by(most) {
-            let rows = most.min(work.rows.count - done);
-            let row = work.rows.first + done * work.rows.step;
-            let row_step = work.rows.step as u32;
-            let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
-            let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
-            let workgroups = (rows * work.row_invocations).div_ceil(WORKGROUP as usize) as u32;
-            let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
-            part.push(command, rows as u64 * self.row_entries(&work));
-        }
-    }
-
-    /// Message entries that a row of this work is worth: an invocation makes four messages at four nodes for every label,
-    /// or does less.
-    fn row_entries(&self, work: &Work) -> u64 {
-        work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
-    }
-
-    /// How many rows a dispatch may compute.
-    fn rows_per_dispatch(&self, work: &Work) -> usize {
-        let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
-        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / work.row_invocations.max(1);
-        usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
-    }
-
-    /// The parameters of a strip's nodes of one colour, on rows that are still to be told.
-    fn work(&self, nodes: Nodes, rows: Rows) -> Work {
-        let grid = &self.grids[nodes.grid];
-        let (model, cut) = (self.plan.model(), self.plan.settings().cut);
-        let parameters = Parameters {
-            width: grid.size.width as u32,
-            height: grid.size.height as u32,
-            words: grid.words as u32,
-            labels: model.labels() as u32,
-            quads: grid.quads as u32,
-            first_row: grid.strips[nodes.strip].first as u32,
-            colour: nodes.colour as u32,
-            slope: model.slope().into(),
-            truncation: model.truncation().into(),
-            step: model.smoothness().step().into(),
-            weak_slope: model.smoothness().weakened().slope.into(),
-            weak_truncation: model.smoothness().weakened().truncation.into(),
-            weak_step: model.smoothness().weakened().step().into(),
-            edge_threshold: model.weak_edges().unwrap_or(u8::MAX).into(),
-            clip: self.plan.clip(nodes.grid).into(),
-            min_disparity: model.min_disparity(),
-            padding_cost: model.clip().into(),
-            cut_x: cut.map_or(0, |cut| cut.x as u32),
-            cut_y: cut.map_or(0, |cut| cut.y as u32),
-            ..Parameters::default()
-        };
-        Work { parameters, rows, row_invocations: grid.words }
-    }
-
-    /// All rows of a strip.
-    fn all_rows(&self, nodes: Nodes) -> Work {
-        let count = self.grids[nodes.grid].strips[nodes.strip].rows;
-        self.work(nodes, Rows { first: 0, step: 1, count })
-    }
-
-    /// The nodes of every strip and colour of a grid.
-    fn nodes(&self, grid: usize) -> impl Iterator<Item = Nodes> + use<> {
-        let strips = 0..self.grids[grid].strips.len();
-        strips.flat_map(move |strip| [0, 1].map(|colour| Nodes { grid, strip, colour }))
-    }
-
-    fn strip(&self, nodes: Nodes) -> &StripBuffers {
-        &self.buffers.strips[nodes.grid][nodes.strip]
-    }
-}
-
-/// Parameters of a dispatch, its rows, and how many invocations a row takes.
-struct Work {
-    parameters: Parameters,
-    rows: Rows,
-    row_invocations: usize,
 }
 
 /// How many steps make up a submission on grid 0.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Error, Plan, Schedule, Size};
+use bp_core::{BAND_ROWS, Error, Node, Plan, Schedule, Size};
 
 use crate::Limits;
 
@@ -80,8 +80,9 @@ impl Grid {
         self.strips.iter().rposition(|strip| strip.first <= y).unwrap_or(0)
     }
 
-    /// Where in a strip's plane the byte of a label at the node (x, y) lies; the node's colour says in which plane.
-    pub(crate) fn byte(&self, strip: Strip, (x, y): (usize, usize), label: usize) -> usize {
+    /// Where in a strip's plane the byte of a node's label lies; the node's colour says in which plane.
+    pub(crate) fn byte(&self, strip: Strip, node: Node, label: usize) -> usize {
+        let Node { x, y } = node;
         let node = x / 2;
         let vector = ((y - strip.first + 1) * self.quads + label / QUAD_LABELS) * self.words + node / WORD_NODES;
         (vector * QUAD_LABELS + label % QUAD_LABELS) * WORD_NODES + node % WORD_NODES
@@ -89,8 +90,8 @@ impl Grid {
 }
 
 /// Colour of a node.
-pub(crate) fn colour((x, y): (usize, usize)) -> usize {
-    (x + y) % 2
+pub(crate) fn colour(node: Node) -> usize {
+    usize::from(!node.is_even())
 }
 
 /// The grids of a plan, cut into strips where a buffer would be too large: those of a grid begin where two rows of the

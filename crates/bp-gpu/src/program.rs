@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Plan, Side};
+use bp_core::Side;
 
-use crate::{Kernel, Limits, Parameters, Pipeline, compose, layout::Grid};
+use crate::{Kernel, Parameters, Pipeline, layout::Grid};
 
 /// Where a buffer lies and what reaches it besides kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,29 +136,6 @@ impl Program {
     pub const DOWNLOAD: usize = 2;
     /// Bytes of one block of parameters: the size to which binding 0 is bound.
     pub const PARAMETER_BYTES: u64 = size_of::<Parameters>() as u64;
-
-    /// The program of a plan.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] where a device of these limits cannot run it, [`Error::OutOfMemory`] where its buffers
-    /// need more memory than there is.
-    pub fn new(plan: &Plan, limits: &Limits) -> Result<Self, Error> {
-        let program = compose::compose(plan, limits)?;
-        match limits.memory_bytes {
-            Some(available) if program.bytes() > available => {
-                Err(Error::OutOfMemory { what: "device buffers", needed: program.bytes(), available: Some(available) })
-            }
-            _ => Ok(program),
-        }
-    }
-
-    /// Bytes that a matcher of this plan takes on a device of these limits, its labels on the host included; those of
-    /// the plan itself where the device cannot run it.
-    #[must_use]
-    pub fn planned_bytes(plan: &Plan, limits: &Limits) -> u64 {
-        let labels = 2 * plan.image_size().pixels() as u64;
-        compose::compose(plan, limits).map_or_else(|_| plan.bytes(), |program| program.bytes().saturating_add(labels))
-    }
 
     /// Bytes of all buffers.
     #[must_use]

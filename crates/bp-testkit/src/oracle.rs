@@ -6,7 +6,7 @@ mod sweep;
 
 use std::ops::Range;
 
-use bp_core::{DataCost, Device, Error, MessageStart, Plan, Schedule, Seed, Side, Solver, StereoPair};
+use bp_core::{DataCost, Device, Error, MessageStart, Node, Plan, Schedule, Seed, Side, Solver, StereoPair};
 use state::{Grid, State};
 
 /// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs, except
@@ -25,34 +25,33 @@ impl State {
     /// nodes that send receive nothing in that half-step.
     fn step(&mut self, grid: usize, step: u32) {
         let before = self.grids[grid].received.clone();
-        for (node, (x, y)) in self.nodes(grid) {
+        for node in self.plan.size(grid).nodes() {
             let checkerboard = self.plan.settings().schedule == Schedule::Checkerboard;
-            if checkerboard && !(x + y + step as usize).is_multiple_of(2) {
+            if checkerboard && node.is_even() != step.is_multiple_of(2) {
                 continue;
             }
             for to in Side::ALL {
-                if let Some((to_x, to_y)) = self.plan.neighbour(grid, (x, y), to) {
-                    let message = self.message(grid, (x, y), &before[node], to);
-                    let receiver = to_y * self.plan.size(grid).width + to_x;
+                if let Some(receiver) = self.plan.neighbour(grid, node, to) {
+                    let message = self.message(grid, node, &before[self.index(grid, node)], to);
+                    let receiver = self.index(grid, receiver);
                     self.grids[grid].received[receiver][to.opposite() as usize] = message;
                 }
             }
         }
     }
 
-    /// The first message that the fine node at (x, y) holds from `side`.
-    fn first_message(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<Vec<i64>> {
+    /// The first message that a fine node holds from `side`.
+    fn first_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
         let coarse = self.grids.get(grid + 1)?;
-        let (sender_x, sender_y) = self.plan.neighbour(grid, (x, y), side)?;
+        let sender = self.plan.neighbour(grid, node, side)?;
         if self.plan.settings().schedule == Schedule::Sweep {
-            return self.first_sweep_message(grid, (x, y), side);
+            return self.first_sweep_message(grid, node, side);
         }
         let receiver = match self.plan.settings().message_start {
-            MessageStart::Receiver => (x / 2, y / 2),
-            MessageStart::Sender => self.plan.neighbour(grid + 1, (sender_x / 2, sender_y / 2), side.opposite())?,
+            MessageStart::Receiver => node.parent(),
+            MessageStart::Sender => self.plan.neighbour(grid + 1, sender.parent(), side.opposite())?,
         };
-        let receiver = receiver.1 * self.plan.size(grid + 1).width + receiver.0;
-        Some(coarse.received[receiver][side as usize].clone())
+        Some(coarse.received[self.index(grid + 1, receiver)][side as usize].clone())
     }
 }
 
@@ -60,9 +59,9 @@ impl Solver for State {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
         data_cost.load(pair, seed)?;
-        for (node, (x, y)) in self.nodes(0) {
-            self.grids[0].greys[node] = pair.left().grey(x, y).into();
-            for (label, cost) in self.grids[0].sums[node].iter_mut().enumerate() {
+        for (i, Node { x, y }) in pair.size().nodes().enumerate() {
+            self.grids[0].greys[i] = pair.left().grey(x, y).into();
+            for (label, cost) in self.grids[0].sums[i].iter_mut().enumerate() {
                 *cost = data_cost.at(x, y, label as u16).into();
             }
         }
@@ -73,15 +72,14 @@ impl Solver for State {
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
         let (fine, coarse) = self.grids.split_at_mut(grid);
         coarse[0].sums.iter_mut().for_each(|sums| sums.fill(0));
-        for (node, costs) in fine[grid - 1].sums.iter().enumerate() {
-            let width = self.plan.size(grid - 1).width;
-            let parent = (node / width / 2) * self.plan.size(grid).width + (node % width) / 2;
+        for (node, costs) in self.plan.size(grid - 1).nodes().zip(&fine[grid - 1].sums) {
+            let parent = self.plan.size(grid).index(node.parent());
             coarse[0].sums[parent].iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
         }
         self.set_costs(grid);
         let mut children = vec![Vec::new(); self.plan.size(grid).pixels()];
-        for (node, (x, y)) in self.nodes(grid - 1) {
-            children[y / 2 * self.plan.size(grid).width + x / 2].push(self.grids[grid - 1].greys[node]);
+        for (i, node) in self.plan.size(grid - 1).nodes().enumerate() {
+            children[self.index(grid, node.parent())].push(self.grids[grid - 1].greys[i]);
         }
         let mean = |of: &Vec<i64>| (of.iter().sum::<i64>() + of.len() as i64 / 2) / of.len() as i64;
         self.grids[grid].greys = children.iter().map(mean).collect();
@@ -89,11 +87,11 @@ impl Solver for State {
     }
 
     fn refine(&mut self, grid: usize) -> Result<(), Error> {
-        for (node, position) in self.nodes(grid) {
+        for (i, node) in self.plan.size(grid).nodes().enumerate() {
             for side in Side::ALL {
                 let zeros = || vec![0; self.plan.model().labels()];
-                let message = self.first_message(grid, position, side).unwrap_or_else(zeros);
-                self.grids[grid].received[node][side as usize] = message;
+                let message = self.first_message(grid, node, side).unwrap_or_else(zeros);
+                self.grids[grid].received[i][side as usize] = message;
             }
         }
         Ok(())

@@ -7,6 +7,7 @@
 
 mod render;
 mod scenes;
+mod spot;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use ash::vk;
 use bp_core::Error;
 use bp_gpu::{Buffer, Memory};
 
-use crate::{device::Gpu, limits::memory_type, object::Owned};
+use crate::{gpu::Gpu, memory::memory_type, object::Owned};
 
 /// Buffers, by their index in the program.
 pub(crate) struct Buffers {

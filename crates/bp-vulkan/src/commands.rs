@@ -7,7 +7,7 @@ use ash::vk;
 use bp_core::Error;
 use bp_gpu::{Command, Memory, Program};
 
-use crate::{device::Gpu, object::Owned, resources::Resources};
+use crate::{gpu::Gpu, object::Owned, resources::Resources};
 
 /// Most bytes that a command itself can carry to a buffer.
 const CARRIED_BYTES: usize = 65_536;

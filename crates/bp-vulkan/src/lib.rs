@@ -5,12 +5,16 @@
 //! and waits, `timer` reads the device's clock. Everything that Vulkan makes is an `object` with one owner.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
+mod adapter;
 mod buffers;
 mod commands;
 mod device;
 mod error;
+mod gpu;
 mod instance;
 mod limits;
+mod loader;
+mod memory;
 mod object;
 mod pipelines;
 mod queue;
@@ -20,10 +24,11 @@ mod timeline;
 mod timer;
 pub mod validation;
 
+use adapter::Adapter;
 use bp_core::{Backend, Device, DeviceInfo, Error};
 use bp_gpu::{Limits, missing};
 use device::VulkanDevice;
-use instance::{Adapter, Instance};
+use instance::Instance;
 
 /// The backend.
 #[derive(Clone, Copy, Debug, Default)]

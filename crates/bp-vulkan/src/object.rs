@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::device::Gpu;
+use crate::gpu::Gpu;
 
 /// An object of a device, which it keeps open.
 pub(crate) struct Owned<T: Destroy> {

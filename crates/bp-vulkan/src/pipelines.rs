@@ -15,7 +15,7 @@ use ash::vk;
 use bp_core::Error;
 use bp_gpu::{Kernel, Pipeline, cache};
 
-use crate::{device::Gpu, object::Owned, spirv};
+use crate::{gpu::Gpu, object::Owned, spirv};
 
 /// What a kernel is given: the shape of its bind groups.
 pub(crate) struct Layout {

@@ -13,7 +13,7 @@ use bp_gpu::{Buffer, Command, Memory, Program, Queue, Segment};
 use crate::{
     buffers::Buffers,
     commands::{Commands, Recorder},
-    device::Gpu,
+    gpu::Gpu,
     pipelines::Pipelines,
     resources::Resources,
     timeline::Timeline,

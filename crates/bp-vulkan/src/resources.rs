@@ -12,7 +12,7 @@ use bp_gpu::{BindGroup, Program};
 
 use crate::{
     buffers::Buffers,
-    device::Gpu,
+    gpu::Gpu,
     object::Owned,
     pipelines::{Compiled, Layout, Pipelines},
 };

@@ -8,7 +8,7 @@ use bp_core::Error;
 
 use bp_gpu::PATIENCE;
 
-use crate::{device::Gpu, object::Owned, validation};
+use crate::{gpu::Gpu, object::Owned, validation};
 
 /// Counts pieces of work, submitted and done.
 pub(crate) struct Timeline {

@@ -6,7 +6,7 @@ use std::{sync::Arc, time::Duration};
 use ash::vk;
 use bp_core::Error;
 
-use crate::{commands::Commands, device::Gpu, object::Owned};
+use crate::{commands::Commands, gpu::Gpu, object::Owned};
 
 /// Notes times at marks.
 pub(crate) struct Timer {

@@ -45,7 +45,7 @@ pub fn turn_on() {
 /// Whether the layer is installed.
 #[must_use]
 pub fn is_installed() -> bool {
-    crate::instance::entry().is_ok_and(has_layer)
+    crate::loader::entry().is_ok_and(has_layer)
 }
 
 /// What the layer complained of so far.

@@ -3,14 +3,14 @@
 use bp_core::Error;
 use bp_gpu::{BindGroup, Memory, Program};
 use wgpu::{
-    BindGroupDescriptor, BindGroupEntry, Buffer, BufferBinding, BufferDescriptor, BufferSize, BufferUsages,
-    CommandEncoder, MapMode, SubmissionIndex,
+    BindGroupDescriptor, BindGroupEntry, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder,
+    MapMode, SubmissionIndex,
 };
 
-use crate::{error::Gpu, pipelines};
-
-/// What a block of parameters is bound as.
-pub(crate) const PARAMETER_BYTES: Option<BufferSize> = BufferSize::new(Program::PARAMETER_BYTES);
+use crate::{
+    gpu::Gpu,
+    pipelines::{self, PARAMETER_BYTES},
+};
 
 /// Makes the buffers of a program, and fills that of the parameters.
 pub(crate) fn make(gpu: &Gpu, program: &Program) -> Result<Vec<Buffer>, Error> {

@@ -8,7 +8,7 @@ use wgpu::{
     QueryType, SubmissionIndex,
 };
 
-use crate::{buffers, error::Gpu};
+use crate::{buffers, gpu::Gpu};
 
 /// Notes the device's time at marks.
 pub(crate) struct Clock {

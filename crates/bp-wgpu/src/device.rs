@@ -6,7 +6,7 @@ use bp_core::{Device, Error, Plan, Solver};
 use bp_gpu::{GpuSolver, Limits, Program};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
-use crate::{clock::Clock, error::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue, vulkan};
+use crate::{clock::Clock, gpu::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue, vulkan};
 
 /// An open adapter.
 pub(crate) struct WgpuDevice {

@@ -1,17 +1,17 @@
 //! GPU backend through wgpu. Its labels and messages are the scalar backend's to the bit.
 //!
-//! What runs is told by `bp-shaders`: this crate allocates, compiles, encodes and submits what a program says, and turns
+//! `bp-gpu` says what runs: this crate allocates, compiles, encodes and submits what a program says, and turns
 //! all that can go wrong there into errors. Its devices are those that have a Vulkan driver.
 //!
 //! `instance` lists adapters, `device` opens one, `buffers` and `pipelines` make what a program names, `recording` encodes
-//! its commands, `queue` runs them, `clock` times them, `error` sees to it that wgpu never ends the program, and
+//! its commands, `queue` runs them, `clock` times them, `gpu` keeps wgpu from ending the program, and
 //! `vulkan` asks for what wgpu does not tell.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffers;
 mod clock;
 mod device;
-mod error;
+mod gpu;
 mod instance;
 mod pipelines;
 mod queue;

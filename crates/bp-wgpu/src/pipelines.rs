@@ -6,14 +6,17 @@ use std::{
 };
 
 use bp_core::Error;
-use bp_gpu::{Access, Kernel, Pipeline, cache};
+use bp_gpu::{Access, Kernel, Pipeline, Program, cache};
 use wgpu::{
     Adapter, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
-    ComputePipeline, ComputePipelineDescriptor, Features, PipelineCache, PipelineCacheDescriptor,
+    BufferSize, ComputePipeline, ComputePipelineDescriptor, Features, PipelineCache, PipelineCacheDescriptor,
     PipelineCompilationOptions, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
-use crate::{buffers::PARAMETER_BYTES, error::Gpu, vulkan};
+use crate::{gpu::Gpu, vulkan};
+
+/// What a block of parameters is bound as.
+pub(crate) const PARAMETER_BYTES: Option<BufferSize> = BufferSize::new(Program::PARAMETER_BYTES);
 
 /// All pipelines made so far.
 pub(crate) struct Pipelines {

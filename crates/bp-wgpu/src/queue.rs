@@ -13,7 +13,7 @@ use wgpu::{BufferUsages, CommandEncoder, SubmissionIndex};
 use crate::{
     buffers,
     clock::Clock,
-    error::Gpu,
+    gpu::Gpu,
     pipelines::Pipelines,
     recording::{self, Recording},
 };

@@ -7,7 +7,7 @@ use wgpu::{
     SubmissionIndex,
 };
 
-use crate::{buffers, error::Gpu};
+use crate::{buffers, gpu::Gpu};
 
 /// The commands of a program, and all that they name.
 pub(crate) struct Recording {

@@ -1,7 +1,9 @@
 //! The left-right check.
 
-use super::AGREE;
 use crate::{DisparityMap, Error, metrics::check_size};
+
+/// Two disparities that differ by no more than this many pixels belong to one surface, and agree.
+pub const AGREE: f32 = 1.0;
 
 /// Makes every pixel of the left map unknown whose match in the right image says otherwise: at column
 /// `floor(x - d + 1/2)` the right map has to be known and to differ by no more than [`AGREE`] (Fua 1993). Pixels that

@@ -1,8 +1,7 @@
 //! How far a map can be trusted.
 
 use super::{
-    AGREE,
-    check::difference,
+    check::{AGREE, difference},
     subpixel::window,
     window::{Frame, Framed},
 };

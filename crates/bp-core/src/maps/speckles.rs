@@ -1,6 +1,6 @@
 //! Small surfaces that are wrong more often than not.
 
-use super::AGREE;
+use super::check::AGREE;
 use crate::{DisparityMap, Error, memory};
 
 /// Makes surfaces of fewer than `least` pixels unknown: pixels joined over sides, each within [`AGREE`] of the next.

@@ -1,7 +1,7 @@
 //! Fractions of disparities.
 
 use super::{
-    AGREE,
+    check::AGREE,
     window::{Frame, Framed},
 };
 use crate::{DisparityMap, Error};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{LONGEST_SIDE, codes};
+use super::{codes, shrink::LONGEST_SIDE};
 use crate::{DisparityMap, Error, StereoPair, maps, memory};
 
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.

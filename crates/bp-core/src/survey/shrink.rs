@@ -1,7 +1,9 @@
 //! Smaller copies of the images.
 
-use super::LONGEST_SIDE;
 use crate::{Error, Image, Size, StereoPair, image::grey, memory};
+
+/// Longest side of the shrunk images in pixels: half of it either way gives disparities that fit 8 bits.
+pub const LONGEST_SIDE: usize = 200;
 
 /// By what both sides are divided.
 pub(super) fn factor(size: Size) -> usize {

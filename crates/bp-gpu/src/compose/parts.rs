@@ -2,7 +2,10 @@
 
 use bp_core::{MessageStart, Schedule, Side, image::APRON};
 
-use super::{Composer, Nodes, PartRecorder, Rows, Work};
+use super::{
+    composer::{Composer, Nodes, Rows, Work},
+    recorder::PartRecorder,
+};
 use crate::{
     Command, Kernel, Parameters, Pipeline, Program,
     answer::{SEED_BYTES, image_bytes, label_bytes},
@@ -71,16 +74,6 @@ impl Composer<'_> {
     fn whole_grid(&self, grid: usize, colour: usize) -> Work {
         let count = self.grids[grid].size.height;
         self.work(Nodes { grid, strip: 0, colour }, Rows { first: 0, step: 1, count })
-    }
-
-    /// The grey values of a grid, or, where a kernel is to read none, costs that it is given anyway.
-    fn greys_read(&self, nodes: Nodes) -> usize {
-        self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
-    }
-
-    /// Whether kernels are to look for weak edges, as a constant of theirs.
-    fn looks_for_weak_edges(&self) -> (&'static str, u32) {
-        ("WEAK", self.buffers.greys.is_some().into())
     }
 
     /// The buffers that data costs of these nodes are stored to.
@@ -186,29 +179,6 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }
 
-    pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
-        let constants = vec![
-            ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
-            ("SELECTIVE", selective.into()),
-            self.looks_for_weak_edges(),
-        ];
-        Pipeline { kernel: Kernel::UpdateMessages, constants }
-    }
-
-    /// Data cost, what the other colour sent, what these nodes send, and grey values.
-    pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
-        let strip = self.strip(nodes);
-        let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
-        let sent = strip.sent[written].map(|side| side[nodes.colour]);
-        [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
-    }
-
-    /// Whether a stored data cost plus so many messages plus `more` may pass 255, as 1 or 0.
-    fn saturates(&self, messages: u32, more: u8) -> u32 {
-        let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
-        (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()
-    }
-
     /// Copies what was sent across the border of two strips to where the other strip looks for it.
     fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, colours: &[usize]) {
         let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
@@ -248,22 +218,5 @@ impl Composer<'_> {
         let (from, bytes) = (self.buffers.labels, label_bytes(self.plan.image_size()));
         part.push_short(Command::Barrier);
         part.push_short(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
-    }
-
-    pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
-        let sweep = self.plan.settings().schedule == Schedule::Sweep;
-        let constants = vec![
-            ("SATURATING", self.saturates(4, 0)),
-            ("SWEEP", sweep.into()),
-            self.looks_for_weak_edges(),
-            ("BAND_ROWS", bp_core::BAND_ROWS as u32),
-        ];
-        let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
-        let set = self.set(self.plan.settings().steps);
-        let strip = self.strip(nodes);
-        let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
-        let bound =
-            [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels, self.greys_read(nodes)]].concat();
-        self.dispatch(part, pipeline, bound, work);
     }
 }

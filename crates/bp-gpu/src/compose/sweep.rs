@@ -2,32 +2,44 @@
 
 use bp_core::{BAND_ROWS, Side};
 
-use super::{Composer, Nodes, PartRecorder, Rows};
+use super::{
+    composer::{Composer, Nodes, Rows},
+    recorder::PartRecorder,
+};
 use crate::Command;
 
 const EVEN: usize = 0;
 const ODD: usize = 1;
+
+/// The nodes of one colour in the same row of every band of a grid.
+#[derive(Clone, Copy)]
+struct BandRow {
+    grid: usize,
+    colour: usize,
+    /// Counted from the first row of the band.
+    row: usize,
+}
 
 impl Composer<'_> {
     /// One loop on a grid: forward and backward through every band, see [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, part: &mut PartRecorder, grid: usize) {
         let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
         for row in 0..last {
-            self.send(part, (grid, EVEN, row), &[Side::Left, Side::Right, Side::Down]);
-            self.send(part, (grid, ODD, row), &[Side::Down]);
+            self.send(part, BandRow { grid, colour: EVEN, row }, &[Side::Left, Side::Right, Side::Down]);
+            self.send(part, BandRow { grid, colour: ODD, row }, &[Side::Down]);
         }
-        self.send(part, (grid, EVEN, last), &horizontal);
+        self.send(part, BandRow { grid, colour: EVEN, row: last }, &horizontal);
         for row in (1..=last).rev() {
-            self.send(part, (grid, ODD, row), &[Side::Left, Side::Right, Side::Up]);
-            self.send(part, (grid, EVEN, row), &[Side::Up]);
+            self.send(part, BandRow { grid, colour: ODD, row }, &[Side::Left, Side::Right, Side::Up]);
+            self.send(part, BandRow { grid, colour: EVEN, row }, &[Side::Up]);
         }
-        self.send(part, (grid, ODD, 0), &horizontal);
+        self.send(part, BandRow { grid, colour: ODD, row: 0 }, &horizontal);
     }
 
     /// The nodes of one colour in one row of every band send to these sides.
-    fn send(&mut self, part: &mut PartRecorder, (grid, colour, row): (usize, usize, usize), sides: &[Side]) {
+    fn send(&mut self, part: &mut PartRecorder, at: BandRow, sides: &[Side]) {
         let pipeline = self.update_pipeline(true);
-        for (nodes, rows) in self.band_rows(grid, colour, row) {
+        for (nodes, rows) in self.band_rows(at) {
             let mut work = self.work(nodes, rows);
             work.parameters.sends = sides.iter().map(|&side| 1 << side as u32).sum();
             let bound = self.messages(nodes, 0, 0);
@@ -39,7 +51,7 @@ impl Composer<'_> {
     /// Labels of every band from its top row to its bottom row, in a row first of even nodes.
     pub(super) fn decode(&mut self, part: &mut PartRecorder) {
         for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
-            for (nodes, rows) in self.band_rows(0, colour, row) {
+            for (nodes, rows) in self.band_rows(BandRow { grid: 0, colour, row }) {
                 self.select(part, nodes, self.work(nodes, rows));
             }
             part.push_short(Command::Barrier);
@@ -47,7 +59,8 @@ impl Composer<'_> {
     }
 
     /// The row so far below the first one of every band, in each strip that has any; strips begin with a band.
-    fn band_rows(&self, grid: usize, colour: usize, row: usize) -> Vec<(Nodes, Rows)> {
+    fn band_rows(&self, at: BandRow) -> Vec<(Nodes, Rows)> {
+        let BandRow { grid, colour, row } = at;
         let strips = self.grids[grid].strips.iter().enumerate();
         let rows = strips.map(|(strip, &layout)| {
             let count = layout.rows.saturating_sub(row).div_ceil(BAND_ROWS);

@@ -1,6 +1,6 @@
 //! The model as defined, computed in the obvious way: what the oracle knows between two kernels.
 
-use bp_core::{Plan, Side};
+use bp_core::{Node, Plan, Side};
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
@@ -34,10 +34,9 @@ impl State {
         Self { grids: (0..plan.grids()).map(grid).collect(), plan: plan.clone() }
     }
 
-    /// The nodes of a grid: index, column and row.
-    pub(super) fn nodes(&self, grid: usize) -> impl Iterator<Item = (usize, (usize, usize))> + use<> {
-        let width = self.plan.size(grid).width;
-        (0..self.plan.size(grid).pixels()).map(move |node| (node, (node % width, node / width)))
+    /// The index of a node in the lists of its grid.
+    pub(super) fn index(&self, grid: usize, node: Node) -> usize {
+        self.plan.size(grid).index(node)
     }
 
     /// Makes the costs of a grid from their sums.
@@ -52,25 +51,20 @@ impl State {
         }
     }
 
-    /// The smoothness cost of labels a and d at the ends of the edge from (x, y) to that side.
-    pub(super) fn smoothness(
-        &self,
-        grid: usize,
-        (x, y): (usize, usize),
-        side: Side,
-    ) -> impl Fn(usize, usize) -> i64 + use<> {
-        let (model, width) = (self.plan.model(), self.plan.size(grid).width);
+    /// The smoothness cost of labels a and d at the ends of the edge from `node` to that side.
+    pub(super) fn smoothness(&self, grid: usize, node: Node, side: Side) -> impl Fn(usize, usize) -> i64 + use<> {
+        let model = self.plan.model();
         let (slope, truncation) = (i64::from(model.slope()), i64::from(model.truncation()));
-        let grey = |(x, y): (usize, usize)| self.grids[grid].greys[y * width + x];
-        let difference = self.plan.neighbour(grid, (x, y), side).map_or(0, |other| grey((x, y)) - grey(other));
+        let grey = |node| self.grids[grid].greys[self.index(grid, node)];
+        let difference = self.plan.neighbour(grid, node, side).map_or(0, |other| grey(node) - grey(other));
         let is_weak = model.weak_edges().is_some_and(|threshold| difference.abs() > threshold.into());
         let (slope, truncation) = if is_weak { (slope / 2, truncation / 2) } else { (slope, truncation) };
         move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
     }
 
     /// What the node at `from` sends, given what it `received`: all but what came from the receiver, `to`.
-    pub(super) fn message(&self, grid: usize, from: (usize, usize), received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
-        let costs = &self.grids[grid].costs[from.1 * self.plan.size(grid).width + from.0];
+    pub(super) fn message(&self, grid: usize, from: Node, received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
+        let costs = &self.grids[grid].costs[self.index(grid, from)];
         let smoothness = self.smoothness(grid, from, to);
         let sources = || Side::ALL.into_iter().filter(|&side| side != to);
         let h: Vec<i64> = (0..costs.len())

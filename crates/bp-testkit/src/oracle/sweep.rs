@@ -2,12 +2,17 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Side};
+use bp_core::{BAND_ROWS, Node, Side};
 
 use super::state::State;
 
 const EVEN: usize = 0;
 const ODD: usize = 1;
+
+/// The even or odd nodes of row y.
+fn row_nodes(width: usize, y: usize, parity: usize) -> impl Iterator<Item = Node> {
+    (0..width).filter(move |x| (x + y) % 2 == parity).map(move |x| Node { x, y })
+}
 
 impl State {
     /// One loop of [`bp_core::Schedule::Sweep`].
@@ -48,42 +53,43 @@ impl State {
         let width = self.plan.size(grid).width;
         let received = &self.grids[grid].received;
         let mut messages = Vec::new();
-        for x in (0..width).filter(|x| (x + y) % 2 == parity) {
+        for node in row_nodes(width, y, parity) {
             for &to in sides {
-                messages.push((x, to, self.message(grid, (x, y), &received[y * width + x], to)));
+                messages.push((node, to, self.message(grid, node, &received[self.index(grid, node)], to)));
             }
         }
-        for (x, to, message) in messages {
-            if let Some((to_x, to_y)) = self.plan.neighbour(grid, (x, y), to) {
-                self.drop_edge(grid, (x, y), to);
-                self.grids[grid].received[to_y * width + to_x][to.opposite() as usize] = message;
+        for (node, to, message) in messages {
+            if let Some(receiver) = self.plan.neighbour(grid, node, to) {
+                self.drop_edge(grid, node, to);
+                let receiver = self.index(grid, receiver);
+                self.grids[grid].received[receiver][to.opposite() as usize] = message;
             }
         }
     }
 
-    /// Sets what the edge from (x, y) to that side holds, whichever way it went, to zeros.
-    fn drop_edge(&mut self, grid: usize, (x, y): (usize, usize), side: Side) {
-        let width = self.plan.size(grid).width;
-        if let Some((other_x, other_y)) = self.plan.neighbour(grid, (x, y), side) {
-            self.grids[grid].received[y * width + x][side as usize].fill(0);
-            self.grids[grid].received[other_y * width + other_x][side.opposite() as usize].fill(0);
+    /// Sets both messages of the edge from `node` to that side to zeros.
+    fn drop_edge(&mut self, grid: usize, node: Node, side: Side) {
+        if let Some(other) = self.plan.neighbour(grid, node, side) {
+            let [node, other] = [node, other].map(|node| self.index(grid, node));
+            self.grids[grid].received[node][side as usize].fill(0);
+            self.grids[grid].received[other][side.opposite() as usize].fill(0);
         }
     }
 
-    /// The first message that the node at (x, y) holds from `side`, where it has a neighbour.
-    pub(super) fn first_sweep_message(&self, grid: usize, (x, y): (usize, usize), side: Side) -> Option<Vec<i64>> {
-        let (parent_x, parent_y) = (x / 2, y / 2);
-        let even_parent = (parent_x + parent_y).is_multiple_of(2);
+    /// The first message that a node holds from `side`, where it has a neighbour.
+    pub(super) fn first_sweep_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
+        let parent = node.parent();
         let coarse = self.plan.size(grid + 1);
         let receiver_x = match side {
             Side::Up => return None,
-            Side::Down => parent_x,
-            Side::Left | Side::Right if !(x + y).is_multiple_of(2) => return None,
-            Side::Left | Side::Right if even_parent => parent_x,
-            Side::Left => parent_x.checked_sub(1)?,
-            Side::Right => Some(parent_x + 1).filter(|&x| x < coarse.width)?,
+            Side::Down => parent.x,
+            Side::Left | Side::Right if !node.is_even() => return None,
+            Side::Left | Side::Right if parent.is_even() => parent.x,
+            Side::Left => parent.x.checked_sub(1)?,
+            Side::Right => Some(parent.x + 1).filter(|&x| x < coarse.width)?,
         };
-        Some(self.grids[grid + 1].received[parent_y * coarse.width + receiver_x][side as usize].clone())
+        let receiver = self.index(grid + 1, Node { x: receiver_x, y: parent.y });
+        Some(self.grids[grid + 1].received[receiver][side as usize].clone())
     }
 
     /// Decides labels one after another.
@@ -92,30 +98,29 @@ impl State {
         for rows in self.bands(0) {
             for y in rows.clone() {
                 for parity in [EVEN, ODD] {
-                    for x in (0..width).filter(|x| (x + y) % 2 == parity) {
-                        labels[y * width + x] = self.decide((x, y), y == rows.start, labels);
+                    for node in row_nodes(width, y, parity) {
+                        labels[self.index(0, node)] = self.decide(node, y == rows.start, labels);
                     }
                 }
             }
         }
     }
 
-    /// The smallest best label of (x, y), given those decided before.
-    fn decide(&self, (x, y): (usize, usize), first_row: bool, labels: &[u16]) -> u16 {
-        let even = (x + y).is_multiple_of(2);
+    /// The smallest best label of a node, given the labels decided before.
+    fn decide(&self, node: Node, first_row: bool, labels: &[u16]) -> u16 {
+        let even = node.is_even();
         let messages: &[Side] = if even { &[Side::Left, Side::Right, Side::Down] } else { &[Side::Down] };
         let decided: &[Side] = if even { &[Side::Up] } else { &[Side::Up, Side::Left, Side::Right] };
-        let width = self.plan.image_size().width;
-        let node = y * width + x;
+        let index = self.index(0, node);
         let sum = |d: &u16| {
-            let mut sum = self.grids[0].costs[node][usize::from(*d)];
+            let mut sum = self.grids[0].costs[index][usize::from(*d)];
             for &side in messages {
-                sum += self.grids[0].received[node][side as usize][usize::from(*d)];
+                sum += self.grids[0].received[index][side as usize][usize::from(*d)];
             }
             for &side in decided.iter().filter(|&&side| !(first_row && side == Side::Up)) {
-                if let Some((other_x, other_y)) = self.plan.neighbour(0, (x, y), side) {
-                    let other = usize::from(labels[other_y * width + other_x]);
-                    sum += self.smoothness(0, (x, y), side)(usize::from(*d), other);
+                if let Some(other) = self.plan.neighbour(0, node, side) {
+                    let other = usize::from(labels[self.index(0, other)]);
+                    sum += self.smoothness(0, node, side)(usize::from(*d), other);
                 }
             }
             sum

@@ -1,5 +1,6 @@
 //! Surfaces: where they lie in the left image, how near they are, what they show.
 
+use super::spot::Spot;
 use super::texture::{NOISE_BOUND, Paint, noise};
 
 /// Which camera.
@@ -94,20 +95,6 @@ pub(super) struct Folds {
     pub(super) seed: u32,
 }
 
-/// A place in a surface's own coordinates.
-#[derive(Clone, Copy)]
-pub(super) struct Spot {
-    /// Share of the spine, 0..=1 inside.
-    pub(super) t: f64,
-    /// Distance from the spine as a share of the greatest half width; with sign.
-    pub(super) aside: f64,
-    /// The half width here as a share of the greatest.
-    pub(super) rim: f64,
-    /// Pixels along and across the spine.
-    pub(super) along: f64,
-    pub(super) across: f64,
-}
-
 impl Surface {
     pub(super) fn new(strip: Strip, relief: Relief, paint: Paint) -> Self {
         Self { bounds: Bounds::new(&strip, &relief), strip, relief, paint }
@@ -183,12 +170,6 @@ impl Bounds {
     fn hold(&self, view: View, x: f64, y: f64) -> bool {
         let within = |(low, high): (f64, f64), value: f64| low <= value && value <= high;
         within(self.rows, y) && within(self.columns[view as usize], x - self.lean * y)
-    }
-}
-
-impl Spot {
-    fn is_inside(&self) -> bool {
-        0.0 <= self.t && self.t <= 1.0 && self.aside.abs() <= self.rim
     }
 }
 

@@ -1,6 +1,6 @@
 //! Band-limited procedural textures from integer hashes: the same bits on every machine.
 
-use super::surface::Spot;
+use super::spot::Spot;
 
 /// The paint of a surface: a pattern in 0..=1 looked up on a ramp of colours.
 #[derive(Clone, Copy)]

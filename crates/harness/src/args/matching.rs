@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bp_core::{Algorithm, MAX_TRUNCATION, MessageStart, Profile, Schedule, image::MAX_SIDE};
+use bp_core::{Algorithm, MAX_SIDE, MAX_TRUNCATION, MessageStart, Profile, Schedule};
 use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 

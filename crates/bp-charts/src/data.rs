@@ -1,0 +1,69 @@
+//! What charts show.
+
+use plotters::style::RGBColor;
+
+use crate::{Style, canvas::INK, style::colour};
+
+/// A number and its interval, whose ends equal it where there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Value {
+    /// The number.
+    pub value: f64,
+    /// Where its interval begins.
+    pub low: f64,
+    /// Where its interval ends.
+    pub high: f64,
+}
+
+impl From<f64> for Value {
+    /// The number without an interval.
+    fn from(value: f64) -> Self {
+        Self { value, low: value, high: value }
+    }
+}
+
+/// What has one name and one look.
+#[derive(Clone, Debug)]
+pub struct Series<P> {
+    /// Its name.
+    pub name: String,
+    /// Its look.
+    pub style: Style,
+    /// What is drawn.
+    pub points: Vec<P>,
+}
+
+/// An entry of a legend.
+#[derive(Clone, Debug)]
+pub struct Key {
+    /// What looks like this.
+    pub name: String,
+    /// The look.
+    pub style: Style,
+}
+
+/// What a legend names: the keys or, where there are none, the series.
+pub(crate) fn entries<'a, P>(keys: &'a [Key], series: &'a [Series<P>]) -> Vec<(&'a str, Style)> {
+    match keys {
+        [] => series.iter().map(|series| (series.name.as_str(), series.style)).collect(),
+        keys => keys.iter().map(|key| (key.name.as_str(), key.style)).collect(),
+    }
+}
+
+/// A value to compare with, drawn as a dashed line from left to right.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// Its name in the legend.
+    pub name: String,
+    /// Where it lies on the vertical axis.
+    pub value: f64,
+    /// The number of its colour; none for that of the text.
+    pub colour: Option<usize>,
+}
+
+impl Level {
+    /// The colour of its line.
+    pub(crate) fn line_colour(&self) -> RGBColor {
+        self.colour.map_or(INK, colour)
+    }
+}

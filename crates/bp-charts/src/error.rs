@@ -1,0 +1,6 @@
+//! Why charts fail.
+
+/// Why a chart could not be drawn, in words.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Error(pub(crate) String);

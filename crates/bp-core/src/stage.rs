@@ -1,0 +1,33 @@
+//! The stages of a solve.
+
+/// A timed stage: the kernel of the same name, over all grids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Data costs of the image.
+    MatchCost,
+    /// Data costs of the coarser grids.
+    Coarsen,
+    /// First messages of every grid.
+    Refine,
+    /// Message passing.
+    UpdateMessages,
+    /// Labels of least belief.
+    SelectLabels,
+}
+
+impl Stage {
+    /// All stages, in the order in which they first run.
+    pub const ALL: [Self; 5] = [Self::MatchCost, Self::Coarsen, Self::Refine, Self::UpdateMessages, Self::SelectLabels];
+
+    /// The name of stage and kernel.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MatchCost => "match_cost",
+            Self::Coarsen => "coarsen",
+            Self::Refine => "refine",
+            Self::UpdateMessages => "update_messages",
+            Self::SelectLabels => "select_labels",
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! A program in the making: records dispatches with their buffers and parameters.
+
+use bp_core::{Plan, Schedule};
+use indexmap::IndexSet;
+
+use super::{
+    buffers::{Buffers, StripBuffers},
+    recorder::PartRecorder,
+};
+use crate::{BindGroup, Command, Limits, Parameters, Pipeline, WORKGROUP, layout::Grid};
+
+/// Alignment of dynamic offsets: the most that any device asks for.
+pub(super) const PARAMETERS_ALIGNMENT: usize = 256;
+
+/// Which nodes a dispatch computes.
+#[derive(Clone, Copy)]
+pub(super) struct Nodes {
+    pub(super) grid: usize,
+    pub(super) strip: usize,
+    pub(super) colour: usize,
+}
+
+/// Which rows of a strip a kernel computes.
+#[derive(Clone, Copy)]
+pub(super) struct Rows {
+    pub(super) first: usize,
+    pub(super) step: usize,
+    pub(super) count: usize,
+}
+
+/// A program in the making.
+pub(super) struct Composer<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) limits: &'a Limits,
+    pub(super) grids: &'a [Grid],
+    pub(super) buffers: &'a Buffers,
+    pub(super) parameters: IndexSet<Parameters>,
+    pub(super) pipelines: IndexSet<Pipeline>,
+    pub(super) bind_groups: IndexSet<BindGroup>,
+}
+
+/// Parameters of a dispatch, its rows, and how many invocations a row takes.
+pub(super) struct Work {
+    pub(super) parameters: Parameters,
+    pub(super) rows: Rows,
+    pub(super) row_invocations: usize,
+}
+
+impl Composer<'_> {
+    /// Which set of message buffers holds what was sent before a step. Under [`Schedule::Sync`] a step reads one set and
+    /// writes the other.
+    pub(super) fn set(&self, step: u32) -> usize {
+        if self.plan.settings().schedule == Schedule::Sync { step as usize % 2 } else { 0 }
+    }
+
+    /// Records dispatches of a kernel to rows of a strip, as many as the limits ask for.
+    pub(super) fn dispatch(&mut self, part: &mut PartRecorder, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
+        let kernel = pipeline.kernel;
+        let pipeline = self.pipelines.insert_full(pipeline).0;
+        let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
+        let most = self.rows_per_dispatch(&work);
+        for done in (0..work.rows.count).step_by(most) {
+            let rows = most.min(work.rows.count - done);
+            let row = work.rows.first + done * work.rows.step;
+            let row_step = work.rows.step as u32;
+            let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
+            let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
+            let workgroups = (rows * work.row_invocations).div_ceil(WORKGROUP as usize) as u32;
+            let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
+            part.push(command, rows as u64 * self.row_entries(&work));
+        }
+    }
+
+    /// Message entries that a row of this work is worth: an invocation makes four messages at four nodes for every label,
+    /// or does less.
+    fn row_entries(&self, work: &Work) -> u64 {
+        work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
+    }
+
+    /// How many rows a dispatch may compute.
+    fn rows_per_dispatch(&self, work: &Work) -> usize {
+        let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
+        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / work.row_invocations.max(1);
+        usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
+    }
+
+    /// The parameters of a strip's nodes of one colour, on rows that are still to be told.
+    pub(super) fn work(&self, nodes: Nodes, rows: Rows) -> Work {
+        let grid = &self.grids[nodes.grid];
+        let (model, cut) = (self.plan.model(), self.plan.settings().cut);
+        let parameters = Parameters {
+            width: grid.size.width as u32,
+            height: grid.size.height as u32,
+            words: grid.words as u32,
+            labels: model.labels() as u32,
+            quads: grid.quads as u32,
+            first_row: grid.strips[nodes.strip].first as u32,
+            colour: nodes.colour as u32,
+            slope: model.slope().into(),
+            truncation: model.truncation().into(),
+            step: model.smoothness().step().into(),
+            weak_slope: model.smoothness().weakened().slope.into(),
+            weak_truncation: model.smoothness().weakened().truncation.into(),
+            weak_step: model.smoothness().weakened().step().into(),
+            edge_threshold: model.weak_edges().unwrap_or(u8::MAX).into(),
+            clip: self.plan.clip(nodes.grid).into(),
+            min_disparity: model.min_disparity(),
+            padding_cost: model.clip().into(),
+            cut_x: cut.map_or(0, |cut| cut.x as u32),
+            cut_y: cut.map_or(0, |cut| cut.y as u32),
+            ..Parameters::default()
+        };
+        Work { parameters, rows, row_invocations: grid.words }
+    }
+
+    /// All rows of a strip.
+    pub(super) fn all_rows(&self, nodes: Nodes) -> Work {
+        let count = self.grids[nodes.grid].strips[nodes.strip].rows;
+        self.work(nodes, Rows { first: 0, step: 1, count })
+    }
+
+    /// The nodes of every strip and colour of a grid.
+    pub(super) fn nodes(&self, grid: usize) -> impl Iterator<Item = Nodes> + use<> {
+        let strips = 0..self.grids[grid].strips.len();
+        strips.flat_map(move |strip| [0, 1].map(|colour| Nodes { grid, strip, colour }))
+    }
+
+    pub(super) fn strip(&self, nodes: Nodes) -> &StripBuffers {
+        &self.buffers.strips[nodes.grid][nodes.strip]
+    }
+}

@@ -1,0 +1,61 @@
+//! The buffers and constants of the kernels that read messages: `update_messages` and `select_labels`.
+
+use bp_core::Schedule;
+
+use super::{
+    composer::{Composer, Nodes, Work},
+    recorder::PartRecorder,
+};
+use crate::{Kernel, Pipeline};
+
+impl Composer<'_> {
+    /// The grey values of a grid, or, where a kernel is to read none, costs that it is given anyway.
+    pub(super) fn greys_read(&self, nodes: Nodes) -> usize {
+        self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
+    }
+
+    /// Whether kernels are to look for weak edges, as a constant of theirs.
+    fn looks_for_weak_edges(&self) -> (&'static str, u32) {
+        ("WEAK", self.buffers.greys.is_some().into())
+    }
+
+    pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
+        let constants = vec![
+            ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
+            ("SELECTIVE", selective.into()),
+            self.looks_for_weak_edges(),
+        ];
+        Pipeline { kernel: Kernel::UpdateMessages, constants }
+    }
+
+    /// Data cost, what the other colour sent, what these nodes send, and grey values.
+    pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
+        let strip = self.strip(nodes);
+        let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
+        let sent = strip.sent[written].map(|side| side[nodes.colour]);
+        [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
+    }
+
+    /// Whether a stored data cost plus so many messages plus `more` may pass 255, as 1 or 0.
+    fn saturates(&self, messages: u32, more: u8) -> u32 {
+        let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
+        (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()
+    }
+
+    pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
+        let sweep = self.plan.settings().schedule == Schedule::Sweep;
+        let constants = vec![
+            ("SATURATING", self.saturates(4, 0)),
+            ("SWEEP", sweep.into()),
+            self.looks_for_weak_edges(),
+            ("BAND_ROWS", bp_core::BAND_ROWS as u32),
+        ];
+        let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
+        let set = self.set(self.plan.settings().steps);
+        let strip = self.strip(nodes);
+        let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
+        let bound =
+            [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels, self.greys_read(nodes)]].concat();
+        self.dispatch(part, pipeline, bound, work);
+    }
+}
