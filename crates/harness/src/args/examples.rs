@@ -1,4 +1,4 @@
-//! What `--help` shows below the options.
+//! Examples below the options.
 
 use crate::failure;
 
@@ -15,8 +15,8 @@ Examples:
 
 {}
 
-Standard output has results, or JSON alone with --json; standard error has the rest. RUST_LOG=debug logs what is
-opened, prepared and solved; NO_COLOR=1 leaves out colours.",
+Results go to standard output, or only JSON with --json; everything else goes to standard error. RUST_LOG=debug logs
+what is opened, prepared and solved. NO_COLOR=1 turns colours off.",
         failure::exit_codes()
     )
 }
@@ -27,7 +27,7 @@ Examples:
   bp match left.png right.png --output map.pfm --labels auto
   bp match left.png right.png --output map.png --algorithm bp --profile thesis --labels 112
   bp match left.png right.png --output map.pfm --ground-truth truth.png --scale 2 --json
-  bp match --pairs dataset --output maps                        # the same again goes on where it was
+  bp match --pairs dataset --output maps                        # run it again to resume
   bp match --pairs list.csv --output maps --shard 2/4           # the second of four processes
   bp match --video 'left/%04d.png' 'right/%04d.png' --output maps --format png --also picture";
 

@@ -11,26 +11,30 @@ use super::{named, switch};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "After matching, in this order")]
 pub(crate) struct FinishArgs {
-    /// Match the right image too, and make unknown what the two maps do not agree on within a pixel: hidden pixels, and
-    /// most wrong ones. Takes twice the time.
+    /// Match the right image too, and drop pixels on which the two maps disagree.
+    ///
+    /// They disagree by more than a pixel at occluded pixels, and at most wrong ones. It takes twice the time. Dropped pixels
+    /// are filled unless --fill off.
     #[arg(long, value_parser = named(&[()], |()| "left-right"))]
     pub(crate) check: Option<()>,
-    /// Make unknown what belongs to a surface of fewer than N pixels.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Drop surfaces of fewer than N pixels.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) speckle: Option<u32>,
-    /// Whether unknown pixels are filled from the row, by the farther one of the next surfaces. [default: on]
-    #[arg(long, value_parser = named(&[true, false], switch))]
+    /// Whether dropped pixels are filled from their row, by the farther one of the next surfaces. [default: on]
+    #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) fill: Option<bool>,
-    /// Take the median of windows of N x N pixels: 3, 5 or 7.
+    /// Take the median of N x N pixels.
     #[arg(long, value_name = "N", value_parser = named(&MEDIANS, side))]
     pub(crate) median: Option<usize>,
-    /// Give fractions of disparities: the mean of those in a window of 9 x 9 that are within a pixel.
-    #[arg(long)]
+    /// Give fractions of disparities: the mean of those in 9 x 9 pixels that lie within a pixel.
+    #[arg(long, hide_short_help = true)]
     pub(crate) subpixel: bool,
-    /// Also write how far the map can be trusted, from 0 to 1: the share of 9 x 9 pixels that agree with their middle
-    /// and with the right image's map, as matched; 0 where --check or --speckle made the disparity unknown, filled or
-    /// not. .pfm, .tif and .npy as 32-bit floats, .png 65535 times them. Matches the right image too.
-    #[arg(long, value_name = "MAP")]
+    /// Write a confidence from 0 to 1 for each pixel.
+    ///
+    /// It is the share of 9 x 9 pixels that agree with their middle and with the right image's map, as matched; 0 where
+    /// --check or --speckle dropped the pixel, filled or not. .pfm, .tif and .npy hold 32-bit floats, .png 65535 times them.
+    /// Matches the right image too.
+    #[arg(long, value_name = "MAP", hide_short_help = true)]
     pub(crate) confidence: Option<PathBuf>,
 }
 
