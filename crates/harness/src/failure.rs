@@ -24,7 +24,7 @@ enum Kind {
     Interrupted,
 }
 
-/// What the exit codes mean, in their order; help, man page and README take it from here.
+/// What the exit codes mean, in their order; help, man page and docs/matching.md take it from here.
 pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
     (0, "done"),
     (1, "other"),
@@ -193,9 +193,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_readme_lists_the_exit_codes() {
-        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-        let readme = include_str!("../../../README.md");
-        assert!(words(readme).contains(&exit_codes()), "{}", exit_codes());
+    fn the_documentation_lists_the_exit_codes() {
+        let page = include_str!("../../../docs/matching.md");
+        for (code, meaning) in EXIT_CODES {
+            assert!(page.contains(&format!("| {code} | {meaning} |")), "{code} {meaning}");
+        }
     }
 }
