@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bp_core::maps::{Finish, MEDIANS};
+use bp_core::finish::{Finish, MEDIANS};
 use clap::Args;
 
 use super::{named, switch};

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bp_core::{
     DisparityMap, Error, StereoPair, Times,
-    maps::{self, Finish},
+    finish::{self, Finish},
 };
 
 use crate::args::FinishArgs;
@@ -28,7 +28,7 @@ impl Sample {
 /// A map that is done.
 pub(super) struct Finished {
     pub(super) map: DisparityMap,
-    /// See [`maps::confidence`], 0 where the check or speckles made the disparity unknown; where it was asked for.
+    /// See [`finish::confidence`], 0 where the check or speckles made the disparity unknown; where it was asked for.
     pub(super) confidence: Option<Vec<f32>>,
     pub(super) sample: Sample,
 }
@@ -50,7 +50,7 @@ pub(super) fn finished<E: From<Error>>(
     let right = args.needs_right().then(|| matched(&pair.mirrored())).transpose()?.map(DisparityMap::mirrored);
     let left = matched(pair)?;
     let trust = right.as_ref().filter(|_| args.confidence.is_some());
-    let mut confidence = trust.map(|right| maps::confidence(&left, right)).transpose()?;
+    let mut confidence = trust.map(|right| finish::confidence(&left, right)).transpose()?;
     let finish: Finish = args.finish();
     let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
     let judged = judge.apply(left, right.as_ref())?;
