@@ -13,7 +13,7 @@ pub enum Algorithm {
     Sweep {
         /// Number of grids; none for five, or fewer where the image is small.
         #[serde(default)]
-        grids: Option<usize>,
+        grids: Option<u32>,
         /// Loops on each grid.
         #[serde(default = "one")]
         loops: u32,
@@ -105,7 +105,7 @@ impl Default for Loops {
 #[serde(default, deny_unknown_fields)]
 pub struct Hierarchy {
     /// Number of grids; none for the thesis's floor(log2 m), m being the width. Loops must then count on each grid.
-    pub grids: Option<usize>,
+    pub grids: Option<u32>,
     /// By which side finer grids take over messages.
     pub message_start: MessageStart,
     /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].

@@ -231,7 +231,7 @@ impl Settings {
             algorithm: algorithm.name().to_owned(),
             k: derived.k,
             z: derived.z,
-            grids: settings.grids,
+            grids: settings.grids as usize,
             steps_per_grid: settings.steps,
             schedule: settings.schedule.name().to_owned(),
             message_start: settings.message_start.name().to_owned(),
@@ -247,9 +247,9 @@ impl Settings {
 impl Finish {
     /// What a map goes through; `None` where that is nothing.
     #[must_use]
-    pub fn of(finish: bp_core::maps::Finish) -> Option<Self> {
-        let bp_core::maps::Finish { check, speckles, fill, median, subpixel } = finish;
-        (finish != bp_core::maps::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
+    pub fn of(finish: bp_core::finish::Finish) -> Option<Self> {
+        let bp_core::finish::Finish { check, speckles, fill, median, subpixel } = finish;
+        (finish != bp_core::finish::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
     }
 }
 

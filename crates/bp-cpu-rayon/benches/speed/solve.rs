@@ -34,7 +34,7 @@ impl Case<'_> {
 }
 
 /// Half-steps on each of so many grids, in checkerboard order.
-pub(crate) fn hierarchy(size: Size, grids: usize, steps: u32) -> Settings {
+pub(crate) fn hierarchy(size: Size, grids: u32, steps: u32) -> Settings {
     Settings { grids, steps, ..Algorithm::Cfbp.settings(size, 1, 1, Schedule::Checkerboard) }
 }
 

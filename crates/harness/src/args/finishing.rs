@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bp_core::maps::MEDIANS;
+use bp_core::finish::MEDIANS;
 use clap::Args;
 
 use super::{named, switch};

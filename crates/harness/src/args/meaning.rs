@@ -166,7 +166,7 @@ impl PlanArgs {
         let seed_start = self.seed_start.unwrap_or(true);
         Ok(match self.kind() {
             Kind::Sweep => Algorithm::Sweep {
-                grids: self.grids.map(usize::from),
+                grids: self.grids.map(u32::from),
                 loops: self.loops.unwrap_or(1),
                 coarse_clip: self.coarse_clip.unwrap_or(true),
             },
@@ -190,7 +190,7 @@ impl PlanArgs {
 
     fn hierarchy(&self) -> Hierarchy {
         Hierarchy {
-            grids: self.grids.map(usize::from),
+            grids: self.grids.map(u32::from),
             message_start: self.message_start.unwrap_or(MessageStart::Receiver),
             coarse_clip: self.coarse_clip.unwrap_or(false),
         }

@@ -17,7 +17,7 @@ pub(crate) struct Planned {
     pub(crate) z: Option<u32>,
     schedule: Schedule,
     /// Grids and steps on each, in place of the algorithm's own.
-    fixed: Option<(usize, u32)>,
+    fixed: Option<(u32, u32)>,
 }
 
 /// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and three of

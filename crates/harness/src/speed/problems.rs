@@ -23,7 +23,7 @@ enum Passing {
     /// So many synchronous loops on one grid.
     Loops(u32),
     /// On each of so many grids so many half-steps in checkerboard order.
-    HalfSteps(usize, u32),
+    HalfSteps(u32, u32),
     /// As [`Algorithm::Sweep`] says.
     Sweep,
 }

@@ -3,7 +3,7 @@
 
 use bp_core::{
     Algorithm, Backend, DisparityMap, Driver, GroundTruth, MapErrors, Model, Plan, Profile, Schedule, StereoPair,
-    maps::{self, Finish},
+    finish::{self, Finish},
 };
 use bp_cpu_rayon::Rayon;
 use bp_testkit::synthetic::{self, Scene};
@@ -63,7 +63,7 @@ fn what_passes_the_check_is_mostly_right_and_filling_lowers_errors() {
 fn trusted_pixels_are_right_more_often() {
     let [trusted, all] = over_scenes(|scene| {
         let [left, right] = both(&scene.pair);
-        let trust = maps::confidence(&left, &right).unwrap();
+        let trust = finish::confidence(&left, &right).unwrap();
         let mut sorted = trust.clone();
         sorted.sort_by(f32::total_cmp);
         let median = sorted[sorted.len() / 2];
@@ -78,7 +78,7 @@ fn trusted_pixels_are_right_more_often() {
 fn fractions_are_nearer_to_the_truth_than_labels() {
     let [fractions, labels] = over_scenes(|scene| {
         let [left, _] = both(&scene.pair);
-        [&maps::subpixel(&left).unwrap(), &left].map(|map| errors(scene, map).bad[0])
+        [&finish::subpixel(&left).unwrap(), &left].map(|map| errors(scene, map).bad[0])
     });
     assert!(fractions < 0.9 * labels, "{fractions} % wrong by more than half a pixel against {labels} %");
 }
