@@ -39,7 +39,7 @@ def enter_venv(folder):
 
 
 def build():
-    subprocess.run(["cargo", "build", "--quiet", "--release", "--locked", "--package", "harness"], cwd=ROOT, check=True)
+    subprocess.run(["cargo", "build", "--quiet", "--release", "--locked", "--bin", "bp"], cwd=ROOT, check=True)
 
 
 def bp(*words):
