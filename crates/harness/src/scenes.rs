@@ -171,7 +171,10 @@ fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
     Ok(Scene { record: described(scene, &pair, &truth, images), pair, truth })
 }
 
-/// What the public data files should be: `bench-data/middlebury.json`.
+/// The manifest as messages name it.
+const MANIFEST: &str = "crates/harness/data/middlebury.json";
+
+/// The expected checksums of the public data files: `data/middlebury.json`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Manifest {
@@ -197,13 +200,13 @@ pub(crate) struct ManifestEntry {
 impl Manifest {
     /// The manifest of this build.
     pub(crate) fn read() -> Result<Self, Failure> {
-        let text = include_str!("../../../bench-data/middlebury.json");
-        serde_json::from_str(text).map_err(|error| Failure::other(format!("bench-data/middlebury.json: {error}")))
+        let text = include_str!("../data/middlebury.json");
+        serde_json::from_str(text).map_err(|error| Failure::other(format!("{MANIFEST}: {error}")))
     }
 
     fn entry(&self, path: &str) -> Result<&ManifestEntry, Failure> {
         let entry = self.files.iter().find(|entry| entry.path == path);
-        entry.ok_or_else(|| Failure::other(format!("bench-data/middlebury.json does not list {path}")))
+        entry.ok_or_else(|| Failure::other(format!("{MANIFEST} does not list {path}")))
     }
 
     /// Reads a listed image and fails, with its name, where it is not the one listed.
@@ -217,7 +220,7 @@ impl Manifest {
             return Err(Failure::reading(path, &format!("{width}x{height} pixels instead of {expected}")));
         }
         if pixels_sha256(&image) != entry.sha256 {
-            let what = "its pixels are not those that bench-data/middlebury.json lists; delete it and fetch it again";
+            let what = format!("its pixels are not those that {MANIFEST} lists; delete it and fetch it again");
             return Err(Failure::reading(path, &what));
         }
         Ok(image)
