@@ -1,12 +1,10 @@
 //! The one list of backends, and how options name their devices.
 
-mod asked;
 #[cfg(test)]
 pub(crate) mod flaky;
 
 use std::time::{Duration, Instant};
 
-pub(crate) use asked::{Asked, open_all};
 use bp_core::{Backend, Device, DeviceInfo, Error};
 
 use crate::failure::Failure;

@@ -2,6 +2,8 @@
 
 use std::{io, path::Path};
 
+use crate::watch::Stopped;
+
 /// Why a command ended without its result.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
@@ -149,6 +151,12 @@ impl From<bp_core::Error> for Failure {
             _ => Kind::Other,
         };
         Self::new(kind, error.to_string())
+    }
+}
+
+impl From<Stopped> for Failure {
+    fn from(_: Stopped) -> Self {
+        Self::interrupted()
     }
 }
 

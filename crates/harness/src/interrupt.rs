@@ -3,18 +3,19 @@
 
 use std::{
     ops::ControlFlow,
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{LazyLock, Mutex, OnceLock, PoisonError},
     time::Duration,
 };
 
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 
-use crate::{failure::Failure, notes};
+use crate::{
+    failure::Failure,
+    notes,
+    watch::{Event, Stop, Watch},
+};
 
-static STOPPED: AtomicBool = AtomicBool::new(false);
+static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
 
 /// The bar that is shown: the first of those that there are, as a batch has one that its pairs have theirs below.
 static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
@@ -23,7 +24,7 @@ static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
 /// others are stopped by the system.
 pub(crate) fn listen() -> Result<(), Failure> {
     let stop = || {
-        if STOPPED.swap(true, Ordering::Relaxed) {
+        if STOP.stop() {
             std::process::exit(Failure::interrupted().code().into());
         }
     };
@@ -36,13 +37,49 @@ pub(crate) fn listen() -> Result<(), Failure> {
 
 /// Fails where the user has asked to stop.
 pub(crate) fn check() -> Result<(), Failure> {
-    if STOPPED.load(Ordering::Relaxed) { Err(Failure::interrupted()) } else { Ok(()) }
+    if STOP.is_stopped() { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
 /// Writes to standard error where a bar may be shown.
 pub(crate) fn beside_bar(write: impl FnOnce()) {
     let bar = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     bar.unwrap_or_else(indicatif::ProgressBar::hidden).suspend(write);
+}
+
+/// Does work whose events go to standard error, and which Ctrl-C stops if [`listen`] was called.
+pub(crate) fn watched<T>(work: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let bar = OnceLock::new();
+    work(&Watch::new(&|event| show(event, &bar), &STOP))
+}
+
+/// Shows an event. The bar appears with the first progress.
+fn show(event: Event<'_>, bar: &OnceLock<ProgressBar>) {
+    match event {
+        Event::Progress { done, total } => {
+            let bar = bar.get_or_init(|| {
+                let bar = ProgressBar::new(total);
+                bar.resume_at(done);
+                bar
+            });
+            bar.set_total(total);
+            bar.bar.set_position(done);
+            if done >= total {
+                bar.finish();
+            }
+        }
+        Event::Task(task) => {
+            if let Some(bar) = bar.get() {
+                bar.message(task.split_whitespace().collect::<Vec<_>>().join(" "));
+            }
+        }
+        Event::Line(line) => {
+            if !notes::is_quiet() {
+                notes::tell(line);
+            }
+        }
+        Event::Note(line) => notes::note(line),
+        Event::Warning(what) => notes::warn(what),
+    }
 }
 
 /// A bar on standard error, with the time left; not drawn where that is no terminal, where only errors are told, or where
@@ -70,7 +107,7 @@ impl ProgressBar {
     /// Shows how much is done; breaks where the user has asked to stop.
     pub(crate) fn update(&self, done: u64) -> ControlFlow<()> {
         self.bar.set_position(done);
-        if STOPPED.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if STOP.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// Starts from a run that was interrupted after so much: it says nothing about the time left.
@@ -87,13 +124,6 @@ impl ProgressBar {
     /// Shows what is being done.
     pub(crate) fn message(&self, message: String) {
         self.bar.set_message(message);
-    }
-
-    /// Prints a line above the bar, unless only errors are told.
-    pub(crate) fn line(&self, line: &str) {
-        if !notes::is_quiet() {
-            notes::tell(line);
-        }
     }
 
     /// Removes the bar.

@@ -20,6 +20,7 @@ mod heap;
 mod interrupt;
 mod machine;
 mod matching;
+mod measure;
 mod notes;
 mod panics;
 pub mod record;
@@ -27,6 +28,7 @@ pub mod report;
 pub mod reproduce;
 mod scenes;
 mod speed;
+mod statistics;
 mod summary;
 mod threads;
 pub mod watch;
@@ -59,7 +61,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Match(args) => command::match_pair(args),
         Command::Convert(args) => command::convert(args),
         Command::Evaluate(args) => command::evaluate(args),
-        Command::Reproduce(args) => reproduce::reproduce(args),
+        Command::Reproduce(args) => command::reproduce(args),
         Command::Report(args) => report::command(args),
         Command::Scenes(args) => command::scenes(args),
         Command::Devices(args) => threads::run_on(None, || command::devices(args)),

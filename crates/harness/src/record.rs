@@ -3,15 +3,20 @@
 
 mod from_core;
 mod load;
+mod sample;
 mod settings;
+pub mod speed;
 
-pub(crate) use from_core::clocks;
+pub(crate) use from_core::{clocks, milliseconds};
 #[cfg(feature = "fuzzing")]
 pub(crate) use load::parse;
-pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, load, record_file};
+pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, SPEED_FILE, load, load_speed, record_file};
+pub use sample::{Clock, Clocked, Sample, Stages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 pub use settings::{Cut, Finish, Settings};
+
+use crate::failure::Failure;
 
 /// Version of the schema; changes with every change of meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -173,11 +178,12 @@ pub struct Device {
 /// Numbers, or why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+#[schemars(rename = "Outcome")]
+pub enum Outcome<M = Measurement> {
     /// Not run yet.
     Pending,
     /// It ran.
-    Measured(Box<Measurement>),
+    Measured(Box<M>),
     /// It failed.
     Error(String),
     /// This machine lacks the backend's device, or the device is too small for the plan; no fault of the run.
@@ -202,55 +208,6 @@ pub struct Measurement {
     pub labels_sha256: String,
     /// The disparity map, a PNG of 16 bits (x256), beside the record.
     pub map: String,
-}
-
-/// One timed solve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sample {
-    /// Which round of taking turns it belongs to, from 0.
-    pub round: u32,
-    /// Milliseconds to allocate by the wall clock, apart from the total.
-    pub prepare_ms: f64,
-    /// Milliseconds of these that compiling kernels took, where the device compiles any.
-    #[serde(default)]
-    pub compile_ms: Option<f64>,
-    /// Milliseconds from images to labels by the wall clock.
-    pub total_ms: f64,
-    /// Milliseconds of each stage, by the wall clock first.
-    pub clocks: Vec<Clocked>,
-}
-
-/// A clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Clock {
-    /// The host's monotonic clock.
-    Wall,
-    /// The device's own clock.
-    Device,
-}
-
-/// Stage times by one clock.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Clocked {
-    /// The clock.
-    pub clock: Clock,
-    /// The times.
-    pub stages: Stages,
-}
-
-/// Milliseconds of each stage, over all grids.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
-pub struct Stages {
-    pub match_cost_ms: f64,
-    pub coarsen_ms: f64,
-    pub refine_ms: f64,
-    pub update_messages_ms: f64,
-    pub select_labels_ms: f64,
 }
 
 /// An energy in the units of its profile.
@@ -295,19 +252,20 @@ pub struct Labelling {
     pub energy: Energy,
 }
 
-impl Stages {
-    /// The stages in their order.
-    pub(crate) fn in_order(&self) -> [f64; 5] {
-        let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
-        [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
+impl<M> Outcome<M> {
+    /// What a failure leaves: a device that is too small for the plan is no fault of the run.
+    pub(crate) fn failed(failure: &Failure) -> Self {
+        let reason = failure.to_string();
+        if failure.is_beyond_device() { Self::Unavailable(reason) } else { Self::Error(reason) }
     }
-}
 
-impl Sample {
-    /// Milliseconds of message passing, `refine` and `update_messages`, by the device's clock where it has one.
+    /// The measurement, where there is one.
     #[must_use]
-    pub fn message_passing_ms(&self) -> f64 {
-        self.clocks.last().map_or(0.0, |clocked| clocked.stages.refine_ms + clocked.stages.update_messages_ms)
+    pub fn measured(&self) -> Option<&M> {
+        match self {
+            Self::Measured(measurement) => Some(measurement),
+            Self::Pending | Self::Error(_) | Self::Unavailable(_) => None,
+        }
     }
 }
 
@@ -315,10 +273,7 @@ impl Cell {
     /// The measurement, where there is one.
     #[must_use]
     pub fn measured(&self) -> Option<&Measurement> {
-        match &self.outcome {
-            Outcome::Measured(measurement) => Some(measurement),
-            Outcome::Pending | Outcome::Error(_) | Outcome::Unavailable(_) => None,
-        }
+        self.outcome.measured()
     }
 }
 

@@ -10,15 +10,16 @@ use crate::{args::GateArgs, failure::Failure, gate, interrupt, note, threads};
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
     if let Some(solve) = args.counted {
-        return solve.run();
+        return Ok(writeln!(std::io::stdout(), "{}", solve.run()?)?);
     }
     interrupt::listen()?;
     if args.instructions {
-        let judgement = threads::run_on(None, || gate::instructions(args))?;
+        let judgement =
+            threads::run_on(None, || interrupt::watched(|watch| gate::instructions(&args.baselines, watch)))?;
         print(args, &judgement, &judgement.page())?;
         return if args.update.is_some() { written(&judgement.update()?) } else { conclude(&judgement.failures()) };
     }
-    let judgement = threads::run_on(None, || gate::gate(args))?;
+    let judgement = threads::run_on(None, || interrupt::watched(|watch| gate::gate(&args.options(), watch)))?;
     print(args, &judgement, &gate::page(&judgement))?;
     if args.update.is_some() { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
 }

@@ -90,8 +90,10 @@ pub(crate) fn recorded_settings(
     let z = (!own && args.algorithm().divides_loops()).then(|| args.z.unwrap_or(2));
     let device = opened.device.as_ref();
     Ok(record::Settings {
+        k,
+        z,
         message_updates: tiling.message_updates(),
         planned_bytes: tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?,
-        ..record::Settings::new(plan, Some(device), args.algorithm(), (k, z))
+        ..record::Settings::new(plan, Some(device), args.algorithm())
     })
 }

@@ -54,7 +54,7 @@ impl<'a> Session<'a> {
     /// Opens the device that the options name.
     pub(crate) fn open(args: &'a MatchArgs) -> Result<Self, Failure> {
         let opened = backends::open(&args.plan.backend, args.plan.device.as_deref())?;
-        threads::check(args.plan.threads, &[&opened])?;
+        threads::check(args.plan.threads, std::slice::from_ref(&opened.name), [opened.info.workers])?;
         Ok(Self { args, opened, prepared: None, starts_warm: false })
     }
 

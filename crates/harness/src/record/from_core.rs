@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use super::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
+use bp_core::Stage;
+
+use super::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Sample, Settings, Stages};
 
 impl From<bp_core::Energy> for Energy {
     fn from(energy: bp_core::Energy) -> Self {
@@ -26,12 +28,12 @@ impl From<&bp_core::DeviceInfo> for Device {
 }
 
 impl Settings {
-    /// What is known of a plan before it runs; `device` tells how many bytes it will take there.
+    /// What is known of a plan before it runs. `device` says how many bytes it will allocate for it. `k` and `z` are for
+    /// the caller to fill in: a plan does not know which numbers its loops came from.
     pub(crate) fn new(
         plan: &bp_core::Plan,
         device: Option<&dyn bp_core::Device>,
         algorithm: bp_core::Algorithm,
-        (k, z): (Option<u32>, Option<u32>),
     ) -> Self {
         let (model, settings) = (plan.model(), plan.settings());
         Self {
@@ -42,8 +44,8 @@ impl Settings {
             truncation: model.truncation(),
             edge_threshold: model.weak_edges(),
             algorithm: algorithm.name().to_owned(),
-            k,
-            z,
+            k: None,
+            z: None,
             grids: settings.grids,
             steps_per_grid: settings.steps,
             schedule: settings.schedule.name().to_owned(),
@@ -65,14 +67,24 @@ impl Finish {
     }
 }
 
-/// All clocks of a solve.
+impl Sample {
+    /// The times of a solve.
+    pub(crate) fn new(round: u32, times: &bp_core::Times) -> Self {
+        Self { round, total_ms: milliseconds(times.total), clocks: clocks(times), ..Self::default() }
+    }
+}
+
+/// The stages of a solve by all clocks.
 pub(crate) fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
-    let clocked = |clock, stages: [Duration; 5]| {
-        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] =
-            stages.map(|time| 1000.0 * time.as_secs_f64());
-        let stages = Stages { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms };
+    let clocked = |clock, stages: [Duration; Stage::ALL.len()]| {
+        let stages = Stages::new(stages.map(milliseconds));
         Clocked { clock, stages }
     };
     let device = times.device.map(|stages| clocked(Clock::Device, stages));
     std::iter::once(clocked(Clock::Wall, times.wall)).chain(device).collect()
+}
+
+/// In milliseconds.
+pub(crate) fn milliseconds(time: Duration) -> f64 {
+    1000.0 * time.as_secs_f64()
 }

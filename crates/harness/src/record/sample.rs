@@ -1,0 +1,136 @@
+//! One timed solve. Every experiment records its times as these.
+
+use bp_core::Stage;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::{Spread, median};
+
+/// One timed solve, or the median of a few that were timed together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sample {
+    /// Which round of taking turns it belongs to, from 0.
+    pub round: u32,
+    /// Milliseconds to allocate by the wall clock, apart from the total.
+    // Every sample of `bp reproduce` prepares anew. The other experiments prepare once and keep this time elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(required)]
+    pub prepare_ms: Option<f64>,
+    /// Milliseconds of these that compiling kernels took, where the device compiles any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compile_ms: Option<f64>,
+    /// Milliseconds from images to labels by the wall clock.
+    pub total_ms: f64,
+    /// Milliseconds of each stage, by the wall clock first.
+    pub clocks: Vec<Clocked>,
+}
+
+/// A clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Clock {
+    /// The host's monotonic clock.
+    Wall,
+    /// The device's own clock.
+    Device,
+}
+
+/// Stage times by one clock.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Clocked {
+    /// The clock.
+    pub clock: Clock,
+    /// The times.
+    pub stages: Stages,
+}
+
+/// Milliseconds of each stage, over all grids.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
+pub struct Stages {
+    pub match_cost_ms: f64,
+    pub coarsen_ms: f64,
+    pub refine_ms: f64,
+    pub update_messages_ms: f64,
+    pub select_labels_ms: f64,
+}
+
+impl Stages {
+    /// From the stages in their order.
+    pub(crate) fn new(ms: [f64; Stage::ALL.len()]) -> Self {
+        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] = ms;
+        Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms }
+    }
+
+    /// The stages in their order.
+    pub(crate) fn in_order(&self) -> [f64; Stage::ALL.len()] {
+        let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
+        [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
+    }
+}
+
+impl Sample {
+    /// The median of each time over samples of one turn, which have the same clocks.
+    pub(crate) fn median(samples: &[Self]) -> Option<Self> {
+        let first = samples.first()?;
+        let of = |ms: &dyn Fn(&Self) -> f64| median(samples.iter().map(ms)).unwrap_or(f64::NAN);
+        let clocked = |(index, clocked): (usize, &Clocked)| {
+            let stage = |stage| of(&|sample| sample.clocks[index].stages.in_order()[stage]);
+            Clocked { clock: clocked.clock, stages: Stages::new(std::array::from_fn(stage)) }
+        };
+        Some(Self {
+            total_ms: of(&|sample| sample.total_ms),
+            clocks: first.clocks.iter().enumerate().map(clocked).collect(),
+            ..first.clone()
+        })
+    }
+
+    /// How many times as long `over` took as `of`, round by round: samples of the same round met the same machine.
+    pub(crate) fn ratios(over: &[Self], of: &[Self], ms: impl Fn(&Self) -> f64) -> Vec<f64> {
+        let in_round = |of: &Self| Some(ms(over.iter().find(|over| over.round == of.round)?) / ms(of));
+        of.iter().filter_map(in_round).collect()
+    }
+
+    /// The median and range of a time; `None` if there are no samples.
+    pub(crate) fn spread(samples: &[Self], ms: impl Fn(&Self) -> f64) -> Option<Spread> {
+        Spread::of(samples.iter().map(ms))
+    }
+
+    /// Milliseconds of message passing, `refine` and `update_messages`, by the device's clock where it has one.
+    #[must_use]
+    pub fn message_passing_ms(&self) -> f64 {
+        self.clocks.last().map_or(0.0, |clocked| clocked.stages.refine_ms + clocked.stages.update_messages_ms)
+    }
+
+    /// Milliseconds of each stage, by the device's clock where it has one.
+    pub(crate) fn stages_ms(&self) -> [f64; Stage::ALL.len()] {
+        self.clocks.last().map_or([0.0; 5], |clocked| clocked.stages.in_order())
+    }
+
+    /// Milliseconds of all stages by the device's clock, where it has one.
+    pub(crate) fn device_ms(&self) -> Option<f64> {
+        let device = self.clocks.iter().find(|clocked| clocked.clock == Clock::Device);
+        device.map(|clocked| clocked.stages.in_order().iter().sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_of_several_solves_has_the_median_of_each_time() {
+        let sample = |ms: f64| Sample {
+            round: 3,
+            total_ms: ms,
+            clocks: vec![Clocked { clock: Clock::Wall, stages: Stages::new([10.0 - ms, 0.0, 0.0, ms, 1.0]) }],
+            ..Sample::default()
+        };
+        let median = Sample::median(&[1.0, 9.0, 2.0].map(sample)).unwrap();
+        assert_eq!((median.round, median.total_ms, median.stages_ms()), (3, 2.0, [8.0, 0.0, 0.0, 2.0, 1.0]));
+        assert_eq!(Sample::median(&[]), None);
+    }
+}
