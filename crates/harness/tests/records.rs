@@ -7,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use harness::record::{Outcome, Record};
+use harness::record::{Outcome, Record, speed::Speed};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -56,6 +56,32 @@ fn committed_records_fit_the_schema_and_are_whole() {
                 Outcome::Pending | Outcome::Error(_) => panic!("{}: {} {}", run.display(), cell.scene, cell.plan),
             }
         }
+    }
+}
+
+/// The folders under `results` that hold a record of `bp speed`. The record of a former benchmark has no version of the
+/// schema: no program reads it.
+fn speed_runs() -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
+    let is_ours = |text: String| text.contains("\"schema_version\"");
+    entries.filter(|path| fs::read_to_string(path.join("speed.json")).is_ok_and(is_ours)).collect()
+}
+
+#[test]
+fn old_records_of_speed_are_read_and_their_pages_made_again() {
+    let runs = speed_runs();
+    assert!(runs.len() >= 2, "growth and lavapipe are recorded");
+    for run in runs {
+        let text = fs::read_to_string(run.join("speed.json")).unwrap();
+        let speed: Speed = serde_json::from_str(&text).unwrap();
+        assert!(speed.contests.iter().all(|contest| !contest.entries.is_empty()), "{}", run.display());
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(run.join("speed.json"), folder.path().join("speed.json")).unwrap();
+        let bp = Command::new(env!("CARGO_BIN_EXE_bp")).arg("report").arg(folder.path()).output().unwrap();
+        assert!(bp.status.success(), "{bp:?}");
+        let page = fs::read_to_string(folder.path().join("speed.md")).unwrap();
+        assert!(speed.contests.iter().all(|contest| page.contains(&contest.problem)), "{page}");
+        assert_eq!(folder.path().join("roofline.svg").exists(), run.join("roofline.svg").exists());
     }
 }
 

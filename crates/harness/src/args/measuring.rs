@@ -51,12 +51,12 @@ pub(crate) struct ConformArgs {
 /// `bp speed`.
 #[derive(Debug, Args)]
 pub(crate) struct SpeedArgs {
-    /// Backends, separated by commas, the one first that the others are compared with; NAME:DEVICE for another than a
-    /// backend's first device.
+    /// Backends, separated by commas. The others are compared with the first. NAME:DEVICE is another than a backend's
+    /// first device, NAME@THREADS runs on that many threads: rayon@1,rayon@2.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
-    /// Problems, separated by commas; pixels, labels and loops are families of problems in which that number grows.
-    /// [default: all]
+    /// Problems, separated by commas. In pixels, labels and loops that number grows from problem to problem. [default:
+    /// the first eight]
     #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = Problem::ASKED)]
     pub(crate) problem: Vec<String>,
     /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of

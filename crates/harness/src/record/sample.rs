@@ -6,19 +6,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::{Spread, median};
 
-/// One timed solve, or the median of a few that were timed together.
+/// One timed solve.
+// A turn of several short solves keeps the median of each time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Which round of taking turns it belongs to, from 0.
     pub round: u32,
     /// Milliseconds to allocate by the wall clock, apart from the total.
-    // Every sample of `bp reproduce` prepares anew. The other experiments prepare once and keep this time elsewhere.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    // Every sample of `bp reproduce` prepares anew, as its schema says. The other experiments prepare once and keep this
+    // time elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(required)]
     pub prepare_ms: Option<f64>,
     /// Milliseconds of these that compiling kernels took, where the device compiles any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = null))]
     pub compile_ms: Option<f64>,
     /// Milliseconds from images to labels by the wall clock.
     pub total_ms: f64,
