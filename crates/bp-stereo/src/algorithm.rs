@@ -3,7 +3,7 @@
 use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, description::Derived};
+use crate::Error;
 
 /// What is run. The first is ours, the others are those of Doan Van Tuan's PhD thesis (2019).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -116,6 +116,15 @@ impl Default for Hierarchy {
     fn default() -> Self {
         Self { grids: None, message_start: MessageStart::Receiver, coarse_clip: false }
     }
+}
+
+/// What an algorithm derived its loops from, where it did.
+#[derive(Default)]
+pub(crate) struct Derived {
+    /// Loops asked for.
+    pub(crate) k: Option<u32>,
+    /// What they were divided by.
+    pub(crate) z: Option<u32>,
 }
 
 /// What the thesis's Z divides loops by where nothing else is said.

@@ -97,6 +97,13 @@ pub(crate) struct DataArgs {
     pub(crate) synthetic: bool,
 }
 
+impl DataArgs {
+    /// The data folder, if the data comes from one.
+    pub(crate) fn folder(&self) -> Option<PathBuf> {
+        self.data.clone().filter(|folder| !folder.as_os_str().is_empty() && !self.synthetic)
+    }
+}
+
 /// `bp scenes`.
 #[derive(Debug, Args)]
 pub(crate) struct ScenesArgs {

@@ -11,6 +11,7 @@ mod gate;
 mod match_pair;
 mod match_report;
 mod match_summary;
+mod reproduce;
 pub(crate) mod scenes;
 mod shell;
 mod speed;
@@ -26,9 +27,10 @@ pub(crate) use evaluate::evaluate;
 pub(crate) use export::export;
 pub(crate) use gate::gate;
 pub(crate) use match_pair::match_pair;
+pub(crate) use reproduce::reproduce;
 pub(crate) use scenes::scenes;
 pub(crate) use shell::{completions, man};
-pub(crate) use speed::{check_speed, speed, write_speed};
+pub(crate) use speed::speed;
 
 use crate::failure::Failure;
 

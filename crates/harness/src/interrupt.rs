@@ -2,7 +2,6 @@
 //! is left half done.
 
 use std::{
-    ops::ControlFlow,
     sync::{Mutex, PoisonError},
     time::Duration,
 };
@@ -29,11 +28,6 @@ pub(crate) fn listen() -> Result<(), Failure> {
     ctrlc::set_handler(stop).map_err(|error| Failure::other(format!("cannot handle Ctrl-C: {}", reason(error))))
 }
 
-/// Fails where the user has asked to stop.
-pub(crate) fn check() -> Result<(), Failure> {
-    if STOP.is_stopped() { Err(Failure::interrupted()) } else { Ok(()) }
-}
-
 /// Writes to standard error where a bar may be shown.
 pub(crate) fn beside_bar(write: impl FnOnce()) {
     let bar = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -48,8 +42,8 @@ pub(crate) struct ProgressBar {
 }
 
 impl ProgressBar {
-    /// A bar for so much work: message entries, pairs.
-    pub(crate) fn new(total: u64) -> Self {
+    /// A bar for so much work, of which so much was done before: that says nothing about the time left.
+    pub(crate) fn new(total: u64, done: u64) -> Self {
         let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
         if shown.is_some() || notes::is_quiet() {
             return Self { bar: indicatif::ProgressBar::hidden(), is_shown: false };
@@ -58,42 +52,24 @@ impl ProgressBar {
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(500));
+        bar.set_position(done);
+        bar.reset_eta();
         *shown = Some(bar.clone());
         Self { bar, is_shown: true }
     }
 
-    /// Shows how much is done; breaks where the user has asked to stop.
-    pub(crate) fn update(&self, done: u64) -> ControlFlow<()> {
-        self.bar.set_position(done);
-        if STOP.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-
-    /// Starts from a run that was interrupted after so much: it says nothing about the time left.
-    pub(crate) fn resume_at(&self, done: u64) {
-        self.bar.set_position(done);
-        self.bar.reset_eta();
-    }
-
-    /// Corrects how much there is.
-    pub(crate) fn set_total(&self, total: u64) {
+    /// Shows how much is done of how much.
+    pub(crate) fn show(&self, done: u64, total: u64) {
         self.bar.set_length(total);
+        self.bar.set_position(done);
+        if done >= total {
+            self.bar.finish_and_clear();
+        }
     }
 
     /// Shows what is being done.
     pub(crate) fn message(&self, message: String) {
         self.bar.set_message(message);
-    }
-
-    /// Prints a line above the bar, unless only errors are told.
-    pub(crate) fn line(&self, line: &str) {
-        if !notes::is_quiet() {
-            notes::tell(line);
-        }
-    }
-
-    /// Removes the bar.
-    pub(crate) fn finish(&self) {
-        self.bar.finish_and_clear();
     }
 }
 

@@ -20,12 +20,14 @@ mod gate;
 mod heap;
 mod interrupt;
 mod machine;
+mod measure;
 mod notes;
 pub mod record;
 pub mod report;
 pub mod reproduce;
 mod scenes;
 mod speed;
+mod statistics;
 mod summary;
 mod terminal;
 mod threads;
@@ -58,7 +60,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Match(args) => command::match_pair(args),
         Command::Convert(args) => command::convert(args),
         Command::Evaluate(args) => command::evaluate(args),
-        Command::Reproduce(args) => reproduce::reproduce(args),
+        Command::Reproduce(args) => command::reproduce(args),
         Command::Report(args) => report::command(args),
         Command::Scenes(args) => command::scenes(args),
         Command::Devices(args) => threads::run_on(None, || command::devices(args)),

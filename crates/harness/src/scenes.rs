@@ -7,7 +7,6 @@ use bp_testkit::synthetic;
 use serde::Deserialize;
 
 use crate::{
-    args::DataArgs,
     failure::Failure,
     files::{PixelLimit, pixels_sha256, read_image, read_map},
     record::{self, ImageSum},
@@ -78,11 +77,8 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// What the options ask for: the data folder's scenes where one is given, at half size or, when `quick`, at third
-    /// size; else the synthetic scenes.
-    pub(crate) fn new(args: &DataArgs, quick: bool) -> Result<Self, Failure> {
-        let named = |folder: &PathBuf| !folder.as_os_str().is_empty();
-        let folder = args.data.clone().filter(|folder| named(folder) && !args.synthetic);
+    /// The scenes of a data folder, at half size or, if `quick`, at third size. Without a folder, the synthetic scenes.
+    pub(crate) fn new(folder: Option<PathBuf>, quick: bool) -> Result<Self, Failure> {
         let set = match (&folder, quick) {
             (Some(_), false) => &HALF_SIZE,
             (Some(_), true) => &THIRD_SIZE,

@@ -29,6 +29,13 @@ pub(crate) fn watch() -> Watch<'static> {
     Watch::new(&show, &STOP)
 }
 
+/// Does work whose events are shown, and removes the bar after it.
+pub(crate) fn watched<T>(work: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let outcome = work(&watch());
+    finish();
+    outcome
+}
+
 /// Removes the bar.
 pub(crate) fn finish() {
     *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
@@ -38,13 +45,12 @@ fn show(event: Event<'_>) {
     match event {
         Event::Progress { done, total } => {
             let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
-            let bar = bar.get_or_insert_with(|| ProgressBar::new(total));
-            bar.set_total(total);
-            let _ = bar.update(done);
+            let bar = bar.get_or_insert_with(|| ProgressBar::new(total, done));
+            bar.show(done, total);
         }
         Event::Task(text) => {
             if let Some(bar) = BAR.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
-                bar.message(text.to_owned());
+                bar.message(text.split_whitespace().collect::<Vec<_>>().join(" "));
             }
         }
         Event::Line(text) if !notes::is_quiet() => tell(text),

@@ -1,6 +1,6 @@
 //! The threads that work is shared by.
 
-use crate::{backends::Opened, failure::Failure};
+use crate::failure::Failure;
 
 /// Runs `work` on a worker of a pool of so many threads, by default as many as RAYON_NUM_THREADS
 /// says, else one a processor. The rayon backend works in the pool
@@ -14,12 +14,15 @@ pub(crate) fn run_on<T: Send>(
     builder.build().map_err(failed)?.install(work)
 }
 
-/// Refuses a number of threads that no device works with.
-pub(crate) fn check(threads: Option<u16>, devices: &[&Opened]) -> Result<(), Failure> {
+/// Refuses a number of threads that none of these devices works with.
+pub(crate) fn check(
+    threads: Option<u16>,
+    names: &[String],
+    workers: impl IntoIterator<Item = usize>,
+) -> Result<(), Failure> {
     match threads.map(usize::from) {
-        Some(threads) if devices.iter().all(|device| device.info.workers != threads) => {
-            let names = devices.iter().map(|device| device.name.as_str()).collect::<Vec<_>>().join(",");
-            let what = format!("--backend {names} has no threads; --backend rayon has");
+        Some(threads) if workers.into_iter().all(|workers| workers != threads) => {
+            let what = format!("--backend {} has no threads; --backend rayon has", names.join(","));
             Err(Failure::usage(format!("--threads {threads}: {what}")))
         }
         _ => Ok(()),

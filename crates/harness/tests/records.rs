@@ -7,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use harness::record::{Outcome, Record};
+use harness::record::{Outcome, Record, speed::Speed};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -77,6 +77,30 @@ fn reports_are_made_from_their_records() {
             assert!(same, "{}; run: cargo run -- report {}", committed.display(), run.display());
         }
     }
+}
+
+/// The same of `bp speed`. The record of a former benchmark has no version of the schema: no program reads it.
+#[test]
+fn pages_of_speed_are_made_from_their_records() {
+    let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
+    let is_ours = |text: String| text.contains("\"schema_version\"");
+    let runs = entries.filter(|path| fs::read_to_string(path.join("speed.json")).is_ok_and(is_ours));
+    let mut read = 0;
+    for run in runs {
+        let speed: Speed = serde_json::from_str(&fs::read_to_string(run.join("speed.json")).unwrap()).unwrap();
+        assert!(speed.contests.iter().all(|contest| !contest.entries.is_empty()), "{}", run.display());
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(run.join("speed.json"), folder.path().join("speed.json")).unwrap();
+        let bp = Command::new(env!("CARGO_BIN_EXE_bp")).arg("report").arg(folder.path()).output().unwrap();
+        assert!(bp.status.success(), "{bp:?}");
+        for entry in fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap()) {
+            let committed = run.join(entry.file_name());
+            let same = fs::read(&committed).ok() == Some(fs::read(entry.path()).unwrap());
+            assert!(same, "{}; run: cargo run -- report {}", committed.display(), run.display());
+        }
+        read += 1;
+    }
+    assert!(read >= 2, "growth and lavapipe are recorded");
 }
 
 /// docs/thesis.md shows what the record says.

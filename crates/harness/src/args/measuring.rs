@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, builder::NonEmptyStringValueParser};
+use clap::{Args, ValueEnum, builder::NonEmptyStringValueParser};
 
 use super::{DataArgs, threads};
 use crate::{
     backends,
-    gate::{Renewal, Solve},
-    speed::Problem,
+    gate::{Counted, GateOptions, Renewal},
+    reproduce::ReproduceOptions,
+    speed::{Problem, SpeedOptions},
 };
 
 /// `bp reproduce`.
@@ -50,12 +51,12 @@ pub(crate) struct ConformArgs {
 /// `bp speed`.
 #[derive(Debug, Args)]
 pub(crate) struct SpeedArgs {
-    /// Backends, separated by commas, the one first that the others are compared with; NAME:DEVICE for another than a
-    /// backend's first device.
+    /// Backends, separated by commas. The others are compared with the first. NAME:DEVICE is another than a backend's
+    /// first device, NAME@THREADS runs on that many threads: rayon@1,rayon@2.
     #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
-    /// Problems, separated by commas; pixels, labels and loops are families of problems in which that number grows.
-    /// [default: all]
+    /// Problems, separated by commas. In pixels, labels and loops that number grows from problem to problem. [default:
+    /// the first eight]
     #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = Problem::ASKED)]
     pub(crate) problem: Vec<String>,
     /// Rounds, each of which runs every device once; a device that needs more than 5 s for a problem takes part in 3 of
@@ -91,11 +92,54 @@ pub(crate) struct GateArgs {
     /// Write what is measured as the new baseline for this kind of machine, the median of three measurements; everywhere:
     /// for all machines too, after a change that is meant to change results.
     #[arg(long, value_name = "WHERE", num_args = 0..=1, require_equals = true, default_missing_value = "here")]
-    pub(crate) update: Option<Renewal>,
+    pub(crate) update: Option<Where>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
     /// What valgrind runs: solves this once on one thread.
-    #[arg(long, hide = true, value_name = "SOLVE", value_parser = Solve::parse)]
-    pub(crate) counted: Option<Solve>,
+    #[arg(long, hide = true, value_name = "SOLVE", value_parser = Counted::parse)]
+    pub(crate) counted: Option<Counted>,
+}
+
+/// Which baselines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Where {
+    /// The file for this kind of machine.
+    Here,
+    /// That and the file for all machines.
+    Everywhere,
+}
+
+impl ReproduceArgs {
+    /// What they ask for.
+    pub(crate) fn options(&self) -> ReproduceOptions {
+        ReproduceOptions {
+            data: self.data.folder(),
+            quick: self.quick,
+            backends: self.backend.clone(),
+            threads: self.threads,
+            samples: self.samples,
+            results: self.results.clone(),
+            machine: self.machine.clone(),
+        }
+    }
+}
+
+impl SpeedArgs {
+    /// What they ask for.
+    pub(crate) fn options(&self) -> SpeedOptions {
+        let (problems, output) = (self.problem.clone(), self.output.clone());
+        SpeedOptions { problems, rounds: self.rounds, quick: self.quick, output }
+    }
+}
+
+impl GateArgs {
+    /// What they ask for.
+    pub(crate) fn options(&self) -> GateOptions {
+        let update = self.update.map(|update| match update {
+            Where::Here => Renewal::Here,
+            Where::Everywhere => Renewal::Everywhere,
+        });
+        GateOptions { quick: self.quick, rounds: self.rounds, baselines: self.baselines.clone(), update }
+    }
 }

@@ -166,7 +166,7 @@ fn cache() -> Check {
 /// Whether the public images are there.
 fn data(args: &DoctorArgs) -> Check {
     let advice = "the synthetic scenes run instead; scripts/fetch-middlebury fetches the real images";
-    let source = Source::new(&DataArgs { data: args.data.clone(), synthetic: false }, false);
+    let source = Source::new(DataArgs { data: args.data.clone(), synthetic: false }.folder(), false);
     match source.map(|source| (source.folder().map(|folder| folder.display().to_string()), source.set.described)) {
         Ok((Some(folder), described)) => Check::ok("data", format!("{folder}: {described}")),
         Ok((None, _)) => Check::note("data", "no folder is named by --data or BP_DATA", advice),

@@ -5,20 +5,21 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::print_json;
-use crate::{args::GateArgs, failure::Failure, gate, interrupt, note, threads};
+use crate::{args::GateArgs, failure::Failure, gate, note, terminal, threads};
 
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
     if let Some(solve) = args.counted {
-        return solve.run();
+        return Ok(writeln!(std::io::stdout(), "{}", solve.run()?)?);
     }
-    interrupt::listen()?;
+    terminal::listen()?;
     if args.instructions {
-        let judgement = threads::run_on(None, || gate::instructions(args))?;
+        let judgement =
+            threads::run_on(None, || terminal::watched(|watch| gate::instructions(&args.baselines, watch)))?;
         print(args, &judgement, &judgement.page())?;
         return if args.update.is_some() { written(&judgement.update()?) } else { conclude(&judgement.failures()) };
     }
-    let judgement = threads::run_on(None, || gate::gate(args))?;
+    let judgement = threads::run_on(None, || terminal::watched(|watch| gate::gate(&args.options(), watch)))?;
     print(args, &judgement, &gate::page(&judgement))?;
     if args.update.is_some() { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
 }

@@ -1,11 +1,11 @@
 //! What `bp match` says of a pair, as text or as JSON.
 
-use std::{fmt::Write as _, path::PathBuf, time::Duration};
+use std::{fmt::Write as _, path::PathBuf};
 
 use bp_core::{Errors, Size, Stage};
 use bp_stereo::{
     AnswerTimes, Disparity, Matcher, Tiles,
-    description::{self, Clocked, Energy, Settings, clocks},
+    description::{self, Clocked, Energy, Settings, clocks, milliseconds},
 };
 use bytesize::ByteSize;
 use serde::Serialize;
@@ -95,10 +95,6 @@ fn median(samples: &[AnswerTimes]) -> AnswerTimes {
 
 fn total_ms(sample: &AnswerTimes) -> f64 {
     milliseconds(sample.total())
-}
-
-fn milliseconds(time: Duration) -> f64 {
-    1000.0 * time.as_secs_f64()
 }
 
 /// The range of several samples.

@@ -13,7 +13,7 @@ use crate::{
 /// Runs the command: lists the scenes, and checks every listed file that the data folder holds.
 pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    let source = Source::new(&args.data, false)?;
+    let source = Source::new(args.data.folder(), false)?;
     let Some(folder) = source.folder() else {
         writeln!(out, "{}:", source.set.described)?;
         for (name, [width, height]) in synthetic::NAMES.iter().zip(synthetic::SIZES) {

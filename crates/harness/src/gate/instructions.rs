@@ -1,6 +1,9 @@
 //! `bp gate --instructions`: counts beside those that were recorded.
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 
@@ -9,7 +12,9 @@ use super::{
     file,
     table::table,
 };
-use crate::{args::GateArgs, failure::Failure, report::format::whole};
+use bp_stereo::Watch;
+
+use crate::{failure::Failure, report::format::whole};
 
 /// Name of the file.
 const FILE: &str = "instructions.json";
@@ -31,18 +36,18 @@ pub(crate) struct CountJudgement {
 }
 
 /// Counts, and holds against the file what is comparable.
-pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
+pub(crate) fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
-    let recorded: Option<Counts> = file::read(&args.baselines.join(FILE))?;
-    let counts = callgrind::count(valgrind)?;
+    let recorded: Option<Counts> = file::read(&baselines.join(FILE))?;
+    let counts = callgrind::count(valgrind, watch)?;
     let unlike = match &recorded {
-        None => Some(format!("there is no {}", args.baselines.join(FILE).display())),
+        None => Some(format!("there is no {}", baselines.join(FILE).display())),
         Some(recorded) if recorded.tools() != counts.tools() => Some(format!("it is of {}", recorded.tools())),
         Some(_) => None,
     };
     let recorded = recorded.filter(|_| unlike.is_none());
-    Ok(CountJudgement { baselines: args.baselines.clone(), counts, recorded, unlike })
+    Ok(CountJudgement { baselines: baselines.to_owned(), counts, recorded, unlike })
 }
 
 impl CountJudgement {

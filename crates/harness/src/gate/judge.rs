@@ -78,13 +78,13 @@ impl SpeedUp {
 impl Judgement {
     /// Judges a first measurement.
     pub(super) fn new(gate: &Gate<'_>, baselines: &Baselines, measured: &Measured) -> Result<Self, Failure> {
-        let devices = gate.devices();
+        let devices = gate.runners.devices();
         let known = Known { gate, baselines };
         Ok(Self {
             program: machine::program()?,
             machine: gate.machine.clone(),
-            quick: gate.args.quick,
-            rounds: gate.args.rounds,
+            quick: gate.options.quick,
+            rounds: gate.options.rounds,
             baseline: baselines.path_here().display().to_string(),
             has_baseline: known.expected(baselines.here.as_ref()).is_some(),
             devices: devices.into_iter().collect(),
@@ -141,13 +141,13 @@ impl<'a> Known<'a> {
 
     /// What this machine's baseline expects, where these runners were the same devices then.
     fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
-        let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.devices());
+        let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.runners.devices());
         runners.iter().all(|&runner| here.devices.get(runner) == devices.get(runner)).then_some(here)
     }
 
     /// What is expected of the devices that are here, and was not measured.
     fn missing(&self, measured: &Measured) -> Vec<String> {
-        let devices = self.gate.devices();
+        let devices = self.gate.runners.devices();
         let of_device = |expected: &Expected, name: &str| {
             let is_of = |runner: &String| {
                 name.starts_with(&format!("{runner}: ")) || name.starts_with(&format!("{runner} over "))

@@ -7,10 +7,12 @@ use std::{
 
 use jiff::{Timestamp, Zoned};
 
+use bp_stereo::Watch;
+
 use crate::{
     failure::Failure,
     files::{create_folder, write_json},
-    machine, note,
+    machine,
     record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
 };
@@ -28,7 +30,7 @@ pub(crate) struct Storage {
 
 /// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
 /// process is at work on is left to it.
-pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
+pub(crate) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
         let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;
@@ -38,7 +40,7 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
         let Some(lock) = lock(&folder)? else { continue };
         // Judged again under the lock: until then another process may have been at work on it.
         let Some(record) = interrupted(&folder) else { continue };
-        note(&format!("going on with the interrupted run in {}", folder.display()));
+        watch.note(&format!("going on with the interrupted run in {}", folder.display()));
         return Ok(Storage { folder, record, _lock: lock });
     }
     begin(results, program, machine, run)

@@ -1,148 +1,137 @@
-//! What `bp speed` found. These types are the JSON of `speed.json`; what they share with runs of `bp reproduce` is
-//! documented in [`crate::record`].
+//! What `bp speed` found. These types are the JSON of `speed.json`; the types that it shares with `record.json` are in
+//! [`crate::record`].
 
 use bp_core::Stage;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::{
-    record::{Clock, Clocked, Device, Machine, Program, Settings, Stages},
-    report::format::Spread,
-};
+use super::{Device, Machine, Outcome, Program, Sample, Settings};
+use crate::statistics::Spread;
 
 /// Version of the schema; changes with every change of meaning.
-pub(crate) const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 1;
 
 /// Everything that was measured.
-#[derive(Debug, Serialize)]
-pub(crate) struct Speed {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Speed {
     /// [`SCHEMA_VERSION`] of the program that wrote it.
-    pub(crate) schema_version: u32,
+    pub schema_version: u32,
     /// When it was begun, RFC 3339.
-    pub(crate) started: String,
+    pub started: String,
     /// The program.
-    pub(crate) program: Program,
+    pub program: Program,
     /// The machine.
-    pub(crate) machine: Machine,
+    pub machine: Machine,
     /// Whether the images were small.
-    pub(crate) quick: bool,
+    pub quick: bool,
     /// Rounds asked for.
-    pub(crate) rounds: u32,
+    pub rounds: u32,
     /// Threads that those contestants share which have threads.
-    pub(crate) threads: usize,
+    pub threads: usize,
     /// Who was asked to take part; the others are compared with the first.
-    pub(crate) contestants: Vec<Contestant>,
+    pub contestants: Vec<Contestant>,
     /// The problems, in order.
-    pub(crate) contests: Vec<Contest>,
+    pub contests: Vec<Contest>,
 }
 
 /// A device of a backend.
-#[derive(Debug, Serialize)]
-pub(crate) struct Contestant {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contestant {
     /// Name of the backend, with the device's index unless that is 0.
-    pub(crate) name: String,
+    pub name: String,
     /// The device; none where the backend could not open it.
-    pub(crate) device: Option<Device>,
+    pub device: Option<Device>,
     /// Why it could not be opened.
-    pub(crate) unavailable: Option<String>,
+    pub unavailable: Option<String>,
     /// Milliseconds to open it, its test included, for which kernels may be compiled.
-    pub(crate) open_ms: Option<f64>,
+    pub open_ms: Option<f64>,
     /// 10^9 bytes a second that it reads and writes, together, while it copies its own memory; none where that says
     /// nothing or could not be measured.
-    pub(crate) copy_gb_per_s: Option<f64>,
+    pub copy_gb_per_s: Option<f64>,
 }
 
 /// A problem, and what came of it on every device that could be opened.
-#[derive(Debug, Serialize)]
-pub(crate) struct Contest {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contest {
     /// Name of the problem.
-    pub(crate) problem: String,
+    pub problem: String,
     /// What grows from it to the next problem, all else being alike; none where there is no such problem, and in
     /// records from before there were any.
-    pub(crate) family: Option<Family>,
+    #[serde(default)]
+    pub family: Option<Family>,
     /// Pixels per row.
-    pub(crate) width: usize,
+    pub width: usize,
     /// Pixels per column.
-    pub(crate) height: usize,
+    pub height: usize,
     /// What was run; the bytes it predicts are those of no device in particular.
-    pub(crate) settings: Settings,
+    pub settings: Settings,
     /// SHA-256 of the labels that every contestant gave, two bytes each, low byte first; none where none was measured.
-    pub(crate) labels_sha256: Option<String>,
+    pub labels_sha256: Option<String>,
     /// In the order of the contestants.
-    pub(crate) entries: Vec<Entry>,
+    pub entries: Vec<Entry>,
 }
 
 /// Problems that are alike but for one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Family {
+pub enum Family {
     /// Pixels of an image.
     Pixels,
     /// Labels of a pixel.
     Labels,
     /// Loops on the one grid.
     Loops,
+    /// Pixels, up to 30 megapixels, by the schedule `sweep`.
+    SweepPixels,
+    /// Pixels, up to 30 megapixels, by half-steps on one grid.
+    HalfStepPixels,
+    /// Labels, by half-steps on one grid.
+    HalfStepLabels,
 }
 
 /// A contestant in a contest.
-#[derive(Debug, Serialize)]
-pub(crate) struct Entry {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
     /// Its name.
-    pub(crate) contestant: String,
-    /// What came of it.
-    pub(crate) outcome: Outcome,
-}
-
-/// Numbers, or why there are none.
-#[derive(Debug, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Outcome {
-    /// It ran.
-    Measured(Box<Measurement>),
-    /// It failed, or gave other labels than those before it.
-    Error(String),
-    /// The device is too small for the problem; no fault of the run.
-    Unavailable(String),
+    pub contestant: String,
+    /// What came of it. Other labels than those of the contestants before it are an error.
+    pub outcome: Outcome<Measurement>,
 }
 
 /// What was measured.
-#[derive(Debug, Serialize)]
-pub(crate) struct Measurement {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
     /// Milliseconds to make the device ready for the problem, which was done once.
-    pub(crate) prepare_ms: f64,
+    pub prepare_ms: f64,
     /// Milliseconds of these that compiling kernels took, where the device compiles any. Kernels that a problem before
     /// this one brought along are not compiled again.
-    pub(crate) compile_ms: Option<f64>,
+    pub compile_ms: Option<f64>,
     /// Bytes allocated, counted.
-    pub(crate) allocated_bytes: u64,
+    pub allocated_bytes: u64,
     /// Bytes that each stage has to read and write at least, where the device counts them.
-    pub(crate) moved_bytes: Option<StageBytes>,
+    pub moved_bytes: Option<StageBytes>,
     /// Milliseconds of the first solve by the wall clock, which counts in no other number.
-    pub(crate) first_ms: f64,
+    pub first_ms: f64,
     /// Rounds that it took part in: fewer than asked for where the first solve took long.
-    pub(crate) rounds: u32,
+    pub rounds: u32,
     /// Every sample, by round.
-    pub(crate) samples: Vec<Sample>,
+    pub samples: Vec<Sample>,
 }
 
-/// One timed solve.
-#[derive(Debug, Serialize)]
-pub(crate) struct Sample {
-    /// Which round of taking turns it belongs to, from 0.
-    pub(crate) round: u32,
-    /// Milliseconds from images to labels by the wall clock.
-    pub(crate) total_ms: f64,
-    /// Milliseconds of each stage, by the wall clock first.
-    pub(crate) clocks: Vec<Clocked>,
-}
-
-/// Bytes of each stage, over all grids; the stages are documented as [`bp_core::Stage`].
-#[derive(Debug, Serialize)]
-pub(crate) struct StageBytes {
-    pub(crate) match_cost: u64,
-    pub(crate) coarsen: u64,
-    pub(crate) refine: u64,
-    pub(crate) update_messages: u64,
-    pub(crate) select_labels: u64,
+/// Bytes of each stage, over all grids.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the stages are documented as bp_core::Stage")]
+pub struct StageBytes {
+    pub match_cost: u64,
+    pub coarsen: u64,
+    pub refine: u64,
+    pub update_messages: u64,
+    pub select_labels: u64,
 }
 
 impl From<[u64; 5]> for StageBytes {
@@ -160,13 +149,26 @@ impl StageBytes {
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 3] = [Self::Pixels, Self::Labels, Self::Loops];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Pixels, Self::Labels, Self::Loops, Self::SweepPixels, Self::HalfStepPixels, Self::HalfStepLabels];
 
-    /// Its name: what grows.
+    /// Its name in options and file names.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Pixels => "pixels",
             Self::Labels => "labels",
+            Self::Loops => "loops",
+            Self::SweepPixels => "sweep-pixels",
+            Self::HalfStepPixels => "half-step-pixels",
+            Self::HalfStepLabels => "half-step-labels",
+        }
+    }
+
+    /// What grows.
+    pub(crate) const fn grows(self) -> &'static str {
+        match self {
+            Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => "pixels",
+            Self::Labels | Self::HalfStepLabels => "labels",
             Self::Loops => "loops",
         }
     }
@@ -174,8 +176,8 @@ impl Family {
     /// The number that grows.
     pub(crate) fn number_of(self, contest: &Contest) -> u64 {
         match self {
-            Self::Pixels => contest.width as u64 * contest.height as u64,
-            Self::Labels => contest.settings.labels as u64,
+            Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => contest.width as u64 * contest.height as u64,
+            Self::Labels | Self::HalfStepLabels => contest.settings.labels as u64,
             Self::Loops => contest.settings.steps_per_grid.into(),
         }
     }
@@ -213,7 +215,7 @@ impl Contestant {
     pub(crate) fn stages(&self, measurement: &Measurement) -> impl Iterator<Item = StageTime> {
         let moved = measurement.moved_bytes.as_ref().filter(|_| self.times_stages(measurement));
         let time = move |stage: Stage| {
-            let ms = Spread::of(measurement.samples.iter().map(|sample| sample.stages_ms()[stage as usize]))?;
+            let ms = Sample::spread(&measurement.samples, |sample| sample.stages_ms()[stage as usize])?;
             let bytes = moved.map(|bytes| bytes.in_order()[stage as usize]).filter(|&bytes| bytes > 0);
             (ms.high > 0.0).then_some(StageTime { stage, ms, bytes })
         };
@@ -224,16 +226,6 @@ impl Contestant {
     pub(crate) fn label(&self) -> String {
         let software = self.device.as_ref().is_some_and(|device| device.software_rasteriser);
         format!("{}{}", self.name, if software { " (software rasteriser)" } else { "" })
-    }
-}
-
-impl Outcome {
-    /// The measurement, where there is one.
-    pub(crate) fn measured(&self) -> Option<&Measurement> {
-        match self {
-            Self::Measured(measurement) => Some(measurement),
-            Self::Error(_) | Self::Unavailable(_) => None,
-        }
     }
 }
 
@@ -259,22 +251,5 @@ impl Measurement {
     /// Whether the stages are timed by the device's own clock.
     pub(crate) fn has_clock(&self) -> bool {
         self.samples.iter().all(|sample| sample.device_ms().is_some())
-    }
-}
-
-impl Sample {
-    /// The stages by the device's clock, where it has one.
-    pub(crate) fn device_stages(&self) -> Option<Stages> {
-        self.clocks.iter().find(|clocked| clocked.clock == Clock::Device).map(|clocked| clocked.stages)
-    }
-
-    /// Milliseconds of all stages by the device's clock, where it has one.
-    pub(crate) fn device_ms(&self) -> Option<f64> {
-        self.device_stages().map(|stages| stages.in_order().iter().sum())
-    }
-
-    /// Milliseconds of each stage, by the device's clock where it has one.
-    pub(crate) fn stages_ms(&self) -> [f64; 5] {
-        self.clocks.last().map_or([0.0; 5], |clocked| clocked.stages.in_order())
     }
 }
