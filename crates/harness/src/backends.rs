@@ -1,6 +1,6 @@
 //! Backends as the experiments open them.
 
 #[cfg(test)]
-pub(crate) mod flaky;
+pub mod flaky;
 
-pub(crate) use bp_stereo::devices::{ALL, DEFAULT, Opened, choose, device_name, reason, reference};
+pub use bp_stereo::devices::{ALL, DEFAULT, Opened, choose, device_name, reason, reference};

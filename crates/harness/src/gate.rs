@@ -21,18 +21,18 @@ use bp_stereo::Watch;
 
 use crate::{failure::Failure, machine, record::Machine, scenes};
 use baseline::Baselines;
-pub(crate) use callgrind::Counted;
+pub use callgrind::Counted;
 use guarded::Guarded;
-pub(crate) use instructions::instructions;
-pub(crate) use judge::Judgement;
+pub use instructions::instructions;
+pub use judge::Judgement;
 use measure::{Measured, Problem, measure};
-pub(crate) use renew::Renewal;
+pub use renew::Renewal;
 use runners::Runners;
-pub(crate) use table::page;
+pub use table::page;
 
 /// Whether the text of a file holds baselines, of one kind or the other.
 #[cfg(feature = "fuzzing")]
-pub(crate) fn is_baseline(path: &std::path::Path, text: &str) -> bool {
+pub fn is_baseline(path: &std::path::Path, text: &str) -> bool {
     file::parse::<baseline::Baseline>(path, text).is_ok() || file::parse::<callgrind::Counts>(path, text).is_ok()
 }
 
@@ -48,19 +48,19 @@ const MEASUREMENTS_OF_A_BASELINE: usize = 3;
 
 /// What is measured, and what it is held against.
 #[derive(Debug)]
-pub(crate) struct GateOptions {
+pub struct GateOptions {
     /// A smaller image and fewer loops.
-    pub(crate) quick: bool,
+    pub quick: bool,
     /// Rounds of a measurement.
-    pub(crate) rounds: u32,
+    pub rounds: u32,
     /// The folder of the baselines.
-    pub(crate) baselines: PathBuf,
+    pub baselines: PathBuf,
     /// Baselines to write anew.
-    pub(crate) update: Option<Renewal>,
+    pub update: Option<Renewal>,
 }
 
 /// Measures and judges, or renews the baselines if that is asked for.
-pub(crate) fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
+pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
     let machine = machine::machine(None);
     let mut baselines = Baselines::read(&options.baselines, &machine, options.update.is_some())?;
     let runners = Runners::open()?;

@@ -11,7 +11,7 @@ mod runner;
 mod solve;
 mod turns;
 
-pub(crate) use meter::Meter;
-pub(crate) use runner::{Asked, Runner};
-pub(crate) use solve::Solve;
-pub(crate) use turns::{Contestant, Entrant, Rules, SLOW_MS, take_turns};
+pub use meter::Meter;
+pub use runner::{Asked, Runner};
+pub use solve::Solve;
+pub use turns::{Contestant, Entrant, Rules, SLOW_MS, take_turns};

@@ -5,11 +5,11 @@ mod load;
 mod sample;
 pub mod speed;
 
-pub(crate) use bp_stereo::description::milliseconds;
+pub use bp_stereo::description::milliseconds;
 pub use bp_stereo::description::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
 #[cfg(feature = "fuzzing")]
-pub(crate) use load::parse;
-pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, SPEED_FILE, load, load_speed, record_file};
+pub use load::parse;
+pub use load::{MAPS_FOLDER, RECORD_FILE, SPEED_FILE, load, load_speed, record_file};
 pub use sample::Sample;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -198,7 +198,7 @@ pub struct Labelling {
 
 impl<M> Outcome<M> {
     /// What a failure leaves: a device that is too small for the plan is no fault of the run.
-    pub(crate) fn failed(failure: &Failure) -> Self {
+    pub fn failed(failure: &Failure) -> Self {
         let reason = failure.to_string();
         if failure.is_beyond_device() { Self::Unavailable(reason) } else { Self::Error(reason) }
     }

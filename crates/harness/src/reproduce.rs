@@ -1,14 +1,14 @@
 //! `bp reproduce`: the thesis's experiments, run and recorded.
 
 mod energies;
-pub(crate) mod plans;
+pub mod plans;
 mod run;
 mod storage;
 
-pub(crate) use plans::all as plans;
+pub use plans::all as plans;
 pub use run::ONE_SAMPLE_ABOVE_MS;
-pub(crate) use run::run;
-pub(crate) use storage::{Storage, begin};
+pub use run::run;
+pub use storage::{Storage, begin};
 
 use std::{
     ops::ControlFlow,
@@ -45,25 +45,25 @@ pub fn outside_energies(data: &Path) -> Result<Vec<Labelling>, String> {
 
 /// What a run is asked for.
 #[derive(Debug)]
-pub(crate) struct ReproduceOptions {
+pub struct ReproduceOptions {
     /// The folder of public data; without one the synthetic scenes run.
-    pub(crate) data: Option<PathBuf>,
+    pub data: Option<PathBuf>,
     /// Small images and few loops.
-    pub(crate) quick: bool,
+    pub quick: bool,
     /// The devices, as [`Asked::open`] reads them.
-    pub(crate) backends: Vec<String>,
+    pub backends: Vec<String>,
     /// Threads that the devices must work with.
-    pub(crate) threads: Option<u16>,
+    pub threads: Option<u16>,
     /// Samples of a cell, by default [`SAMPLES`], or one in a quick run.
-    pub(crate) samples: Option<u32>,
+    pub samples: Option<u32>,
     /// The folder of recorded runs.
-    pub(crate) results: PathBuf,
+    pub results: PathBuf,
     /// Name of this machine there.
-    pub(crate) machine: Option<String>,
+    pub machine: Option<String>,
 }
 
 /// Runs what is asked for and writes its report; or goes on with a run that was interrupted.
-pub(crate) fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Failure> {
+pub fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Failure> {
     let source = Source::new(options.data.clone(), options.quick)?;
     let devices = Asked::open_all(&options.backends, watch)?;
     threads::check(options.threads, &options.backends, Asked::opened(&devices).map(|runner| runner.info.workers))?;
@@ -85,7 +85,7 @@ pub(crate) fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result
 }
 
 /// What a run on these scenes and devices asks for.
-pub(crate) fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
+pub fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
     Run {
         data: source.set.name.to_owned(),
         quick,
@@ -98,7 +98,7 @@ pub(crate) fn settings(source: &Source, devices: &[Asked], quick: bool, samples:
 }
 
 /// Fails where a cell failed, be it `late`, after samples that are kept, or where none could be run at all.
-pub(crate) fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
+pub fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
     let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
     let failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
         Outcome::Error(error) => Some(format!("{}: {error}", such_as(cell))),

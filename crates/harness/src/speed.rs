@@ -8,20 +8,20 @@ mod tables;
 
 use std::path::PathBuf;
 
-pub(crate) use files::{Files, is_record, renew};
-pub(crate) use problems::Problem;
-pub(crate) use run::{check, measure};
-pub(crate) use tables::page;
+pub use files::{Files, is_record, renew};
+pub use problems::Problem;
+pub use run::{check, measure};
+pub use tables::page;
 
 /// What is measured.
 #[derive(Debug, Default)]
-pub(crate) struct SpeedOptions {
+pub struct SpeedOptions {
     /// The problems, by the names in [`Problem::ASKED`]; none means all but those that take long.
-    pub(crate) problems: Vec<String>,
+    pub problems: Vec<String>,
     /// Rounds, by default nine, or one in a quick run.
-    pub(crate) rounds: Option<u32>,
+    pub rounds: Option<u32>,
     /// Images of a third of the width and height.
-    pub(crate) quick: bool,
+    pub quick: bool,
     /// The folder of the record, the page and the charts.
-    pub(crate) output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
 }

@@ -19,17 +19,17 @@ const FEWEST_SAMPLES: usize = 3;
 
 /// The median and range of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Spread {
-    pub(crate) median: f64,
-    pub(crate) low: f64,
-    pub(crate) high: f64,
+pub struct Spread {
+    pub median: f64,
+    pub low: f64,
+    pub high: f64,
     /// How many numbers there are.
-    pub(crate) count: usize,
+    pub count: usize,
 }
 
 impl Spread {
     /// The spread of some numbers; `None` if there are none.
-    pub(crate) fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
         let (&low, &high) = (sorted.first()?, sorted.last()?);
@@ -39,7 +39,7 @@ impl Spread {
     }
 
     /// The mean of some medians; `None` if there are none.
-    pub(crate) fn mean(medians: impl IntoIterator<Item = f64>) -> Option<f64> {
+    pub fn mean(medians: impl IntoIterator<Item = f64>) -> Option<f64> {
         let (sum, count) = medians.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
         (count > 0).then(|| sum / f64::from(count))
     }
@@ -58,23 +58,23 @@ impl fmt::Display for Spread {
 }
 
 /// The median of some numbers; `None` if there are none.
-pub(crate) fn median(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub fn median(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     Spread::of(numbers).map(|spread| spread.median)
 }
 
 /// The mean over the scenes of the median of each scene's samples; `None` if a scene has no samples.
-pub(crate) fn mean_of_medians(scenes: &[Vec<f64>]) -> Option<f64> {
+pub fn mean_of_medians(scenes: &[Vec<f64>]) -> Option<f64> {
     Spread::mean(scenes.iter().map(|samples| median(samples.iter().copied())).collect::<Option<Vec<f64>>>()?)
 }
 
 /// A 95 % interval of that mean by the percentile bootstrap; `None` if a scene has too few samples.
-pub(crate) fn interval(scenes: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub fn interval(scenes: &[Vec<f64>]) -> Option<[f64; 2]> {
     percentiles(|random| resampled(scenes, random))
 }
 
 /// The same for the ratio of two such means whose samples were not taken in turns. No sample of one side belongs to a
 /// sample of the other, so each side is resampled by itself.
-pub(crate) fn ratio_interval(scenes: &[Vec<f64>], base: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub fn ratio_interval(scenes: &[Vec<f64>], base: &[Vec<f64>]) -> Option<[f64; 2]> {
     percentiles(|random| Some(resampled(scenes, random)? / resampled(base, random)?))
 }
 

@@ -8,10 +8,8 @@ mod replay;
 use std::{fs, path::Path, time::Duration};
 
 use criterion::Criterion;
-use harness::{
-    bench::{self, Bench},
-
-};
+use bp_stereo::Watch;
+use harness::bench::{self, Bench};
 use serde_json::Value;
 
 /// All benches of an empty environment.

@@ -41,7 +41,7 @@ const TOLD_FROM: f64 = 0.001;
 /// What was counted, and with what: counts of other processors, compilers, flags or valgrinds do not compare.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Counts {
+pub struct Counts {
     /// Commit of the program.
     pub(super) commit: String,
     /// The processor.
@@ -67,7 +67,7 @@ impl Counts {
 
 /// A problem of `bp speed`, in small, on one thread of a CPU backend. It is solved in a process of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Counted {
+pub struct Counted {
     backend: &'static str,
     problem: &'static str,
 }
@@ -87,12 +87,12 @@ impl Counted {
     ///
     /// # Errors
     /// Where there is no such solve.
-    pub(crate) fn parse(name: &str) -> Result<Self, String> {
+    pub fn parse(name: &str) -> Result<Self, String> {
         Self::all().find(|solve| solve.name() == name).ok_or_else(|| "not counted".to_owned())
     }
 
     /// Solves it once, in the process that valgrind runs; the device's name.
-    pub(crate) fn run(self) -> Result<String, Failure> {
+    pub fn run(self) -> Result<String, Failure> {
         let problem = Problem::asked(&[self.problem.to_owned()]).into_iter().next();
         let problem = problem.ok_or_else(|| Failure::other("there is no such problem"))?;
         solve(self.backend, problem.plan(DIVISOR)?)
@@ -130,13 +130,13 @@ fn pair(size: Size) -> Result<StereoPair, Error> {
 }
 
 /// Name and version of valgrind; `None` where there is none.
-pub(crate) fn valgrind() -> Option<String> {
+pub fn valgrind() -> Option<String> {
     let output = Command::new("valgrind").arg("--version").stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 /// Counts all solves with this valgrind, several at once: they do not disturb one another.
-pub(crate) fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
+pub fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
     let failed = |error| Failure::other(format!("cannot find this program's own file: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let solves: Vec<_> = Counted::all().collect();

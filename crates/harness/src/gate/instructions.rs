@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// What was counted, judged.
 #[derive(Serialize)]
-pub(crate) struct CountJudgement {
+pub struct CountJudgement {
     #[serde(skip)]
     baselines: PathBuf,
     counts: Counts,
@@ -36,7 +36,7 @@ pub(crate) struct CountJudgement {
 }
 
 /// Counts, and holds against the file what is comparable.
-pub(crate) fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
+pub fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
     let recorded: Option<Counts> = file::read(&baselines.join(FILE))?;
@@ -60,7 +60,7 @@ impl CountJudgement {
     }
 
     /// Counts that grew beyond the tolerance or are no more, and backends that went to another device, in words.
-    pub(crate) fn failures(&self) -> Vec<String> {
+    pub fn failures(&self) -> Vec<String> {
         let grown = self.rows().filter_map(|(name, now, before)| {
             let (before, more) = before.filter(|&(_, more)| more > TOLERANCE)?;
             let percent = 100.0 * more;
@@ -77,7 +77,7 @@ impl CountJudgement {
     }
 
     /// The page.
-    pub(crate) fn page(&self) -> String {
+    pub fn page(&self) -> String {
         let mut text = format!("# Instructions\n\n* Counted on {}.\n", self.counts.tools());
         self.counts.devices.iter().for_each(|(backend, device)| _ = writeln!(text, "* {backend}: {device}."));
         if let Some(unlike) = &self.unlike {
@@ -95,7 +95,7 @@ impl CountJudgement {
     }
 
     /// Writes the counts as the new baseline; the file's name.
-    pub(crate) fn update(&self) -> Result<String, Failure> {
+    pub fn update(&self) -> Result<String, Failure> {
         let path = self.baselines.join(FILE);
         file::write(&path, &self.counts)?;
         Ok(path.display().to_string())

@@ -21,7 +21,7 @@ const TOLERANCE_ANYWHERE: f64 = 0.4;
 
 /// What a gate found.
 #[derive(Serialize)]
-pub(crate) struct Judgement {
+pub struct Judgement {
     pub(super) program: Program,
     pub(super) machine: Machine,
     pub(super) quick: bool,
@@ -38,7 +38,7 @@ pub(crate) struct Judgement {
     /// What is expected of devices that are here, and was not measured.
     pub(super) missing: Vec<String>,
     /// Baselines that were written.
-    pub(crate) written: Vec<String>,
+    pub written: Vec<String>,
 }
 
 /// A guarded speed-up, judged.
@@ -113,7 +113,7 @@ impl Judgement {
     }
 
     /// What is worse than it may be, or not what it was, in words.
-    pub(crate) fn failures(&self) -> Vec<String> {
+    pub fn failures(&self) -> Vec<String> {
         let worse = self.speed_ups.iter().filter(|speed_up| speed_up.is_worse()).map(|speed_up| {
             let now = speed_up.second.unwrap_or(speed_up.first).median;
             format!("{}: {now:.2} times, was {:.2}", speed_up.name, speed_up.baseline.unwrap_or(f64::NAN))

@@ -10,7 +10,7 @@ use crate::{failure::Failure, machine, statistics::median};
 
 /// Which baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Renewal {
+pub enum Renewal {
     /// The file for this kind of machine.
     Here,
     /// That and the file for all machines.

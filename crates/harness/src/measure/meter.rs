@@ -7,24 +7,24 @@ use bp_stereo::{Event, Watch};
 use crate::failure::Failure;
 
 /// Reports progress in message entries, over one loop or several.
-pub(crate) struct Meter<'a> {
+pub struct Meter<'a> {
     watch: Watch<'a>,
     /// Entries of the turns that are over.
     done: u64,
     /// Entries to come in this loop.
     left: u64,
     /// Entries of later loops.
-    pub(crate) ahead: u64,
+    pub ahead: u64,
 }
 
 impl<'a> Meter<'a> {
     /// A meter that starts at nothing.
-    pub(crate) fn new(watch: &Watch<'a>) -> Self {
+    pub fn new(watch: &Watch<'a>) -> Self {
         Self { watch: *watch, done: 0, left: 0, ahead: 0 }
     }
 
     /// Reports how far the turn has come; breaks if the work should stop.
-    pub(crate) fn observe(&self, entries: u64) -> ControlFlow<()> {
+    pub fn observe(&self, entries: u64) -> ControlFlow<()> {
         self.watch.progress(self.done + entries, self.done + self.left + self.ahead)
     }
 
@@ -43,7 +43,7 @@ impl<'a> Meter<'a> {
     }
 
     /// Sends a line.
-    pub(crate) fn line(&self, line: &str) {
+    pub fn line(&self, line: &str) {
         self.watch.tell(Event::Line(line));
     }
 }

@@ -19,23 +19,23 @@ use crate::{
 const MOST_THREADS: usize = 1024;
 
 /// A device on the threads that it works with. It is opened again after it was lost.
-pub(crate) struct Runner {
+pub struct Runner {
     /// Its name in options and records.
-    pub(crate) name: String,
-    pub(crate) info: DeviceInfo,
+    pub name: String,
+    pub info: DeviceInfo,
     /// How long opening took, the test of the device included.
-    pub(crate) open_time: Duration,
+    pub open_time: Duration,
     opened: Mutex<Opened>,
     /// Its own threads; without them it works in the pool of its caller.
     pool: Option<ThreadPool>,
 }
 
 /// A runner that somebody asked for.
-pub(crate) struct Asked {
+pub struct Asked {
     /// Its name in records.
-    pub(crate) name: String,
+    pub name: String,
     /// The runner, or why there is none.
-    pub(crate) runner: Result<Runner, String>,
+    pub runner: Result<Runner, String>,
 }
 
 impl Asked {
@@ -43,7 +43,7 @@ impl Asked {
     ///
     /// # Errors
     /// If there is no such backend or device, or if the device has no threads to choose.
-    pub(crate) fn open(option: &str) -> Result<Self, Failure> {
+    pub fn open(option: &str) -> Result<Self, Failure> {
         let (device, threads) = split(option)?;
         let pool = threads.map(pool).transpose()?;
         within(pool.as_ref(), || Ok(backends::choose(device, None).map(|chosen| (chosen.name.clone(), chosen.open()))?))
@@ -66,7 +66,7 @@ impl Asked {
     }
 
     /// Opens the runners that a run asks for, each once. It fails only if none of them can be opened.
-    pub(crate) fn open_all(names: &[String], watch: &Watch<'_>) -> Result<Vec<Self>, Failure> {
+    pub fn open_all(names: &[String], watch: &Watch<'_>) -> Result<Vec<Self>, Failure> {
         let mut all: Vec<Self> = Vec::new();
         for name in names {
             let asked = Self::open(name)?;
@@ -83,7 +83,7 @@ impl Asked {
     }
 
     /// The runners that could be opened.
-    pub(crate) fn opened(all: &[Self]) -> impl Iterator<Item = &Runner> {
+    pub fn opened(all: &[Self]) -> impl Iterator<Item = &Runner> {
         all.iter().filter_map(|asked| asked.runner.as_ref().ok())
     }
 
@@ -127,17 +127,17 @@ impl Runner {
     }
 
     /// The same runner under another name.
-    pub(crate) fn named(self, name: &str) -> Self {
+    pub fn named(self, name: &str) -> Self {
         Self { name: name.to_owned(), ..self }
     }
 
     /// Runs some work on the device's threads.
-    pub(crate) fn run<T: Send>(&self, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
+    pub fn run<T: Send>(&self, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
         within(self.pool.as_ref(), work).inspect_err(|failure| self.opened().note(failure.cause()))
     }
 
     /// Runs some work on the device, which is opened again if it was lost.
-    pub(crate) fn on_device<T: Send>(
+    pub fn on_device<T: Send>(
         &self,
         work: impl FnOnce(&dyn Device) -> Result<T, Failure> + Send,
     ) -> Result<T, Failure> {
@@ -154,7 +154,7 @@ impl Runner {
 
     /// Whether the stages of its samples are times. Calls of a CPU backend take as long as the work. Calls of a GPU
     /// backend only hand the work over, so that only the device's own clock knows.
-    pub(crate) fn waits(&self) -> bool {
+    pub fn waits(&self) -> bool {
         self.info.api.is_none()
     }
 }
@@ -162,7 +162,7 @@ impl Runner {
 #[cfg(test)]
 impl Runner {
     /// The device of a test.
-    pub(crate) fn of(opened: Opened) -> Self {
+    pub fn of(opened: Opened) -> Self {
         Self::new(opened.name.clone(), opened, None)
     }
 }

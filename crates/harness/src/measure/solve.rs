@@ -12,19 +12,19 @@ use crate::{
 };
 
 /// A prepared plan, the device that solves it, and the pair that it is solved for.
-pub(crate) struct Solve<'a> {
+pub struct Solve<'a> {
     runner: &'a Runner,
     pair: &'a StereoPair,
-    pub(crate) driver: Driver,
+    pub driver: Driver,
     /// How long it took to allocate everything.
-    pub(crate) prepare_ms: f64,
+    pub prepare_ms: f64,
     /// How much of that was compiling kernels, if the device compiles any.
-    pub(crate) compile_ms: Option<f64>,
+    pub compile_ms: Option<f64>,
 }
 
 impl<'a> Solve<'a> {
     /// Prepares a plan, on a device that is opened again if it was lost.
-    pub(crate) fn prepare(runner: &'a Runner, plan: Plan, pair: &'a StereoPair) -> Result<Self, Failure> {
+    pub fn prepare(runner: &'a Runner, plan: Plan, pair: &'a StereoPair) -> Result<Self, Failure> {
         runner.on_device(|device| {
             machine::check_memory(runner.info.kind, device.planned_bytes(&plan), "--quick needs less")?;
             let start = Instant::now();
@@ -36,14 +36,14 @@ impl<'a> Solve<'a> {
     }
 
     /// Solves it once.
-    pub(crate) fn sample(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
+    pub fn sample(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
         let Self { runner, pair, driver, .. } = self;
         let times = runner.run(|| Ok(driver.solve_observed(pair, &mut |progress| meter.observe(progress.done))?))?;
         Ok(Sample::new(round, &times))
     }
 
     /// Message entries of a solve.
-    pub(crate) fn entries(&self) -> u64 {
+    pub fn entries(&self) -> u64 {
         self.driver.plan().message_updates()
     }
 }

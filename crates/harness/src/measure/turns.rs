@@ -5,13 +5,13 @@ use crate::{failure::Failure, record::Sample};
 
 /// Solves that take more milliseconds are slow: all rounds of them would take too long, and short disturbances average
 /// out within a long solve anyway.
-pub(crate) const SLOW_MS: f64 = 5000.0;
+pub const SLOW_MS: f64 = 5000.0;
 
 /// Nanoseconds of a message entry, to guess which contestants are slow before their first solve.
 const GUESSED_NS: f64 = 2.5;
 
 /// Takes part in the loop.
-pub(crate) trait Contestant {
+pub trait Contestant {
     /// Gets ready before the first round and warms up; returns the time of the warm-up, which counts in no other number.
     fn warm_up(&mut self, meter: &Meter<'_>) -> Result<Sample, Failure> {
         self.turn(0, meter)
@@ -39,46 +39,46 @@ impl<F: FnMut(u32) -> Result<Sample, Failure>> Contestant for F {
 }
 
 /// A contestant and what came of its turns.
-pub(crate) struct Entrant<C> {
+pub struct Entrant<C> {
     /// Its name in progress and messages.
-    pub(crate) name: String,
-    pub(crate) contestant: C,
+    pub name: String,
+    pub contestant: C,
     /// Time of its first solve.
-    pub(crate) first_ms: Option<f64>,
+    pub first_ms: Option<f64>,
     /// Every sample, by round.
-    pub(crate) samples: Vec<Sample>,
+    pub samples: Vec<Sample>,
     /// Why it takes no more turns.
-    pub(crate) failure: Option<Failure>,
+    pub failure: Option<Failure>,
 }
 
 /// How the loop goes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rules {
+pub struct Rules {
     /// Rounds, in each of which every contestant takes one turn.
-    pub(crate) rounds: u32,
+    pub rounds: u32,
     /// Rounds of a contestant whose first solve is slow, see [`SLOW_MS`].
-    pub(crate) slow_rounds: u32,
+    pub slow_rounds: u32,
     /// Whether contestants warm up before the first round. If they do not, each turn makes everything ready anew.
-    pub(crate) warm_up: bool,
+    pub warm_up: bool,
     /// Whether one failure ends everything. If not, the contestant that failed takes no more turns.
-    pub(crate) fail_fast: bool,
+    pub fail_fast: bool,
 }
 
 impl Rules {
     /// Rounds of a contestant whose first solve took so long.
-    pub(crate) fn rounds_for(&self, first_ms: f64) -> u32 {
+    pub fn rounds_for(&self, first_ms: f64) -> u32 {
         if first_ms > SLOW_MS { self.rounds.min(self.slow_rounds) } else { self.rounds }
     }
 }
 
 impl<C: Contestant> Entrant<C> {
     /// A contestant without samples.
-    pub(crate) fn new(name: String, contestant: C) -> Self {
+    pub fn new(name: String, contestant: C) -> Self {
         Self { name, contestant, first_ms: None, samples: Vec::new(), failure: None }
     }
 
     /// A contestant that goes on with the samples of an interrupted run.
-    pub(crate) fn resumed(self, samples: &[Sample]) -> Self {
+    pub fn resumed(self, samples: &[Sample]) -> Self {
         Self { first_ms: samples.first().map(|sample| sample.total_ms), samples: samples.to_vec(), ..self }
     }
 
@@ -124,7 +124,7 @@ impl<C: Contestant> Entrant<C> {
 }
 
 /// Runs the loop: round after round, in each of which every contestant takes one turn, one after another.
-pub(crate) fn take_turns<C: Contestant>(
+pub fn take_turns<C: Contestant>(
     entrants: &mut [Entrant<C>],
     rules: &Rules,
     meter: &mut Meter<'_>,

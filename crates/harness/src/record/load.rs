@@ -18,13 +18,13 @@ use super::{
 use crate::{failure::Failure, report::printable};
 
 /// Name of the record in a run's folder.
-pub(crate) const RECORD_FILE: &str = "record.json";
+pub const RECORD_FILE: &str = "record.json";
 
 /// Name of the record of `bp speed` in a run's folder.
-pub(crate) const SPEED_FILE: &str = "speed.json";
+pub const SPEED_FILE: &str = "speed.json";
 
 /// Name of the folder of maps beside it.
-pub(crate) const MAPS_FOLDER: &str = "maps";
+pub const MAPS_FOLDER: &str = "maps";
 
 /// Larger files are not read: ours are below one MiB, and somebody's may be of any size.
 const MAX_BYTES: u64 = 64 << 20;
@@ -39,13 +39,13 @@ struct Versioned {
 }
 
 /// Reads a record: the file, or the one in a run's folder.
-pub(crate) fn load(path: &Path) -> Result<Record, Failure> {
+pub fn load(path: &Path) -> Result<Record, Failure> {
     let path = record_file(path);
     parse(&path, &read(&path)?)
 }
 
 /// The record in the text of a file.
-pub(crate) fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
+pub fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
     let record: Record = versioned(path, text, &REPRODUCE)?;
     match record.cells.iter().filter_map(Cell::measured).find(|measured| !is_beside(&measured.map)) {
         Some(measured) => Err(refused(path, &REPRODUCE, &format!("a map outside of its folder: {}", measured.map))),
@@ -54,7 +54,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
 }
 
 /// Reads the record of a run of `bp speed`: the file, or the one in its folder.
-pub(crate) fn load_speed(path: &Path) -> Result<Speed, Failure> {
+pub fn load_speed(path: &Path) -> Result<Speed, Failure> {
     let path: Cow<'_, Path> = if path.is_dir() { path.join(SPEED_FILE).into() } else { path.into() };
     versioned(&path, &read(&path)?, &SPEED)
 }
@@ -93,7 +93,7 @@ fn is_beside(map: &str) -> bool {
 }
 
 /// The file that a record is in, where its folder may have been named.
-pub(crate) fn record_file(path: &Path) -> Cow<'_, Path> {
+pub fn record_file(path: &Path) -> Cow<'_, Path> {
     if path.is_dir() { path.join(RECORD_FILE).into() } else { path.into() }
 }
 

@@ -32,12 +32,12 @@ pub struct Sample {
 
 impl Sample {
     /// The times of a solve.
-    pub(crate) fn new(round: u32, times: &Times) -> Self {
+    pub fn new(round: u32, times: &Times) -> Self {
         Self { round, total_ms: milliseconds(times.total), clocks: clocks(times), ..Self::default() }
     }
 
     /// The median of each time over samples of one turn, which have the same clocks.
-    pub(crate) fn median(samples: &[Self]) -> Option<Self> {
+    pub fn median(samples: &[Self]) -> Option<Self> {
         let first = samples.first()?;
         let of = |ms: &dyn Fn(&Self) -> f64| median(samples.iter().map(ms)).unwrap_or(f64::NAN);
         let clocked = |(index, clocked): (usize, &Clocked)| {
@@ -52,13 +52,13 @@ impl Sample {
     }
 
     /// How many times as long `over` took as `of`, round by round: samples of the same round met the same machine.
-    pub(crate) fn ratios(over: &[Self], of: &[Self], ms: impl Fn(&Self) -> f64) -> Vec<f64> {
+    pub fn ratios(over: &[Self], of: &[Self], ms: impl Fn(&Self) -> f64) -> Vec<f64> {
         let in_round = |of: &Self| Some(ms(over.iter().find(|over| over.round == of.round)?) / ms(of));
         of.iter().filter_map(in_round).collect()
     }
 
     /// The median and range of a time; `None` if there are no samples.
-    pub(crate) fn spread(samples: &[Self], ms: impl Fn(&Self) -> f64) -> Option<Spread> {
+    pub fn spread(samples: &[Self], ms: impl Fn(&Self) -> f64) -> Option<Spread> {
         Spread::of(samples.iter().map(ms))
     }
 
@@ -69,12 +69,12 @@ impl Sample {
     }
 
     /// Milliseconds of each stage, by the device's clock where it has one.
-    pub(crate) fn stages_ms(&self) -> [f64; Stage::ALL.len()] {
+    pub fn stages_ms(&self) -> [f64; Stage::ALL.len()] {
         self.clocks.last().map_or([0.0; 5], |clocked| clocked.stages.in_order())
     }
 
     /// Milliseconds of all stages by the device's clock, where it has one.
-    pub(crate) fn device_ms(&self) -> Option<f64> {
+    pub fn device_ms(&self) -> Option<f64> {
         let device = self.clocks.iter().find(|clocked| clocked.clock == Clock::Device);
         device.map(|clocked| clocked.stages.in_order().iter().sum())
     }

@@ -142,18 +142,18 @@ impl From<[u64; 5]> for StageBytes {
 
 impl StageBytes {
     /// The stages in their order.
-    pub(crate) fn in_order(&self) -> [u64; 5] {
+    pub fn in_order(&self) -> [u64; 5] {
         let Self { match_cost, coarsen, refine, update_messages, select_labels } = *self;
         [match_cost, coarsen, refine, update_messages, select_labels]
     }
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 6] =
+    pub const ALL: [Self; 6] =
         [Self::Pixels, Self::Labels, Self::Loops, Self::SweepPixels, Self::HalfStepPixels, Self::HalfStepLabels];
 
     /// Its name in options and file names.
-    pub(crate) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Pixels => "pixels",
             Self::Labels => "labels",
@@ -165,7 +165,7 @@ impl Family {
     }
 
     /// What grows.
-    pub(crate) const fn grows(self) -> &'static str {
+    pub const fn grows(self) -> &'static str {
         match self {
             Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => "pixels",
             Self::Labels | Self::HalfStepLabels => "labels",
@@ -174,7 +174,7 @@ impl Family {
     }
 
     /// The number that grows.
-    pub(crate) fn number_of(self, contest: &Contest) -> u64 {
+    pub fn number_of(self, contest: &Contest) -> u64 {
         match self {
             Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => contest.width as u64 * contest.height as u64,
             Self::Labels | Self::HalfStepLabels => contest.settings.labels as u64,
@@ -185,34 +185,34 @@ impl Family {
 
 impl Speed {
     /// The problems of a family, or those of none.
-    pub(crate) fn contests_of(&self, family: Option<Family>) -> impl Iterator<Item = &Contest> {
+    pub fn contests_of(&self, family: Option<Family>) -> impl Iterator<Item = &Contest> {
         self.contests.iter().filter(move |contest| contest.family == family)
     }
 
     /// The contestant of an entry.
-    pub(crate) fn contestant(&self, entry: &Entry) -> Option<&Contestant> {
+    pub fn contestant(&self, entry: &Entry) -> Option<&Contestant> {
         self.contestants.iter().find(|contestant| contestant.name == entry.contestant)
     }
 
     /// The place of a contestant among all, which its colour tells in charts.
-    pub(crate) fn place(&self, name: &str) -> usize {
+    pub fn place(&self, name: &str) -> usize {
         self.contestants.iter().position(|contestant| contestant.name == name).unwrap_or(0)
     }
 
     /// An entry's contestant as tables and charts name it.
-    pub(crate) fn label(&self, entry: &Entry) -> String {
+    pub fn label(&self, entry: &Entry) -> String {
         self.contestant(entry).map_or_else(|| entry.contestant.clone(), Contestant::label)
     }
 }
 
 impl Contestant {
     /// Whether its stages are timed: a processor's take as long as their calls, of a GPU only its own clock tells.
-    pub(crate) fn times_stages(&self, measurement: &Measurement) -> bool {
+    pub fn times_stages(&self, measurement: &Measurement) -> bool {
         self.device.as_ref().is_some_and(|device| device.api.is_none()) || measurement.has_clock()
     }
 
     /// The stages of a measurement of its that took any time.
-    pub(crate) fn stages(&self, measurement: &Measurement) -> impl Iterator<Item = StageTime> {
+    pub fn stages(&self, measurement: &Measurement) -> impl Iterator<Item = StageTime> {
         let moved = measurement.moved_bytes.as_ref().filter(|_| self.times_stages(measurement));
         let time = move |stage: Stage| {
             let ms = Sample::spread(&measurement.samples, |sample| sample.stages_ms()[stage as usize])?;
@@ -223,23 +223,23 @@ impl Contestant {
     }
 
     /// Its name; what is no GPU says so wherever its times may stand.
-    pub(crate) fn label(&self) -> String {
+    pub fn label(&self) -> String {
         let software = self.device.as_ref().is_some_and(|device| device.software_rasteriser);
         format!("{}{}", self.name, if software { " (software rasteriser)" } else { "" })
     }
 }
 
 /// A stage that took some time.
-pub(crate) struct StageTime {
-    pub(crate) stage: Stage,
-    pub(crate) ms: Spread,
+pub struct StageTime {
+    pub stage: Stage,
+    pub ms: Spread,
     /// What it has to read and write at least, where the device counts it and times the stage.
-    pub(crate) bytes: Option<u64>,
+    pub bytes: Option<u64>,
 }
 
 impl StageTime {
     /// 10^9 bytes a second, with their range.
-    pub(crate) fn gb_per_s(&self) -> Option<Spread> {
+    pub fn gb_per_s(&self) -> Option<Spread> {
         let bytes = self.bytes? as f64;
         let Spread { median, low, high, count } = self.ms;
         let [median, low, high] = [median, high, low].map(|ms| bytes / (1e6 * ms));
@@ -249,7 +249,7 @@ impl StageTime {
 
 impl Measurement {
     /// Whether the stages are timed by the device's own clock.
-    pub(crate) fn has_clock(&self) -> bool {
+    pub fn has_clock(&self) -> bool {
         self.samples.iter().all(|sample| sample.device_ms().is_some())
     }
 }

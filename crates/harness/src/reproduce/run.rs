@@ -25,7 +25,7 @@ pub const ONE_SAMPLE_ABOVE_MS: f64 = SLOW_MS;
 
 /// Runs all cells that the record does not hold yet, on these devices and on the scenes that are asked for. Returns the
 /// failures of cells that keep their earlier samples: their outcomes do not show them.
-pub(crate) fn run(
+pub fn run(
     source: &Source,
     devices: &[Asked],
     storage: &mut Storage,

@@ -21,7 +21,7 @@ use crate::{
 const LOCK_FILE: &str = ".lock";
 
 /// A run being recorded.
-pub(crate) struct Storage {
+pub struct Storage {
     folder: PathBuf,
     record: Record,
     /// Held as long as the run is at work; the system lets go of it however the program ends.
@@ -30,7 +30,7 @@ pub(crate) struct Storage {
 
 /// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
 /// process is at work on is left to it.
-pub(crate) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
+pub fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
         let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;
@@ -52,7 +52,7 @@ fn is_unfinished(folder: &Path, record: &Record) -> bool {
 }
 
 /// Begins a run.
-pub(crate) fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
+pub fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let folder = new_folder(results, &machine, &run)?;
     let lock = lock(&folder)?.ok_or_else(|| Failure::writing(&folder, &"another process took it"))?;
     let now = Timestamp::now().to_string();
@@ -114,22 +114,22 @@ fn new_folder(results: &Path, machine: &Machine, run: &Run) -> Result<PathBuf, F
 
 impl Storage {
     /// The run's folder.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The record so far.
-    pub(crate) fn record(&self) -> &Record {
+    pub fn record(&self) -> &Record {
         &self.record
     }
 
     /// The record, to be changed and then saved.
-    pub(crate) fn record_mut(&mut self) -> &mut Record {
+    pub fn record_mut(&mut self) -> &mut Record {
         &mut self.record
     }
 
     /// Writes the record.
-    pub(crate) fn save(&mut self) -> Result<(), Failure> {
+    pub fn save(&mut self) -> Result<(), Failure> {
         self.record.updated = Timestamp::now().to_string();
         let path = self.folder.join(RECORD_FILE);
         write_json(&path, &self.record)
