@@ -43,9 +43,12 @@ pub struct Key {
 }
 
 /// What a legend names: the keys or, where there are none, the series.
-pub(crate) fn entries<'a, P>(keys: &'a [Key], series: &'a [Series<P>]) -> Vec<(&'a str, Style)> {
+pub(crate) fn entries<'a, P: 'a>(
+    keys: &'a [Key],
+    series: impl Iterator<Item = &'a Series<P>>,
+) -> Vec<(&'a str, Style)> {
     match keys {
-        [] => series.iter().map(|series| (series.name.as_str(), series.style)).collect(),
+        [] => series.map(|series| (series.name.as_str(), series.style)).collect(),
         keys => keys.iter().map(|key| (key.name.as_str(), key.style)).collect(),
     }
 }

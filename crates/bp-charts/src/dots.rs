@@ -3,7 +3,7 @@
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use crate::{
-    Axis, Error, Key, Level, Series, Value,
+    Axis, Error, Key, Level, Series, Style, Value,
     canvas::{Canvas, Drawn, INK, MARGIN, ROW, TEXT_SIZE, WIDTH, text, widest},
     data::entries,
     sheet::{Parts, Room, Sheet},
@@ -25,13 +25,16 @@ pub struct DotChart {
     pub keys: Vec<Key>,
     /// The names along the horizontal axis.
     pub categories: Vec<String>,
-    /// In the order of the markers: a point a category, `None` where there is no value. Lines are not
-    /// drawn.
-    pub series: Vec<Series<Option<Value>>>,
+    /// Groups of series, from left to right within each category, with a gap between groups. A series has one point for
+    /// each category, or `None` where there is no value. Lines are not drawn.
+    pub groups: Vec<Vec<Series<Option<Value>>>>,
 }
 
 const RIGHT: f64 = WIDTH - MARGIN;
 const BAND: RGBColor = RGBColor(246, 246, 246);
+
+/// The gap between groups, in places of a marker.
+const GAP: f64 = 0.8;
 
 impl DotChart {
     /// The chart as an SVG element.
@@ -44,8 +47,13 @@ impl DotChart {
         sheet.svg(|canvas| self.draw_categories(canvas, &sheet), |canvas| self.draw_values(canvas, &sheet))
     }
 
+    /// All series, from left to right.
+    pub fn series(&self) -> impl Iterator<Item = &Series<Option<Value>>> {
+        self.groups.iter().flatten()
+    }
+
     fn sheet(&self) -> Sheet<'_> {
-        let values = self.series.iter().flat_map(|series| self.points(series));
+        let values = self.series().flat_map(|series| self.points(series));
         let ends: Vec<f64> = values.flat_map(|(_, Value { value, low, high })| [value, low, high]).collect();
         let levels = self.levels.iter().map(|level| level.value).filter(|_| !ends.is_empty());
         let parts = Parts {
@@ -54,7 +62,7 @@ impl DotChart {
             axis: &self.axis,
             scale: self.axis.scale(ends.iter().copied().chain(levels)),
             levels: &self.levels,
-            entries: entries(&self.keys, &self.series),
+            entries: entries(&self.keys, self.series()),
         };
         Sheet::new(parts, Room { right: RIGHT, plot_height: 260.0 }, |left| self.name_rows(left))
     }
@@ -90,18 +98,31 @@ impl DotChart {
     }
 
     fn draw_values(&self, canvas: &Canvas<'_>, sheet: &Sheet<'_>) -> Drawn {
-        // Few markers stay together in the middle of their category, many leave a gap to the next one.
-        let (slot, count) = (self.slot(sheet.left), self.series.len() as f64);
-        let step = slot * (0.84 / count).min(0.15);
-        for (place, series) in self.series.iter().enumerate() {
-            for (category, Value { value, low, high }) in self.points(series) {
-                let x = sheet.left + slot * (category as f64 + 0.5) + step * (place as f64 - (count - 1.0) / 2.0);
-                if high > low {
-                    draw_whisker(canvas, [(x, sheet.y(low)), (x, sheet.y(high))], colour(series.style.colour))?;
+        // A few markers stay together in the middle of their category; many leave a gap to the next category.
+        let gaps = GAP * self.groups.len().saturating_sub(1) as f64;
+        let last = self.series().count() as f64 + gaps - 1.0;
+        let slot = self.slot(sheet.left);
+        let step = slot * (0.9 / (last + 1.0)).min(0.15);
+        let mut place = -last / 2.0;
+        for group in &self.groups {
+            for series in group {
+                for (category, value) in self.points(series) {
+                    let x = sheet.left + slot * (category as f64 + 0.5) + step * place;
+                    draw_value(canvas, sheet, (x, value), series.style, MARKER_UNIT.min(0.5 * step))?;
                 }
-                draw_marker(canvas, (x, sheet.y(value)), series.style, MARKER_UNIT.min(0.38 * step))?;
+                place += 1.0;
             }
+            place += GAP;
         }
         Ok(())
     }
+}
+
+/// A marker so far from the left, and the whisker of its interval.
+fn draw_value(canvas: &Canvas<'_>, sheet: &Sheet<'_>, (x, value): (f64, Value), style: Style, unit: f64) -> Drawn {
+    let Value { value, low, high } = value;
+    if high > low {
+        draw_whisker(canvas, [(x, sheet.y(low)), (x, sheet.y(high))], colour(style.colour))?;
+    }
+    draw_marker(canvas, (x, sheet.y(value)), style, unit)
 }

@@ -26,7 +26,7 @@ pub use error::Error;
 pub use number::number;
 pub use picture::{Colour, Pixels, png};
 pub use plot::{Plot, Point};
-pub use style::{BLACK, Line, Marker, Style};
+pub use style::{BLACK, Fill, Line, Marker, Style};
 
 #[cfg(test)]
 mod tests {
@@ -43,14 +43,17 @@ mod tests {
             levels: vec![Level { name: "as fast".into(), value: 1.0, colour: None }],
             keys: vec![],
             categories: ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"].map(String::from).into(),
-            series: vec![series("a&b", Style::numbered(0)), series("printed", Style::numbered(0).hollow())],
+            groups: vec![
+                vec![series("a&b", Style::numbered(0)), series("printed", Style::numbered(0).filled(Fill::Hollow))],
+                vec![series("c", Style::numbered(1).filled(Fill::Pale))],
+            ],
         }
     }
 
     fn plot(logarithmic: bool, values: &[f64]) -> Plot {
-        let DotChart { title, description, axis, levels, series, .. } = dots(logarithmic, values);
+        let DotChart { title, description, axis, levels, groups, .. } = dots(logarithmic, values);
         let point = |value: Value| Point { x: value, y: value };
-        let points: Vec<_> = series[0].points.iter().flatten().copied().map(point).collect();
+        let points: Vec<_> = groups[0][0].points.iter().flatten().copied().map(point).collect();
         let drawn = |line| Series {
             name: format!("{line:?}"),
             style: Style::numbered(1).with_line(line),
@@ -86,7 +89,7 @@ mod tests {
         let chart = dots(true, &values);
         let names: Vec<_> = chart.categories.iter().map(String::as_str).collect();
         has_texts(&chart.svg().unwrap(), &names);
-        has_texts(&chart.svg().unwrap(), &["a&amp;b", "printed", "as fast", "1,000"]);
+        has_texts(&chart.svg().unwrap(), &["a&amp;b", "printed", "c", "as fast", "1,000"]);
         let names = ["Solid", "Dashes", "Dots", "Stairs", "as fast", "pixels, logarithmic axis", "100"];
         has_texts(&plot(true, &values).svg().unwrap(), &names);
         let keys = vec![Key { name: "lines".into(), style: Style::line(BLACK, Line::Solid) }];
@@ -107,7 +110,7 @@ mod tests {
             }
         }
         well_formed(&DotChart { categories: vec![], ..dots(true, &[1.0]) }.svg().unwrap());
-        well_formed(&DotChart { series: vec![], title: String::new(), ..dots(false, &[1.0]) }.svg().unwrap());
+        well_formed(&DotChart { groups: vec![], title: String::new(), ..dots(false, &[1.0]) }.svg().unwrap());
         well_formed(&Plot { series: vec![], ..plot(false, &[]) }.svg().unwrap());
     }
 

@@ -70,7 +70,7 @@ impl Plot {
             axis: &self.y,
             scale: self.y.scale(ends(|point| point.y).into_iter().chain(levels)),
             levels: &self.levels,
-            entries: entries(&self.keys, &self.series),
+            entries: entries(&self.keys, self.series.iter()),
         };
         // The marks of the horizontal axis and its name.
         let sheet = Sheet::new(parts, Room { right: RIGHT, plot_height: 380.0 }, |_| 2);

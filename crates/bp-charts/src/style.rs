@@ -22,8 +22,29 @@ pub struct Style {
 pub struct Marker {
     /// The number of its shape; after the last, the first follows.
     pub shape: usize,
-    /// Whether it is hollow, as of values that somebody else gives.
-    pub hollow: bool,
+    /// How its inside looks.
+    pub fill: Fill,
+}
+
+/// The inside of a marker. No fill is opaque, so markers that coincide all show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fill {
+    /// The colour of its outline.
+    Solid,
+    /// A tint of that colour.
+    Pale,
+    /// Nothing.
+    Hollow,
+}
+
+impl Fill {
+    fn opacity(self) -> f64 {
+        match self {
+            Self::Solid => 0.75,
+            Self::Pale => 0.25,
+            Self::Hollow => 0.0,
+        }
+    }
 }
 
 /// What goes from point to point.
@@ -51,7 +72,7 @@ impl Style {
     /// A marker of this colour and shape.
     #[must_use]
     pub fn marked(colour: usize, shape: usize) -> Self {
-        Self { colour, marker: Some(Marker { shape, hollow: false }), line: None }
+        Self { colour, marker: Some(Marker { shape, fill: Fill::Solid }), line: None }
     }
 
     /// A line without markers.
@@ -60,10 +81,10 @@ impl Style {
         Self { colour, marker: None, line: Some(line) }
     }
 
-    /// The same with a hollow marker, if any.
+    /// The same with another fill of its marker, if it has one.
     #[must_use]
-    pub fn hollow(self) -> Self {
-        Self { marker: self.marker.map(|marker| Marker { hollow: true, ..marker }), ..self }
+    pub fn filled(self, fill: Fill) -> Self {
+        Self { marker: self.marker.map(|marker| Marker { fill, ..marker }), ..self }
     }
 
     /// The same with a line.
@@ -119,7 +140,7 @@ pub(crate) fn colour(number: usize) -> RGBColor {
 
 /// A series' marker, whose radius of 1 is so many pixels; nothing where it has none.
 pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f64) -> Drawn {
-    let Some(Marker { shape, hollow }) = style.marker else { return Ok(()) };
+    let Some(Marker { shape, fill }) = style.marker else { return Ok(()) };
     let ((arms, corners), colour) = (SHAPES[shape % SHAPES.len()], colour(style.colour));
     let corner = |arm: u32, (angle, radius): At| {
         let (sin, cos) = (angle.to_radians() + TAU * f64::from(arm) / f64::from(arms)).sin_cos();
@@ -127,7 +148,7 @@ pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f
     };
     // One arm more than there are closes the line, with a join instead of two ends.
     let outline: Vec<At> = (0..=arms).flat_map(|arm| corners.iter().map(move |&c| corner(arm, c))).collect();
-    canvas.draw(&Polygon::new(outline.as_slice(), if hollow { WHITE } else { colour }))?;
+    canvas.draw(&Polygon::new(outline.as_slice(), colour.mix(fill.opacity())))?;
     // Small markers have a thinner outline, which would fill them else.
     let width = f64::from(THIN) * (unit / MARKER_UNIT).min(1.0);
     canvas.draw(&PathElement::new(outline, colour.stroke_width(width as u32)))

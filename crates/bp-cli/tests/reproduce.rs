@@ -134,9 +134,9 @@ fn check_report(folder: &Path) {
         BACKENDS.contains("vulkan"),
         "the reason beneath the tables"
     );
-    assert!(markdown.contains("all share the whole image"), "how parts share several workers");
+    assert!(markdown.contains("Parts do not get a worker each"), "how parts share several workers");
     assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
     assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
-    assert!(markdown.contains("Pareto front, nothing else being both faster and lower: "));
+    assert!(markdown.contains("On the Pareto front, where no other plan is both faster and lower: "));
     assert!(!html.contains("src=\"http") && !html.contains("<script"), "one self-contained page");
 }

@@ -7,6 +7,7 @@ pub(crate) mod format;
 mod html;
 mod legend;
 mod markdown;
+mod opening;
 mod readme;
 mod results;
 mod tables;
@@ -18,7 +19,9 @@ use std::path::Path;
 use bp_charts::png;
 
 pub(crate) use escape::{markdown as markdown_escaped, printable};
-pub(crate) use markdown::{device_fact, lines, machine_fact, program_fact};
+pub(crate) use markdown::lines;
+pub use opening::headline;
+pub(crate) use opening::{device_fact, machine_fact, program_fact};
 pub(crate) use tables::of_times as table_of_times;
 
 use crate::{

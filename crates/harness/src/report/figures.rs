@@ -1,4 +1,4 @@
-//! Figures 3.2 to 3.6: the disparity maps of each algorithm.
+//! Figures 3.2 to 3.6 of the thesis, and A.1: the disparity maps of each algorithm.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -46,7 +46,10 @@ fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> R
     let title = format!("Figure {number}: disparity maps of {}", plan.title);
     Ok(Drawing {
         name: format!("figure-{number}"),
-        caption: format!("Colours from 0 to {last} px; every second pixel. Data: {}.", results.setting()),
+        caption: format!(
+            "Colours show disparities from 0 to {last} px. Every second pixel is drawn. Data: {}.",
+            results.setting()
+        ),
         svg: draw(&title, &results.setting(), &maps, last as f32)
             .map_err(|error| Failure::other(format!("figure {number}: {error}")))?,
         title,

@@ -1,24 +1,31 @@
-//! Looks of charts that show several plans on several backends: shapes tell the plans, colours the backends.
+//! How charts show plans and devices: the shape of a marker tells the plan, its colour the device.
 
 use bp_charts::{BLACK, Key, Line, Style};
 
-use super::results::Results;
+use super::{results::Results, tables::Named};
 
-/// The look of the numbered plan on the numbered device.
-pub(super) fn style(plan: usize, device: usize) -> Style {
-    Style::marked(device, plan)
+/// The look of a plan on the numbered device. With one device, colours tell the plans apart too.
+pub(super) fn style(results: &Results<'_>, plan: &Named, device: usize) -> Style {
+    Style::marked(if has_one_device(results) { plan.look } else { device }, plan.look)
 }
 
-/// The look of the numbered plan on whichever device.
-pub(super) fn any_device(plan: usize) -> Style {
-    Style::marked(BLACK, plan)
+/// The look of a plan where no device matters, as in a legend.
+pub(super) fn any_device(results: &Results<'_>, plan: &Named) -> Style {
+    style(results, plan, BLACK)
 }
 
-/// What the shapes of these plans mean, and the colours of all devices.
-pub(super) fn keys(results: &Results<'_>, plans: impl IntoIterator<Item = (usize, String)>) -> Vec<Key> {
-    let plans = plans.into_iter().map(|(plan, name)| Key { name, style: any_device(plan) });
-    let devices = results.devices().into_iter().enumerate();
-    let devices =
-        devices.map(|(i, (backend, _))| Key { name: results.label(backend), style: Style::line(i, Line::Solid) });
-    plans.chain(devices).collect()
+/// The colours of the devices. A single device needs none, unless it only imitates a GPU.
+pub(super) fn devices(results: &Results<'_>) -> Vec<Key> {
+    let devices = results.devices();
+    let is_plain = results.backends().count() == 1 && devices.iter().all(|(_, device)| !device.software_rasteriser);
+    let colour = |i| if has_one_device(results) { BLACK } else { i };
+    let key = |(i, (backend, _)): (usize, &(&str, _))| Key {
+        name: results.label(backend),
+        style: Style::line(colour(i), Line::Solid),
+    };
+    devices.iter().enumerate().filter(|_| !is_plain).map(key).collect()
+}
+
+fn has_one_device(results: &Results<'_>) -> bool {
+    results.devices().len() <= 1
 }

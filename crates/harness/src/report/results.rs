@@ -1,4 +1,4 @@
-//! A record, seen as the tables ask for it.
+//! A record, with the questions that tables and charts ask about it.
 
 use super::{format::Spread, thesis::Thesis};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
     scenes,
 };
 
-/// Which part of a solve a time is of.
+/// The part of a solve that a time belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// The stages `refine` and `update_messages`.
@@ -54,7 +54,7 @@ impl<'a> Results<'a> {
         })
     }
 
-    /// Where the images come from, in words.
+    /// The source of the images, in words.
     pub(super) fn data(&self) -> &'a str {
         let name = &self.record.run.data;
         scenes::set(name).map_or(name, |set| set.described)
@@ -65,18 +65,24 @@ impl<'a> Results<'a> {
         self.backends().filter_map(|backend| Some((backend, device(self.record, backend)?))).collect()
     }
 
-    /// A backend as tables and charts name it.
+    /// A backend's name in tables and charts.
     pub(super) fn label(&self, backend: &str) -> String {
         label(self.record, backend)
     }
 
-    /// What stands in place of a plan's means over the scenes.
+    /// The mean of a value over the scenes on a backend; `None` if a scene has no value.
+    pub(super) fn mean(&self, backend: &str, value: impl Fn(&Row<'_>) -> Option<f64>) -> Option<f64> {
+        let rows = self.rows().filter(|row| row.backend == backend);
+        Spread::mean(rows.map(|row| value(&row)).collect::<Option<Vec<f64>>>()?)
+    }
+
+    /// The word shown when a plan has no mean over the scenes.
     pub(super) fn missing_mean(&self, backend: &str, plan: &str, otherwise: &'static str) -> &'static str {
         let mut rows = self.rows().filter(|row| row.backend == backend);
         if rows.any(|row| row.missing(plan) == UNAVAILABLE) { UNAVAILABLE } else { otherwise }
     }
 
-    /// Why cells are unavailable, in a sentence; none where none is.
+    /// Why cells are unavailable, in a sentence; `None` if all are available.
     pub(super) fn unavailable(&self) -> Option<String> {
         let mut reasons = Vec::new();
         for cell in &self.record.cells {
@@ -103,15 +109,15 @@ impl<'a> Results<'a> {
     }
 }
 
-/// What tables show for a plan that the machine cannot run.
+/// The word shown for a plan that the machine cannot run.
 pub(super) const UNAVAILABLE: &str = "unavailable";
 
-/// A backend's device; none where it could not be opened.
+/// A backend's device; `None` if it could not be opened.
 fn device<'a>(record: &'a Record, backend: &str) -> Option<&'a Device> {
     record.cells.iter().find(|cell| cell.backend == backend)?.device.as_ref()
 }
 
-/// A backend's name; what is no GPU says so wherever its times may stand.
+/// A backend's name. A software rasteriser is named as one, since its times are not a GPU's.
 fn label(record: &Record, backend: &str) -> String {
     let software = device(record, backend).is_some_and(|device| device.software_rasteriser);
     format!("{backend}{}", if software { " (software rasteriser)" } else { "" })
@@ -128,7 +134,7 @@ pub(super) struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// The backend as tables name it.
+    /// The backend's name in tables.
     pub(super) fn label(&self) -> String {
         label(self.record, self.backend)
     }

@@ -39,15 +39,19 @@ impl Table {
     }
 }
 
-/// A plan as tables name it.
+/// A plan as tables and charts show it: one name and one shape everywhere.
 #[derive(Clone, Copy)]
 pub(super) struct Named {
     /// Name in the record.
     pub(super) plan: &'static str,
-    /// Name in tables.
+    /// Name in tables and charts.
     pub(super) title: &'static str,
-    /// The thesis's algorithm, where it prints numbers for this plan.
+    /// The thesis's algorithm, if it prints numbers for this plan.
     pub(super) printed: Option<&'static str>,
+    /// The number of its marker, which no other plan has.
+    pub(super) look: usize,
+    /// The plan in words.
+    pub(super) meaning: &'static str,
 }
 
 impl Named {
@@ -57,15 +61,24 @@ impl Named {
     }
 }
 
-pub(super) const BP: Named = Named { plan: "bp", title: "BP", printed: Some("bp") };
-pub(super) const CFBP: Named = Named { plan: "cfbp", title: "CFBP", printed: Some("cfbp") };
-pub(super) const CFCSBP: Named = Named { plan: "cfcsbp", title: "CFCSBP, Z''=2", printed: Some("cfcsbp") };
-pub(super) const CTBP: Named = Named { plan: "ctbp", title: "CTBP", printed: Some("ctbp") };
-/// The thesis's Z'''' lost its digit: its printed numbers stand beside each of the three.
+/// A plan of the thesis.
+const fn named(look: usize, plan: &'static str, title: &'static str, meaning: &'static str) -> Named {
+    Named { plan, title, printed: Some(plan), look, meaning }
+}
+
+pub(super) const BP: Named =
+    named(0, "bp", "BP", "belief propagation on the whole image; all others are compared with it");
+pub(super) const CFBP: Named = named(1, "cfbp", "CFBP", "coarse-to-fine BP");
+pub(super) const CFCSBP: Named = named(2, "cfcsbp", "CFCSBP, Z''=2", "coarse-to-fine constant-space BP");
+pub(super) const CTBP: Named = named(3, "ctbp", "CTBP", "census-transform BP, which cuts the image into four parts");
+/// The digit of Z'''' is missing in the thesis's text. Its printed numbers stand beside each of the three.
 pub(super) const CTCSBP: [Named; 3] = [
-    Named { plan: "ctcsbp", title: "CTCSBP, Z''''=2", printed: Some("ctcsbp") },
-    Named { plan: "ctcsbp-z3", title: "CTCSBP, Z''''=3", printed: Some("ctcsbp") },
-    Named { plan: "ctcsbp-z4", title: "CTCSBP, Z''''=4", printed: Some("ctcsbp") },
+    named(4, "ctcsbp", "CTCSBP, Z''''=2", "census-transform constant-space BP, with half of CTBP's loops"),
+    Named {
+        printed: Some("ctcsbp"),
+        ..named(5, "ctcsbp-z3", "CTCSBP, Z''''=3", "the same with a third of CTBP's loops")
+    },
+    Named { printed: Some("ctcsbp"), ..named(6, "ctcsbp-z4", "CTCSBP, Z''''=4", "the same with a quarter of them") },
 ];
 
 /// The tables of one algorithm: its plans, and the numbers of its speed, memory and reliability.

@@ -1,4 +1,4 @@
-//! Diagrams that the thesis has no counterpart of: what every plan costs on every backend, and what it gives for that.
+//! Diagrams that the thesis does not have: error, memory and energy against time, of every plan on every backend.
 
 use bp_charts::{Axis, Key, Line, Plot, Point, Series, Style, Value, number};
 
@@ -15,10 +15,10 @@ use crate::{
     summary::{Group, groups, interval, mean, mean_of_medians, samples},
 };
 
-/// A plan on a backend, with numbers of every scene.
+/// A plan on a backend, with numbers for every scene.
 struct Entrant<'a> {
-    /// Its places among the plans and among the devices.
-    plan: usize,
+    plan: Named,
+    /// Its backend's place among the devices.
     backend: usize,
     /// From images to labels, in milliseconds, with a 95 % interval where there are samples enough.
     ms: Value,
@@ -26,21 +26,20 @@ struct Entrant<'a> {
     measured: Vec<&'a Measurement>,
 }
 
-/// What stands against time.
+/// A quantity on the vertical axis; time is on the horizontal one.
 struct Quantity {
     title: String,
     axis: Axis,
     value: fn(&Measurement) -> f64,
-    /// What a reader must know.
+    /// What a reader must know about it.
     note: &'static str,
-    /// Whether it means the same of a plan as of others in the diagram.
+    /// Whether a plan with these settings belongs in the diagram.
     compares: Box<dyn Fn(&Settings) -> bool>,
 }
 
-/// What all plans and backends have in common.
+/// All plans on all backends.
 struct Field<'a> {
     results: &'a Results<'a>,
-    plans: Vec<Named>,
     entrants: Vec<Entrant<'a>>,
 }
 
@@ -54,9 +53,9 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
 fn error() -> Quantity {
     Quantity {
         title: "Error against time".to_owned(),
-        axis: Axis::linear("visible pixels wrong by more than 1 px, %"),
+        axis: Axis::linear("non-occluded pixels wrong by more than 1 px, %"),
         value: |measured| measured.visible.bad[1],
-        note: "Backends give the same labels, so that those of a plan stand in a row.",
+        note: "All backends give the same labels, so the markers of a plan lie on one height.",
         compares: Box::new(|_| true),
     }
 }
@@ -66,12 +65,12 @@ fn memory() -> Quantity {
         title: "Memory against time".to_owned(),
         axis: Axis::logarithmic("MiB allocated"),
         value: |measured| mebibytes(measured.allocated_bytes),
-        note: "Bytes allocated, counted.",
+        note: "Allocated bytes, as counted.",
         compares: Box::new(|_| true),
     }
 }
 
-/// One quantity for all plans whose labels have the same energy.
+/// A quantity for each energy function, since energies under different functions cannot be compared.
 fn energies(entrants: &[Entrant<'_>]) -> Vec<Quantity> {
     type Model = (String, usize, i32, u8, u8);
     fn model(s: &Settings) -> Model {
@@ -90,7 +89,7 @@ fn energies(entrants: &[Entrant<'_>]) -> Vec<Quantity> {
         ),
         axis: Axis::logarithmic("energy / 1000"),
         value: |measured| measured.energy.total as f64 / 1000.0,
-        note: "Only plans of this profile: its energies and those of another are not of one scale.",
+        note: "The diagram shows plans of this profile only, since energies of two profiles have different scales.",
         compares: Box::new(move |settings| model(settings) == own),
     };
     models.into_iter().map(quantity).collect()
@@ -105,7 +104,7 @@ impl<'a> Field<'a> {
             let value = mean_of_medians(&ms)?;
             let [low, high] = interval(&ms).unwrap_or([value; 2]);
             Some(Entrant {
-                plan: plans.iter().position(|plan| plan.plan == group.plan)?,
+                plan: *plans.iter().find(|plan| plan.plan == group.plan)?,
                 backend: devices.iter().position(|(backend, _)| *backend == group.backend)?,
                 ms: Value { value, low: low.min(value), high: high.max(value) },
                 settings: &group.cell()?.settings,
@@ -113,7 +112,7 @@ impl<'a> Field<'a> {
             })
         };
         let entrants = groups(results.record).iter().filter_map(entrant).collect();
-        Self { results, plans, entrants }
+        Self { results, entrants }
     }
 
     fn label(&self, entrant: &Entrant<'_>) -> String {
@@ -121,18 +120,18 @@ impl<'a> Field<'a> {
     }
 
     fn name(&self, entrant: &Entrant<'_>) -> String {
-        format!("{} on {}", short(&self.plans[entrant.plan]), self.label(entrant))
+        format!("{} on {}", entrant.plan.title, self.label(entrant))
     }
 }
 
-/// A quantity of all entrants that it compares.
+/// A quantity, and the entrants it is drawn for.
 struct Diagram<'a> {
     field: &'a Field<'a>,
     quantity: &'a Quantity,
     entrants: Vec<&'a Entrant<'a>>,
-    /// One an entrant.
+    /// One for each entrant.
     points: Vec<Point>,
-    /// Numbers of the points that nothing beats.
+    /// Indices of the points on the Pareto front.
     front: Vec<usize>,
 }
 
@@ -146,24 +145,23 @@ impl<'a> Diagram<'a> {
 
     fn drawing(&self, number: usize) -> Result<Drawing, Failure> {
         let svg = self.chart().svg().map_err(|error| Failure::other(format!("diagram A.{number}: {error}")))?;
-        let caption = [Some(READING.to_owned()), Some(self.quantity.note.to_owned()), Some(self.members())];
-        let names = [self.short_names(), self.field.results.unavailable()];
+        let caption = [READING.to_owned(), self.quantity.note.to_owned(), self.members()];
         Ok(Drawing {
             name: format!("diagram-A.{number}"),
-            title: format!("Diagram A.{number} (ours): {}", self.quantity.title),
-            caption: caption.into_iter().chain(names).flatten().collect::<Vec<_>>().join(" "),
+            title: format!("Diagram A.{number}: {}", self.quantity.title),
+            caption: caption.into_iter().chain(self.field.results.unavailable()).collect::<Vec<_>>().join(" "),
             svg,
             table: Some(self.table()),
         })
     }
 
-    /// Who is on the front, in a sentence.
+    /// The plans on the front, in a sentence.
     fn members(&self) -> String {
         let members: Vec<_> = self.front.iter().map(|&i| self.field.name(self.entrants[i])).collect();
         if members.is_empty() {
-            return "No plan has numbers of every scene.".to_owned();
+            return "No plan has numbers for every scene.".to_owned();
         }
-        format!("Pareto front, nothing else being both faster and lower: {}.", members.join("; "))
+        format!("On the Pareto front, where no other plan is both faster and lower: {}.", members.join("; "))
     }
 
     fn chart(&self) -> Plot {
@@ -175,48 +173,42 @@ impl<'a> Diagram<'a> {
             points: self.front.iter().map(|&i| self.points[i]).collect(),
         };
         let front = Key { name: stairs.name.clone(), style: stairs.style };
-        let plans = self.plans().map(|(i, plan)| (i, short(plan)));
+        let key = |plan: &Named| Key { name: plan.title.to_owned(), style: legend::any_device(results, plan) };
         let point = |(entrant, &point): (&&Entrant<'_>, &Point)| Series {
             name: field.name(entrant),
-            style: legend::style(entrant.plan, entrant.backend),
+            style: legend::style(results, &entrant.plan, entrant.backend),
             points: vec![point],
         };
         let points = self.entrants.iter().zip(&self.points).map(point);
         let (data, members) = (results.data(), self.members());
         Plot {
             title: title.clone(),
-            description: format!("{title}, means over {data}, of every plan on every backend. {members}"),
+            description: format!("{title}, means over {data}, for every plan on every backend. {members}"),
             x: Axis::logarithmic("milliseconds from images to labels"),
             y: Axis { name: format!("{}; {}", quantity.axis.name, results.setting()), ..quantity.axis.clone() },
             levels: Vec::new(),
-            keys: legend::keys(results, plans).into_iter().chain([front]).collect(),
+            keys: self.plans().map(key).chain(legend::devices(results)).chain([front]).collect(),
             series: [stairs].into_iter().chain(points).collect(),
         }
     }
 
-    /// A row an entrant.
+    /// A row for each entrant.
     fn table(&self) -> Table {
         let rows = self.entrants.iter().zip(&self.points).map(|(entrant, Point { x, y })| {
             let range = format!("{} ({} to {})", number(x.value, 1), number(x.low, 1), number(x.high, 1));
             let ms = if x.low < x.high { range } else { number(x.value, 1) };
-            vec![short(&self.field.plans[entrant.plan]), self.field.label(entrant), ms, number(y.value, 2)]
+            vec![entrant.plan.title.to_owned(), self.field.label(entrant), ms, number(y.value, 2)]
         });
         let columns = ["plan", "backend", "total, ms", &self.quantity.axis.name];
         Table::new("", self.field.results.setting(), &columns).rows(rows.collect::<Vec<_>>())
     }
 
-    /// The plans that are shown, with their places among all.
-    fn plans(&self) -> impl Iterator<Item = (usize, &Named)> {
-        let is_shown = |plan: usize| self.entrants.iter().any(|entrant| entrant.plan == plan);
-        self.field.plans.iter().enumerate().filter(move |&(i, _)| is_shown(i))
-    }
-
-    /// What the short names of our plans mean.
-    fn short_names(&self) -> Option<String> {
-        let meaning = |plan: &Named| format!("\"{}\" is {}", short(plan), plan.title.trim_start_matches("ours: "));
-        let own = self.plans().filter(|(_, plan)| plan.printed.is_none());
-        let names: Vec<_> = own.map(|(_, plan)| meaning(plan)).collect();
-        (!names.is_empty()).then(|| format!("{}.", names.join("; ")))
+    /// The plans that are shown, in the order of their markers.
+    fn plans(&self) -> impl Iterator<Item = &Named> {
+        let mut plans: Vec<_> = self.entrants.iter().map(|entrant| &entrant.plan).collect();
+        plans.sort_by_key(|plan| plan.look);
+        plans.dedup_by_key(|plan| plan.look);
+        plans.into_iter()
     }
 }
 
@@ -224,15 +216,10 @@ impl<'a> Diagram<'a> {
 const GREY: usize = 7;
 
 /// How to read all of these diagrams.
-const READING: &str = "Lower left is better. Means over the scenes; times are medians by the wall clock, whiskers 95 % \
-                       intervals (bootstrap) where every scene has three samples or more.";
+const READING: &str = "Lower left is better. Values are means over the scenes. Times are medians by the wall clock; whiskers \
+                       are 95 % intervals (bootstrap), where every scene has at least three samples.";
 
-/// A plan's name in a legend: titles of ours tell their settings.
-fn short(plan: &Named) -> String {
-    if plan.printed.is_some() { plan.title.to_owned() } else { format!("ours: {}", plan.plan) }
-}
-
-/// Numbers of the points that no other is below without being right of them, from left to right.
+/// Indices of the points that no other point beats in both values, from left to right.
 fn front(points: &[Point]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     let place = |i: usize| (points[i].x.value, points[i].y.value);

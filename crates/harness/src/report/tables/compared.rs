@@ -46,7 +46,7 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
         "printed: BP, ms",
         "plan, ms",
         "speed-up, %",
-        "ours: fewer updates",
+        "ours: updates, BP / plan",
         "message passing: BP, ms",
         "plan, ms",
         "speed-up, %",
@@ -59,7 +59,7 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
     let rows = pairs(results, plans).map(|(row, plan)| {
         let [printed_ms, printed_percent] = printed(results, &row, plan);
         let [bp_ms, _] = printed(results, &row, &BP);
-        let fewer = fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2} x"));
+        let fewer = fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2}"));
         let mut cells = which(&row, plan);
         cells.extend([bp_ms, printed_ms, printed_percent, or(fewer, "")]);
         for part in [Part::MessagePassing, Part::Total] {
@@ -68,8 +68,8 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
         cells.extend([bad(&row, "bp"), bad(&row, plan.plan)]);
         cells
     });
-    let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device; the range, where there is \
-                one, is over rounds in which the two took turns.";
+    let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device. A range covers the rounds in which the two took \
+                turns.";
     Table::new(number, format!("{} against BP: processing speed", family(plans)), &columns).note(note).rows(rows)
 }
 
@@ -98,10 +98,10 @@ pub(super) fn memory(results: &Results<'_>, number_of: &str, plans: &[Named]) ->
         cells.push(or(ratio, ""));
         cells
     });
-    let ours = if number_of == "3.25a" { " (ours: the thesis has no such table)" } else { "" };
-    let parts = if plans.iter().any(|plan| plan.is_cut()) { " All four parts are held at once." } else { "" };
+    let ours = if number_of == "3.25a" { " (not in the thesis)" } else { "" };
+    let parts = if plans.iter().any(|plan| plan.is_cut()) { " All four parts are in memory at once." } else { "" };
     Table::new(number_of, format!("{} against BP: required memory{ours}", family(plans)), &columns)
-        .note(format!("Bytes allocated, counted.{parts}"))
+        .note(format!("Allocated bytes, as counted.{parts}"))
         .rows(rows)
 }
 
@@ -117,7 +117,7 @@ pub(super) fn reliability(results: &Results<'_>, number_of: &str, plans: &[Named
         "plan",
         "B>1 all, BP",
         "plan",
-        "B>1 visible, BP",
+        "B>1 non-occluded, BP",
         "plan",
         "energy, BP",
         "plan",
@@ -136,8 +136,10 @@ pub(super) fn reliability(results: &Results<'_>, number_of: &str, plans: &[Named
         cells
     });
     Table::new(number_of, format!("{} against BP: reliability", family(plans)), &columns)
-        .note("R in pixels, B in percent. Energies are under the schedule sync, where plain BP's stays well above what as many \
-               checkerboard loops reach.")
+        .note(
+            "R is in pixels, B in percent. Under the schedule sync, plain BP's energy stays well above that of as many \
+               checkerboard loops.",
+        )
         .rows(rows)
 }
 
@@ -180,15 +182,24 @@ pub(super) fn all_memory(results: &Results<'_>) -> Table {
         let which = [(row.index + 1).to_string(), row.scene.name.clone(), row.label()];
         which.into_iter().chain(cells).collect()
     });
-    Table::new("3.30", "All algorithms: required memory, MiB (ours: the thesis has no such table)", &columns)
-        .note("Bytes allocated, counted. Not printed in the thesis.")
+    Table::new("3.30", "All algorithms: required memory, MiB (not in the thesis)", &columns)
+        .note("Allocated bytes, as counted. The thesis prints no memory figure.")
         .rows(rows)
 }
 
 /// Table 3.31, ours.
 pub(super) fn all_reliability(results: &Results<'_>) -> Table {
-    let columns =
-        ["#", "scene", "backend", "plan", "R all, px", "R visible, px", "B>1 all, %", "B>1 visible, %", "energy"];
+    let columns = [
+        "#",
+        "scene",
+        "backend",
+        "plan",
+        "R all, px",
+        "R non-occluded, px",
+        "B>1 all, %",
+        "B>1 non-occluded, %",
+        "energy",
+    ];
     let plans = thesis_plans();
     let rows = pairs(results, &plans).map(|(row, plan)| {
         let mut cells = which(&row, plan);
@@ -204,7 +215,7 @@ pub(super) fn all_reliability(results: &Results<'_>) -> Table {
         }
         cells
     });
-    Table::new("3.31", "All algorithms: reliability (ours: the thesis has no such table)", &columns)
-        .note("Not printed in the thesis.")
+    Table::new("3.31", "All algorithms: reliability (not in the thesis)", &columns)
+        .note("The thesis prints no reliability figure.")
         .rows(rows.collect::<Vec<_>>())
 }

@@ -11,7 +11,7 @@ use crate::{
 
 const NOT_PRINTED: &str = "not printed";
 
-/// The columns that say which measurement a row is of.
+/// The columns that name the measurement of a row.
 const WHICH: [&str; 4] = ["#", "scene", "backend", "plan"];
 
 /// The cells under [`WHICH`].
@@ -36,8 +36,8 @@ fn table<'a>(
 pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
     let columns = ["grids x loops", "printed, ms", "ours: message passing, ms", "total, ms", "samples"];
     let title = format!("{}: processing speed", family(plans));
-    let note = "Median, and range from three samples on. Message passing is the stages refine and update_messages; total \
-                goes from the images to the labels.";
+    let note = "Times are medians, with their range from three samples on. Message passing is the stages refine and \
+                update_messages. The total goes from the images to the labels.";
     let table = table(results, (number, title), plans, &columns, |row, plan| {
         let printed = plan.printed.and_then(|name| results.thesis.time_ms(name, row.index));
         let time = |part| or(row.time(plan.plan, part).map(|time| time.to_string()), row.missing(plan.plan));
@@ -56,11 +56,9 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
 /// How the parts of a cut image share the workers.
 fn parts_note(results: &Results<'_>) -> &'static str {
     if results.devices().iter().all(|(_, device)| device.workers == 1 && device.api.is_none()) {
-        " Parts run one after another; running them side by side needs a backend with several workers, and this run has \
-         none."
+        " Parts run one after another. This run has no backend with several workers, which could run them side by side."
     } else {
-        " Parts are not run side by side, a worker each: where there are several workers, all share the whole image in \
-         every plan, BP's too."
+        " Parts do not get a worker each: all workers share the whole image in every plan, BP's included."
     }
 }
 
@@ -72,8 +70,8 @@ fn grids_and_loops(cell: &Cell) -> String {
 pub(super) fn memory(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
     let columns = ["printed", "ours: predicted, MiB", "allocated, MiB"];
     let title = format!("{}: required memory", family(plans));
-    let note =
-        "Predicted by the plan's formulas before the run; allocated is counted. The thesis prints no memory figure.";
+    let note = "The plan's formulas predict memory before the run; allocated bytes are counted. The thesis prints no memory \
+                figure.";
     table(results, (number, title), plans, &columns, |row, plan| {
         let allocated = row.measured(plan.plan).map(|measured| measured.allocated_bytes);
         vec![
@@ -93,10 +91,10 @@ pub(super) fn mib(bytes: u64) -> String {
 /// Tables 3.5, 3.8, 3.11, 3.14, 3.17.
 pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
     let title = format!("{}: reliability", family(plans));
-    let note = "R is the root mean squared error in pixels (equation 2.82), B the percentage of pixels wrong by more than \
-                so many pixels (2.83), over all pixels of known truth and over those that both cameras see. The \
-                energy depends on the schedule: under sync, plain BP's stays well above what as many checkerboard loops \
-                reach. The thesis prints no reliability figure.";
+    let note = "R is the root mean squared error in pixels (equation 2.82). B>1 is the percentage of pixels wrong by more \
+                than 1 px (2.83). Both are over all pixels of known truth and over the non-occluded ones, which both \
+                cameras see. The energy depends on the schedule: under sync, plain BP's stays well above that of as many \
+                checkerboard loops. The thesis prints no reliability figure.";
     table(results, (number, title), plans, &reliability_columns(), |row, plan| {
         let Some(measured) = row.measured(plan.plan) else {
             return vec![NOT_PRINTED.to_owned(), row.missing(plan.plan).to_owned()];
@@ -119,11 +117,11 @@ fn reliability_columns() -> [&'static str; 13] {
         "B>1 all",
         "B>2 all",
         "B>4 all",
-        "R visible",
-        "B>0.5 visible",
-        "B>1 visible",
-        "B>2 visible",
-        "B>4 visible",
+        "R non-occluded",
+        "B>0.5 non-occluded",
+        "B>1 non-occluded",
+        "B>2 non-occluded",
+        "B>4 non-occluded",
         "energy",
         "schedule",
     ]

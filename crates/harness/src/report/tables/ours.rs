@@ -1,24 +1,31 @@
-//! Tables that the thesis has no counterpart of.
+//! Tables that the thesis does not have.
 
 use super::{Named, Table, thesis_plans};
-use crate::report::{
-    format::{Spread, number, or, whole},
-    results::{Part, Results, Row},
+use crate::{
+    record::Measurement,
+    report::{
+        format::{number, or, whole},
+        results::{Part, Results},
+    },
 };
 
-/// Number of the table of means, the only one with times of plans that the thesis has not.
+/// Number of the table of means, the only one with times of our plans.
 pub(super) const PROFILES: &str = "A.1";
 
-/// Our plan with census costs.
+/// A plan of ours: the census transform gives the data costs of all pixels.
+const fn own(look: usize, plan: &'static str, title: &'static str, meaning: &'static str) -> Named {
+    Named { plan, title, printed: None, look, meaning }
+}
+
 pub(in crate::report) const CENSUS: Named =
-    Named { plan: "census", title: "ours: census cost, 5 grids x 2 loops", printed: None };
+    own(7, "census", "census (ours)", "census costs, 5 grids with 2 loops each");
 
 const HIERARCHY: Named =
-    Named { plan: "hierarchy", title: "ours: census cost, 5 grids x 10 half-steps (checkerboard)", printed: None };
+    own(8, "hierarchy", "hierarchy (ours)", "census costs, 5 grids with 10 half-steps each (schedule checkerboard)");
 
-const SWEEP: Named = Named { plan: "sweep", title: "ours: census cost, 5 grids x 1 sweep", printed: None };
+const SWEEP: Named = own(9, "sweep", "sweep (ours)", "census costs, 5 grids with 1 sweep each");
 
-/// The thesis's plans, and those of ours that were run.
+/// The thesis's plans, and our plans that were run.
 pub(in crate::report) fn all_plans(results: &Results<'_>) -> Vec<Named> {
     let run = |plan: &Named| results.record.cells.iter().any(|cell| cell.plan == plan.plan);
     thesis_plans().into_iter().chain([CENSUS, HIERARCHY, SWEEP].into_iter().filter(run)).collect()
@@ -29,7 +36,7 @@ pub(super) fn profiles(results: &Results<'_>) -> Table {
     let columns = [
         "backend",
         "plan",
-        "B>1 visible, %",
+        "B>1 non-occluded, %",
         "B>1 all, %",
         "R all, px",
         "message passing, ms",
@@ -40,41 +47,28 @@ pub(super) fn profiles(results: &Results<'_>) -> Table {
     let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
     let rows = rows.map(|(backend, plan)| {
         let none = results.missing_mean(backend, plan.plan, "not run");
-        let cells = means(results, backend, plan).map(|mean| or(mean.map(|mean| number(mean, 2)), none));
-        let energy = or(mean_energy(results, backend, plan).map(|energy| number(energy / 1000.0, 0)), none);
+        let mean = |of: fn(&Measurement) -> f64| results.mean(backend, |row| row.measured(plan.plan).map(of));
+        let time = |part| results.mean(backend, |row| Some(row.time(plan.plan, part)?.median));
+        let cells = [
+            mean(|measured| measured.visible.bad[1]),
+            mean(|measured| measured.all.bad[1]),
+            mean(|measured| measured.all.rmse),
+            time(Part::MessagePassing),
+            time(Part::Total),
+        ];
+        let cells = cells.map(|mean| or(mean.map(|mean| number(mean, 2)), none));
+        let energy = mean(|measured| measured.energy.total as f64);
+        let energy = or(energy.map(|energy| number(energy / 1000.0, 0)), none);
         [vec![results.label(backend), plan.title.to_owned()], cells.to_vec(), vec![energy]].concat()
     });
-    let note = "Means over the scenes, of medians where there are several samples. The thesis's plans use its grey \
-                difference; ours use the 3x3 census transform that CTBP computes for one pixel as the data cost of all. \
-                Energies of one data cost can be compared, those of the two cannot. On the backend rayon, message \
-                passing of a sweep includes computing its data costs again and deciding its labels.";
-    Table::new(PROFILES, "Accuracy and time, means (ours)", &columns).note(note).rows(rows)
+    let note = "Means over the scenes; with several samples, means of medians. The thesis's plans use its grey difference as \
+                data cost. Ours use the 3x3 census transform, which CTBP computes for one pixel only. Energies can be \
+                compared only between plans with the same data cost. On the backend rayon, message passing of a sweep \
+                includes computing its data costs again and selecting its labels.";
+    Table::new(PROFILES, "Accuracy and time, means (not in the thesis)", &columns).note(note).rows(rows)
 }
 
-/// Mean energy of a plan's labels.
-fn mean_energy(results: &Results<'_>, backend: &str, plan: &Named) -> Option<f64> {
-    let rows = results.rows().filter(|row| row.backend == backend);
-    let energies: Option<Vec<f64>> = rows.map(|row| Some(row.measured(plan.plan)?.energy.total as f64)).collect();
-    Spread::mean(energies?)
-}
-
-/// Mean visible and total bad-pixel percentage, error, message passing time and total time of a plan.
-pub(in crate::report) fn means(results: &Results<'_>, backend: &str, plan: &Named) -> [Option<f64>; 5] {
-    let rows: Vec<Row<'_>> = results.rows().filter(|row| row.backend == backend).collect();
-    let mean = |value: &dyn Fn(&Row<'_>) -> Option<f64>| {
-        let values: Option<Vec<f64>> = rows.iter().map(value).collect();
-        Spread::mean(values?)
-    };
-    [
-        mean(&|row| Some(row.measured(plan.plan)?.visible.bad[1])),
-        mean(&|row| Some(row.measured(plan.plan)?.all.bad[1])),
-        mean(&|row| Some(row.measured(plan.plan)?.all.rmse)),
-        mean(&|row| Some(row.time(plan.plan, Part::MessagePassing)?.median)),
-        mean(&|row| Some(row.time(plan.plan, Part::Total)?.median)),
-    ]
-}
-
-/// Labellings by others and ours under one energy; none where the data held none.
+/// Labellings by others and by this program under one energy; `None` if the data held none.
 pub(super) fn energies(results: &Results<'_>) -> Option<Table> {
     let labellings = &results.record.labellings;
     if labellings.is_empty() {
@@ -91,11 +85,13 @@ pub(super) fn energies(results: &Results<'_>) -> Option<Table> {
             whole(energy.smoothness),
         ]
     });
-    let note = "Profile mrf, 16 labels: sum of absolute colour differences + 20 min(|a - b|, 2). The references are label \
-                maps made by the Middlebury MRF code (Szeliski et al. 2008) from the same images, all-zero labels, and the \
-                cheapest label of each pixel (WTA); their energies are computed here from the maps. Ours runs plain BP \
-                with the checkerboard schedule.";
+    let note = "Profile mrf, 16 labels: the sum of absolute colour differences plus 20 min(|a - b|, 2). The references are \
+                label maps made by the Middlebury MRF code (Szeliski et al. 2008) from the same images, all-zero labels, \
+                and the cheapest label of each pixel (WTA, winner takes all). Their energies are computed here from the \
+                maps. This program ran plain BP with the schedule checkerboard.";
     let columns = ["scene", "method", "labels by", "energy", "data", "smoothness"];
-    let table = Table::new("A.2", "Energies beside those of other optimisers (ours)", &columns).note(note).rows(rows);
+    let table = Table::new("A.2", "Energies beside those of other optimisers (not in the thesis)", &columns)
+        .note(note)
+        .rows(rows);
     Some(Table { data: Some("Middlebury 2001 and 2003 (tsukuba, venus, teddy), L = 16".to_owned()), ..table })
 }

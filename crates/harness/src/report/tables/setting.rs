@@ -22,11 +22,11 @@ pub(super) fn computer(results: &Results<'_>) -> Table {
         .rows(rows.map(|(what, printed)| vec![what.clone(), printed.clone(), ours(what)]))
 }
 
-/// The GPUs that were used; what only seems one is named, and that it is none.
+/// The GPUs that were used, and the software rasterisers, marked as such.
 fn gpus(results: &Results<'_>) -> String {
     let mut names: Vec<String> = Vec::new();
     for (_, device) in results.devices().into_iter().filter(|(_, device)| device.api.is_some()) {
-        let software = if device.software_rasteriser { " (no GPU: a software rasteriser)" } else { "" };
+        let software = if device.software_rasteriser { " (a software rasteriser, not a GPU)" } else { "" };
         let name = format!("{}{software}", device.name);
         if !names.contains(&name) {
             names.push(name);
@@ -47,7 +47,7 @@ pub(super) fn images(results: &Results<'_>) -> Table {
         "labels L",
         "largest true disparity, px",
         "pixels of known truth",
-        "visible in both views",
+        "non-occluded pixels",
     ];
     let rows = results.scenes().zip(&results.thesis.images).map(|((index, scene), printed)| {
         vec![
@@ -63,6 +63,7 @@ pub(super) fn images(results: &Results<'_>) -> Table {
             whole(scene.visible),
         ]
     });
-    let note = "\"Disparity true\" is the data set's horizontal crop in full-size pixels, not a number of labels.";
+    let note = "\"Disparity true\" is the data set's horizontal crop in full-size pixels, not a number of labels. Non-occluded \
+                pixels are those of known truth that both cameras see.";
     Table::new("3.2", "The images", &columns).note(note).rows(rows)
 }
