@@ -17,6 +17,7 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
+use harness::threads;
 use notes::tell;
 
 fn main() -> ExitCode {

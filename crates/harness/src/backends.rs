@@ -3,4 +3,4 @@
 #[cfg(test)]
 pub mod flaky;
 
-pub use bp_stereo::devices::{ALL, DEFAULT, Opened, choose, device_name, reason, reference};
+pub(crate) use bp_stereo::devices::{ALL, Opened, choose, reason, reference};

@@ -14,13 +14,18 @@ use crate::{
 /// A format of another program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
+    /// Input of github-action-benchmark (customSmallerIsBetter).
     GithubActionBenchmark,
+    /// Bencher Metric Format.
     Bencher,
+    /// A table with a row for every sample.
     Csv,
+    /// A Vega-Lite chart.
     VegaLite,
 }
 
 impl Format {
+    /// All formats.
     pub const ALL: [Self; 4] = [Self::GithubActionBenchmark, Self::Bencher, Self::Csv, Self::VegaLite];
 
     /// What `--format` takes.

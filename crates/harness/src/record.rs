@@ -7,7 +7,6 @@ pub mod speed;
 
 pub use bp_stereo::description::milliseconds;
 pub use bp_stereo::description::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
-#[cfg(feature = "fuzzing")]
 pub use load::parse;
 pub use load::{MAPS_FOLDER, RECORD_FILE, SPEED_FILE, load, load_speed, record_file};
 pub use sample::Sample;

@@ -63,8 +63,11 @@ pub fn set(name: &str) -> Option<&'static Set> {
 
 /// A pair with its ground truth.
 pub struct Scene {
+    /// The images.
     pub pair: StereoPair,
+    /// The ground truth of the left image.
     pub truth: GroundTruth,
+    /// Its description.
     pub record: record::Scene,
 }
 
@@ -73,6 +76,7 @@ pub struct Scene {
 pub struct Source {
     /// The data folder; `None` for synthetic scenes.
     folder: Option<PathBuf>,
+    /// Which six scenes.
     pub set: &'static Set,
 }
 
@@ -176,6 +180,7 @@ const MANIFEST: &str = "crates/harness/data/middlebury.json";
 pub struct Manifest {
     #[expect(dead_code, reason = "for readers of the file")]
     about: String,
+    /// The files.
     pub files: Vec<ManifestEntry>,
 }
 

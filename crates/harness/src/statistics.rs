@@ -20,8 +20,11 @@ const FEWEST_SAMPLES: usize = 3;
 /// The median and range of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
+    /// The median.
     pub median: f64,
+    /// The least value.
     pub low: f64,
+    /// The greatest value.
     pub high: f64,
     /// How many numbers there are.
     pub count: usize,
@@ -58,23 +61,23 @@ impl fmt::Display for Spread {
 }
 
 /// The median of some numbers; `None` if there are none.
-pub fn median(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub(crate) fn median(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     Spread::of(numbers).map(|spread| spread.median)
 }
 
 /// The mean over the scenes of the median of each scene's samples; `None` if a scene has no samples.
-pub fn mean_of_medians(scenes: &[Vec<f64>]) -> Option<f64> {
+pub(crate) fn mean_of_medians(scenes: &[Vec<f64>]) -> Option<f64> {
     Spread::mean(scenes.iter().map(|samples| median(samples.iter().copied())).collect::<Option<Vec<f64>>>()?)
 }
 
 /// A 95 % interval of that mean by the percentile bootstrap; `None` if a scene has too few samples.
-pub fn interval(scenes: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub(crate) fn interval(scenes: &[Vec<f64>]) -> Option<[f64; 2]> {
     percentiles(|random| resampled(scenes, random))
 }
 
 /// The same for the ratio of two such means whose samples were not taken in turns. No sample of one side belongs to a
 /// sample of the other, so each side is resampled by itself.
-pub fn ratio_interval(scenes: &[Vec<f64>], base: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub(crate) fn ratio_interval(scenes: &[Vec<f64>], base: &[Vec<f64>]) -> Option<[f64; 2]> {
     percentiles(|random| Some(resampled(scenes, random)? / resampled(base, random)?))
 }
 

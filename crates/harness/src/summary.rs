@@ -8,10 +8,10 @@ use crate::record::{Cell, Measurement, Record, Sample};
 
 /// A plan on a backend, over the scenes of a record.
 pub(crate) struct Group<'a> {
-    pub(crate) plan: &'a str,
-    pub(crate) backend: &'a str,
+    pub plan: &'a str,
+    pub backend: &'a str,
     /// One a scene, in their order.
-    pub(crate) cells: Vec<Option<&'a Cell>>,
+    pub cells: Vec<Option<&'a Cell>>,
 }
 
 /// The groups of a record, in the order of their first cells.

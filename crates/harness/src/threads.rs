@@ -16,11 +16,7 @@ pub fn run_on<T: Send, E: From<Failure> + Send>(
 }
 
 /// Refuses a number of threads that none of these devices works with.
-pub fn check(
-    threads: Option<u16>,
-    names: &[String],
-    workers: impl IntoIterator<Item = usize>,
-) -> Result<(), Failure> {
+pub fn check(threads: Option<u16>, names: &[String], workers: impl IntoIterator<Item = usize>) -> Result<(), Failure> {
     match threads.map(usize::from) {
         Some(threads) if workers.into_iter().all(|workers| workers != threads) => {
             let what = format!("--backend {} has no threads; --backend rayon has", names.join(","));

@@ -7,8 +7,8 @@ mod replay;
 
 use std::{fs, path::Path, time::Duration};
 
-use criterion::Criterion;
 use bp_stereo::Watch;
+use criterion::Criterion;
 use harness::bench::{self, Bench};
 use serde_json::Value;
 

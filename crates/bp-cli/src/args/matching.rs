@@ -7,10 +7,9 @@ use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
 use bp_io::Limits;
-use bp_stereo::Labels;
+use bp_stereo::{Labels, devices};
 
 use super::{FinishArgs, ManyArgs, OutputArgs, meaning::labels, named, positive, switch, threads};
-use crate::backends;
 
 /// `bp match`.
 #[derive(Clone, Debug, Args)]
@@ -97,7 +96,7 @@ pub(crate) struct PlanArgs {
     /// Backend: rayon, scalar (CPU), vulkan, wgpu (GPU); see bp devices.
     ///
     /// NAME:DEVICE chooses another device than the backend's first.
-    #[arg(long, default_value = backends::DEFAULT, value_name = "NAME")]
+    #[arg(long, default_value = devices::DEFAULT, value_name = "NAME")]
     pub(crate) backend: String,
     /// Device of the backend: its index, a part of its name or the beginning of its UUID. [default: its first]
     #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new(), hide_short_help = true)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum, builder::NonEmptyStringValueParser};
 
 use super::{DataArgs, threads};
-use crate::{
-    backends,
+use bp_stereo::devices;
+use harness::{
     gate::{Counted, GateOptions, Renewal},
     reproduce::ReproduceOptions,
     speed::{Problem, SpeedOptions},
@@ -24,7 +24,7 @@ pub(crate) struct ReproduceArgs {
     pub(crate) quick: bool,
     /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device, by its index, a part of
     /// its name or the beginning of its UUID.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', default_value = devices::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one a processor]
     #[arg(long, value_name = "N", value_parser = threads())]
@@ -44,7 +44,7 @@ pub(crate) struct ReproduceArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ConformArgs {
     /// Backends, separated by commas; NAME:DEVICE for another than a backend's first device.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', default_value = devices::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct ConformArgs {
 pub(crate) struct SpeedArgs {
     /// Backends, separated by commas. The others are compared with the first. NAME:DEVICE is another than a backend's
     /// first device, NAME@THREADS runs on that many threads: rayon@1,rayon@2.
-    #[arg(long, value_delimiter = ',', default_value = backends::DEFAULT, value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', default_value = devices::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
     /// Problems, separated by commas. In pixels, labels and loops that number grows from problem to problem. [default:
     /// the first eight]

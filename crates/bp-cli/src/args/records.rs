@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::named;
-use crate::export::Format;
+use harness::export::Format;
 
 /// `bp report`.
 #[derive(Debug, Args)]

@@ -3,12 +3,12 @@
 use std::{io::Write, path::Path};
 
 use super::print_json;
-use crate::{
-    args::CompareArgs,
+use harness::{
     compare::{Comparison, page},
-    failure::Failure,
     record::{Record, load},
 };
+
+use crate::{args::CompareArgs, failure::Failure};
 
 /// Runs the command.
 pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {

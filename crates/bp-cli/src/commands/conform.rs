@@ -2,15 +2,18 @@
 
 use std::{io::Write, time::Instant};
 
-use crate::{args::ConformArgs, backends, failure::Failure, tell};
+use bp_stereo::devices;
+
+use crate::{args::ConformArgs, failure::Failure, notes::tell};
 
 /// Runs the command: all backends, though one may fail.
 pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
-    let chosen: Vec<_> = args.backend.iter().map(|name| backends::choose(name, None)).collect::<Result<_, _>>()?;
+    let chosen: Vec<_> =
+        args.backend.iter().map(|name| Ok(devices::choose(name, None)?)).collect::<Result<_, Failure>>()?;
     let mut failures = Vec::new();
     for chosen in chosen {
         let name = chosen.name.clone();
-        let opened = chosen.open().map_err(|error| Failure::unavailable(backends::reason(error)));
+        let opened = chosen.open().map_err(|error| Failure::unavailable(devices::reason(error)));
         let outcome = opened.and_then(|opened| check(&opened));
         failures.extend(outcome.err().map(|failure| (name, failure)));
     }
@@ -20,8 +23,8 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
 }
 
 /// Runs the suite on a device.
-fn check(opened: &backends::Opened) -> Result<(), Failure> {
-    let reference = backends::reference()?;
+fn check(opened: &devices::Opened) -> Result<(), Failure> {
+    let reference = devices::reference()?;
     let start = Instant::now();
     let conforms = bp_testkit::conform(reference.device.as_ref(), opened.device.as_ref());
     conforms.map_err(|difference| Failure::other(difference.to_string()))?;

@@ -6,12 +6,9 @@ use bytesize::ByteSize;
 use serde::Serialize;
 
 use super::{indented, print_json};
-use crate::{
-    args::DevicesArgs,
-    backends::{self, device_name},
-    failure::Failure,
-    record,
-};
+use bp_stereo::{description, devices as listed, devices::device_name};
+
+use crate::{args::DevicesArgs, failure::Failure};
 
 /// What `--json` prints for a backend.
 #[derive(Serialize)]
@@ -29,7 +26,7 @@ struct DeviceReport {
     /// What `--backend` takes.
     option: String,
     #[serde(flatten)]
-    device: record::Device,
+    device: description::Device,
 }
 
 /// Where names of devices begin.
@@ -37,7 +34,7 @@ const INDENT: usize = 33;
 
 /// Runs the command.
 pub(crate) fn devices(args: &DevicesArgs) -> Result<(), Failure> {
-    let reports: Vec<_> = backends::ALL.iter().map(|&backend| report(backend)).collect();
+    let reports: Vec<_> = listed::ALL.iter().map(|&backend| report(backend)).collect();
     if args.json {
         return print_json(&reports);
     }
@@ -68,12 +65,12 @@ fn report(backend: &dyn bp_core::Backend) -> BackendReport {
         .enumerate()
         .map(|(index, info)| DeviceReport { option: device_name(backend, index), device: (&info).into() });
     let devices: Vec<_> = devices.collect();
-    let unavailable = if devices.is_empty() { backend.open(0).err().map(backends::reason) } else { None };
-    BackendReport { backend: backend.name(), default: backend.name() == backends::DEFAULT, devices, unavailable }
+    let unavailable = if devices.is_empty() { backend.open(0).err().map(listed::reason) } else { None };
+    BackendReport { backend: backend.name(), default: backend.name() == listed::DEFAULT, devices, unavailable }
 }
 
 /// Memory, interface and driver, as far as they are known.
-fn details(device: &record::Device) -> Vec<String> {
+fn details(device: &description::Device) -> Vec<String> {
     let memory = device.memory_bytes.map(|bytes| ByteSize(bytes).display().iec().to_string());
     [memory, device.api.clone(), device.driver.clone()].into_iter().flatten().collect()
 }

@@ -8,12 +8,12 @@ use bytesize::ByteSize;
 use serde::Serialize;
 
 use super::{indented, print_json};
+use bp_stereo::devices::{self as listed, device_name};
+use harness::{machine, scenes::Source};
+
 use crate::{
     args::{DataArgs, DoctorArgs},
-    backends::{self, device_name},
     failure::Failure,
-    machine,
-    scenes::Source,
 };
 
 /// Something that was looked at.
@@ -78,7 +78,7 @@ fn print(checks: &[Check]) -> Result<(), Failure> {
 fn checks(args: &DoctorArgs) -> Vec<Check> {
     let mut checks = vec![program(), processor(), memory()];
     let mut kinds = Vec::new();
-    for &backend in backends::ALL {
+    for &backend in listed::ALL {
         checks.extend(devices(backend, &mut kinds));
     }
     checks.push(gpu(&kinds));
@@ -89,15 +89,20 @@ fn checks(args: &DoctorArgs) -> Vec<Check> {
 }
 
 fn program() -> Check {
-    let names: Vec<_> = backends::ALL.iter().map(|backend| backend.name()).collect();
-    let commit = env!("BP_COMMIT").get(..8).unwrap_or("unknown");
+    let names: Vec<_> = listed::ALL.iter().map(|backend| backend.name()).collect();
+    let commit = machine::commit();
+    let commit = commit.get(..8).unwrap_or("unknown");
     let version = env!("CARGO_PKG_VERSION");
     Check::ok("program", format!("bp {version}, commit {commit}, backends {}", names.join(", ")))
 }
 
 fn processor() -> Check {
     let machine = machine::machine(None);
-    Check::ok("processor", format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.system))
+    Check::ok("processor", format!("{}, {}, {}", machine.cpu, cores(machine.cores), machine.system))
+}
+
+fn cores(count: usize) -> String {
+    if count == 1 { "1 core".to_owned() } else { format!("{count} cores") }
 }
 
 fn memory() -> Check {
@@ -119,10 +124,10 @@ fn devices(backend: &dyn Backend, kinds: &mut Vec<DeviceKind>) -> Vec<Check> {
                 kinds.extend(info.map(|info| info.kind));
                 Check::ok(name, info.map_or_else(String::new, described))
             }
-            (Err(error), _) if backend.name() == backends::DEFAULT && index == 0 => {
-                Check { state: State::Failed, ..Check::ok(name, backends::reason(error)) }
+            (Err(error), _) if backend.name() == listed::DEFAULT && index == 0 => {
+                Check { state: State::Failed, ..Check::ok(name, listed::reason(error)) }
             }
-            (Err(error), _) => Check { state: State::Note, ..Check::ok(name, backends::reason(error)) },
+            (Err(error), _) => Check { state: State::Note, ..Check::ok(name, listed::reason(error)) },
         });
     }
     checks

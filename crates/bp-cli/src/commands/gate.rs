@@ -5,7 +5,9 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::print_json;
-use crate::{args::GateArgs, failure::Failure, gate, note, terminal, threads};
+use harness::{gate, threads};
+
+use crate::{args::GateArgs, failure::Failure, notes::note, terminal};
 
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {

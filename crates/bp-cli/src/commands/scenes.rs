@@ -4,11 +4,9 @@ use std::io::Write;
 
 use bp_testkit::synthetic;
 
-use crate::{
-    args::ScenesArgs,
-    failure::Failure,
-    scenes::{Manifest, Source},
-};
+use harness::scenes::{Manifest, Source};
+
+use crate::{args::ScenesArgs, failure::Failure};
 
 /// Runs the command: lists the scenes, and checks every listed file that the data folder holds.
 pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {

@@ -2,12 +2,12 @@
 
 use std::{io::Write as _, path::Path};
 
+use bp_io::{Files, create_folder};
 use clap::{Command, CommandFactory as _};
 
 use crate::{
     args::{Cli, CompletionsArgs, ManArgs},
     failure::Failure,
-    files::{create_folder, write_whole},
 };
 
 /// Prints completions.
@@ -30,5 +30,5 @@ pub(crate) fn man(args: &ManArgs) -> Result<(), Failure> {
 
 fn write_page(folder: &Path, command: Command) -> Result<(), Failure> {
     let page = clap_mangen::Man::new(command);
-    write_whole(&folder.join(page.get_filename()), |file| page.render(file))
+    Ok(Files::default().whole(&folder.join(page.get_filename()), |file| page.render(file))?)
 }

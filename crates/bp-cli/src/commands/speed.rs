@@ -2,14 +2,13 @@
 
 use std::io::Write;
 
-use crate::{
-    args::SpeedArgs,
-    failure::Failure,
+use harness::{
     measure::Asked,
-    note,
     speed::{self, Files},
-    terminal, threads,
+    threads,
 };
+
+use crate::{args::SpeedArgs, failure::Failure, notes::note, terminal};
 
 /// Runs the command.
 pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
@@ -29,5 +28,5 @@ pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
         note(&files.write(&measured)?);
     }
     write!(std::io::stdout(), "{}", speed::page(&measured))?;
-    speed::check(&measured)
+    Ok(speed::check(&measured)?)
 }

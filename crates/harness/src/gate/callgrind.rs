@@ -41,7 +41,7 @@ const TOLD_FROM: f64 = 0.001;
 /// What was counted, and with what: counts of other processors, compilers, flags or valgrinds do not compare.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Counts {
+pub(super) struct Counts {
     /// Commit of the program.
     pub(super) commit: String,
     /// The processor.
@@ -130,13 +130,13 @@ fn pair(size: Size) -> Result<StereoPair, Error> {
 }
 
 /// Name and version of valgrind; `None` where there is none.
-pub fn valgrind() -> Option<String> {
+pub(super) fn valgrind() -> Option<String> {
     let output = Command::new("valgrind").arg("--version").stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 /// Counts all solves with this valgrind, several at once: they do not disturb one another.
-pub fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
+pub(super) fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
     let failed = |error| Failure::other(format!("cannot find this program's own file: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let solves: Vec<_> = Counted::all().collect();

@@ -22,6 +22,7 @@ const MOST_THREADS: usize = 1024;
 pub struct Runner {
     /// Its name in options and records.
     pub name: String,
+    /// What is known of the device.
     pub info: DeviceInfo,
     /// How long opening took, the test of the device included.
     pub open_time: Duration,

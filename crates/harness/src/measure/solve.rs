@@ -15,6 +15,7 @@ use crate::{
 pub struct Solve<'a> {
     runner: &'a Runner,
     pair: &'a StereoPair,
+    /// The prepared plan.
     pub driver: Driver,
     /// How long it took to allocate everything.
     pub prepare_ms: f64,

@@ -42,6 +42,7 @@ impl<F: FnMut(u32) -> Result<Sample, Failure>> Contestant for F {
 pub struct Entrant<C> {
     /// Its name in progress and messages.
     pub name: String,
+    /// The contestant.
     pub contestant: C,
     /// Time of its first solve.
     pub first_ms: Option<f64>,

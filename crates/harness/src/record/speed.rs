@@ -149,6 +149,7 @@ impl StageBytes {
 }
 
 impl Family {
+    /// All families.
     pub const ALL: [Self; 6] =
         [Self::Pixels, Self::Labels, Self::Loops, Self::SweepPixels, Self::HalfStepPixels, Self::HalfStepLabels];
 
@@ -231,7 +232,9 @@ impl Contestant {
 
 /// A stage that took some time.
 pub struct StageTime {
+    /// The stage.
     pub stage: Stage,
+    /// Milliseconds.
     pub ms: Spread,
     /// What it has to read and write at least, where the device counts it and times the stage.
     pub bytes: Option<u64>,

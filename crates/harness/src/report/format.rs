@@ -1,22 +1,22 @@
 //! Numbers as text.
 
-pub(crate) use bp_charts::number;
+pub use bp_charts::number;
 
-pub(crate) use crate::statistics::Spread;
+pub use crate::statistics::Spread;
 
 /// A whole number with commas between thousands.
-pub(crate) fn whole(value: u64) -> String {
+pub fn whole(value: u64) -> String {
     let digits: Vec<char> = value.to_string().chars().collect();
     digits.rchunks(3).rev().map(String::from_iter).collect::<Vec<_>>().join(",")
 }
 
 /// Bytes in MiB.
-pub(crate) fn mebibytes(bytes: u64) -> f64 {
+pub fn mebibytes(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
 /// A value, or the word for there being none.
-pub(crate) fn or(value: Option<String>, none: &str) -> String {
+pub fn or(value: Option<String>, none: &str) -> String {
     value.unwrap_or_else(|| none.to_owned())
 }
 

@@ -30,7 +30,7 @@ pub struct Storage {
 
 /// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
 /// process is at work on is left to it.
-pub fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
+pub(super) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
         let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;

@@ -12,12 +12,12 @@ use crate::{
 };
 
 /// A chart and the words around it.
-pub(crate) struct Chart {
+pub(super) struct Chart {
     /// File name without ending.
-    pub(crate) name: &'static str,
-    pub(crate) plot: Plot,
+    pub name: &'static str,
+    pub plot: Plot,
     /// What a reader must know.
-    pub(crate) caption: String,
+    pub caption: String,
 }
 
 /// File names, without ending, of all charts that there may be.
@@ -26,7 +26,7 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// All charts that this run has numbers for.
-pub(crate) fn charts(speed: &Speed) -> Vec<Chart> {
+pub(super) fn charts(speed: &Speed) -> Vec<Chart> {
     Family::ALL.into_iter().filter_map(|family| growth(speed, family)).chain(roofline(speed)).collect()
 }
 

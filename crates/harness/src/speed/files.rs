@@ -16,13 +16,13 @@ use crate::{
 
 /// The files of a folder that holds none of them yet.
 #[derive(Debug)]
-pub(crate) struct Files {
+pub struct Files {
     folder: PathBuf,
 }
 
 impl Files {
     /// Fails if the folder holds one of the files already: no record is overwritten.
-    pub(crate) fn new(folder: &Path) -> Result<Self, Failure> {
+    pub fn new(folder: &Path) -> Result<Self, Failure> {
         let files = Self { folder: folder.to_owned() };
         let charts = charts::names().flat_map(|name| ["svg", "png"].map(|ending| format!("{name}.{ending}")));
         let names = ["speed.md", SPEED_FILE].map(str::to_owned).into_iter().chain(charts);
@@ -31,13 +31,13 @@ impl Files {
     }
 
     /// Makes the folder, and fails if nothing can be written to it. Called before the work is done.
-    pub(crate) fn check(&self) -> Result<(), Failure> {
+    pub fn check(&self) -> Result<(), Failure> {
         create_folder(&self.folder)?;
         check_writable(&self.folder.join(SPEED_FILE))
     }
 
     /// Writes everything. Returns a sentence that names the files.
-    pub(crate) fn write(&self, speed: &Speed) -> Result<String, Failure> {
+    pub fn write(&self, speed: &Speed) -> Result<String, Failure> {
         let record = self.folder.join(SPEED_FILE);
         write_new(&record, json_text(&record, speed)?)?;
         let page = write_page(&self.folder, speed)?;
@@ -46,12 +46,12 @@ impl Files {
 }
 
 /// Whether a path is a speed.json, or a folder with one and no record of `bp reproduce`.
-pub(crate) fn is_record(path: &Path) -> bool {
+pub fn is_record(path: &Path) -> bool {
     path.ends_with(SPEED_FILE) || (path.join(SPEED_FILE).exists() && !path.join(RECORD_FILE).exists())
 }
 
 /// Makes the page and the charts again from a speed.json, or from the one in a folder. Returns the page's name.
-pub(crate) fn renew(path: &Path) -> Result<PathBuf, Failure> {
+pub fn renew(path: &Path) -> Result<PathBuf, Failure> {
     let folder = if path.ends_with(SPEED_FILE) { path.parent().unwrap_or(path) } else { path };
     write_page(folder, &load_speed(path)?)
 }

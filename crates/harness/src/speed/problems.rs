@@ -10,9 +10,9 @@ const BABY1: [usize; 2] = [620, 555];
 
 /// A problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Problem {
+pub struct Problem {
     /// Its name in records.
-    pub(crate) name: String,
+    pub name: String,
     /// The name that `--problem` asks for it by: its own, or that of all problems like it.
     group: &'static str,
     /// The problems beside it that are alike but for one number.
@@ -40,7 +40,7 @@ enum Passing {
 impl Problem {
     /// The groups that `--problem` can ask for. The last of them take long, or say something of fast devices only: they
     /// run if they are named.
-    pub(crate) const ASKED: [&str; 14] = [
+    pub const ASKED: [&str; 14] = [
         "update",
         "hierarchy",
         "sweep",
@@ -61,10 +61,10 @@ impl Problem {
     const BY_DEFAULT: usize = 8;
 
     /// The groups, of one problem each, by which kernels are compared.
-    pub(crate) const KERNELS: [&str; 3] = ["update", "hierarchy", "sweep"];
+    pub const KERNELS: [&str; 3] = ["update", "hierarchy", "sweep"];
 
     /// The problems of some groups; of no names, those that run by default.
-    pub(crate) fn asked(names: &[String]) -> Vec<Self> {
+    pub fn asked(names: &[String]) -> Vec<Self> {
         let by_default = Self::ASKED[..Self::BY_DEFAULT].iter().map(|&name| name.to_owned()).collect();
         let names = if names.is_empty() { by_default } else { names.to_vec() };
         Self::ASKED.into_iter().filter(|&group| names.iter().any(|name| name == group)).flat_map(Self::group).collect()
@@ -148,7 +148,7 @@ impl Problem {
     }
 
     /// Its plan for images whose sides are divided by `divisor`, rounded up.
-    pub(crate) fn plan(&self, divisor: usize) -> Result<Plan, Error> {
+    pub fn plan(&self, divisor: usize) -> Result<Plan, Error> {
         let [width, height] = self.size.map(|side| side.div_ceil(divisor));
         let size = Size { width, height };
         let settings = |loops, z, schedule| self.algorithm().settings(size, loops, z, schedule);

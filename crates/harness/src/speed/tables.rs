@@ -25,7 +25,7 @@ const READING: &str = "Times are medians, with their range from three rounds on.
                        before it has failed.";
 
 /// The whole page.
-pub(crate) fn page(speed: &Speed) -> String {
+pub fn page(speed: &Speed) -> String {
     let quick = if speed.quick { ", a quick run" } else { "" };
     let mut text = format!("# Devices beside one another, on {}{quick}\n\n", markdown_escaped(&speed.machine.cpu));
     facts(speed).iter().for_each(|fact| _ = writeln!(text, "* {}", markdown_escaped(fact)));
