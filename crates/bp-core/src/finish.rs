@@ -1,6 +1,6 @@
-//! What is done to disparity maps after matching, written once for all backends: checks, filling, filters, confidence.
+//! Operations on disparity maps after matching, the same for all backends: checks, filling, filters and confidence.
 //!
-//! [`Finish`] says which of them a map goes through, in one order: left-right check, speckles, fill, median, sub-pixel.
+//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, speckles, fill, median, sub-pixel.
 
 mod check;
 mod confidence;
@@ -19,26 +19,26 @@ pub use subpixel::subpixel;
 
 use crate::{DisparityMap, Error};
 
-/// What is done to a disparity map after matching; by default nothing.
+/// The operations that a disparity map goes through after matching; by default none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Finish {
-    /// Whether [`check_left_right`] makes unknown what the right image's map contradicts.
+    /// Whether [`check_left_right`] makes pixels unknown that contradict the map of the right image.
     pub check: bool,
-    /// Surfaces of fewer pixels are made unknown, see [`remove_speckles`].
+    /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
     pub speckles: Option<usize>,
-    /// Whether unknown pixels are filled at the end of these, see [`fill()`].
+    /// Whether unknown pixels are filled after the check and the speckles; see [`fill()`].
     pub fill: bool,
-    /// Side of the window of [`median`], one of [`MEDIANS`].
+    /// The side of the window of [`median`], one of [`MEDIANS`].
     pub median: Option<usize>,
-    /// Whether [`subpixel`] makes fractions of disparities.
+    /// Whether [`subpixel`] refines disparities to fractions of a pixel.
     pub subpixel: bool,
 }
 
 impl Finish {
-    /// Does to the left image's map what is asked for; `right` is the right image's map, for the check.
+    /// Applies the selected operations to the left image's map. `right` is the right image's map, for the check.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the two maps differ in size, [`Error::Plan`] where a check is asked for without the
+    /// [`Error::WrongSize`] where the two maps differ in size, [`Error::Plan`] if a check is asked for without the
     /// right image's map, or for a median that is none of [`MEDIANS`]; [`Error::OutOfMemory`].
     pub fn apply(&self, left: DisparityMap, right: Option<&DisparityMap>) -> Result<DisparityMap, Error> {
         let mut map = match (self.check, right) {

@@ -1,4 +1,4 @@
-//! The buffers of one plan, and the kernels applied to them.
+//! The buffers of one plan, and the kernels that run on them.
 
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ pub(crate) struct ScalarSolver {
     data_cost: DataCost,
     costs: Vec<Costs>,
     greys: Vec<Greys>,
-    /// Messages of even grids and, where the plan has several grids, of odd ones: only a grid and its next coarser one
-    /// are needed at a time.
+    /// The messages of even grids and, if the plan has several grids, of odd ones: only a grid and the next coarser one are
+    /// needed at a time.
     messages: Vec<Messages>,
     scratch: Vec<u64>,
     h: Vec<u8>,
@@ -64,7 +64,7 @@ impl Solver for ScalarSolver {
         Ok(())
     }
 
-    /// They are where they were.
+    /// Does nothing: the messages are still there.
     fn keep_messages(&mut self) -> Result<(), Error> {
         Ok(())
     }

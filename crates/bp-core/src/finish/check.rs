@@ -2,15 +2,15 @@
 
 use crate::{DisparityMap, Error, metrics::check_size};
 
-/// Two disparities that differ by no more than this many pixels belong to one surface, and agree.
+/// Two disparities agree, and belong to one surface, if they differ by no more than this many pixels.
 pub const AGREE: f32 = 1.0;
 
-/// Makes every pixel of the left map unknown whose match in the right image says otherwise: at column
-/// `floor(x - d + 1/2)` the right map has to be known and to differ by no more than [`AGREE`] (Fua 1993). Pixels that
-/// only the left camera sees fail it, and so do most wrong ones.
+/// Makes every pixel of the left map unknown unless its match in the right image agrees: at column `floor(x - d + 1/2)` the
+/// right map has to be known and to differ by no more than [`AGREE`] (Fua 1993). Occluded pixels fail this check, and so
+/// do most wrong ones.
 ///
 /// # Errors
-/// [`Error::WrongSize`] where the maps differ in size.
+/// [`Error::WrongSize`] if the maps differ in size.
 pub fn check_left_right(left: DisparityMap, right: &DisparityMap) -> Result<DisparityMap, Error> {
     check_size("the right image's map", right.size(), left.size())?;
     let width = left.size().width;
@@ -25,11 +25,11 @@ pub fn check_left_right(left: DisparityMap, right: &DisparityMap) -> Result<Disp
     }))
 }
 
-/// By how much the disparity of column `x` differs from that of its match in the right map's row; `None` where either
+/// By how much the disparity of column `x` differs from that of its match in the right map's row; `None` if either
 /// is unknown or the match lies outside.
 pub(super) fn difference(x: usize, disparity: f32, right: &[f32]) -> Option<f32> {
     let column = (x as f32 - disparity + 0.5).floor();
-    // Compared as numbers first: what is unknown is infinite.
+    // This comes before the conversion to an index, because unknown disparities are infinite.
     let inside = column >= 0.0 && column < right.len() as f32;
     let other = right[inside.then_some(column as usize)?];
     other.is_finite().then(|| (disparity - other).abs())

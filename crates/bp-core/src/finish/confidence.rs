@@ -7,13 +7,16 @@ use super::{
 };
 use crate::{DisparityMap, Error, metrics::check_size};
 
-/// How far each pixel of the left map can be trusted, `[height][width]`, from 0 to 1: over the window of 9x9 around it,
-/// the mean of what its pixels are worth. One within [`AGREE`] of it is worth 1 where the right map says the same, half
-/// where it differs by no more than [`AGREE`], and else nothing; so is one outside the image. Ours: of what was tried,
-/// this simple measure sorts right pixels from wrong ones nearly as well as the best (docs/algorithms.md).
+/// The confidence of each pixel of the left map, `[height][width]`, from 0 to 1: the mean worth of the pixels in the window
+/// of 9x9 around it. A pixel that differs from the centre by no more than [`AGREE`] is worth 1 if the right map has the
+/// same disparity there, and half if it differs by no more than [`AGREE`]. All others, and those outside the image, are
+/// worth nothing.
+///
+/// The measure is ours. Simple as it is, it separates right pixels from wrong ones nearly as well as the best that we tried
+/// (docs/algorithms.md).
 ///
 /// # Errors
-/// [`Error::WrongSize`] where the maps differ in size, [`Error::OutOfMemory`].
+/// [`Error::WrongSize`] if the maps differ in size, [`Error::OutOfMemory`].
 pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>, Error> {
     check_size("the right image's map", right.size(), left.size())?;
     let size = left.size();
@@ -33,7 +36,7 @@ pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>,
     Ok(sums)
 }
 
-/// What a pixel is worth by itself.
+/// The worth of a pixel on its own.
 fn worth(x: usize, disparity: f32, right: &[f32]) -> f32 {
     match difference(x, disparity, right) {
         Some(0.0) => 1.0,
@@ -42,7 +45,7 @@ fn worth(x: usize, disparity: f32, right: &[f32]) -> f32 {
     }
 }
 
-/// Adds what near neighbours are worth.
+/// Adds the worth of neighbours with a similar disparity.
 fn add_worth(row: &[f32], neighbours: &[f32], worths: &[f32], sums: &mut [f32]) {
     for (((&own, &other), &worth), sum) in row.iter().zip(neighbours).zip(worths).zip(sums) {
         *sum += if (other - own).abs() <= AGREE { worth } else { 0.0 };

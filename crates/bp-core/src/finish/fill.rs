@@ -1,9 +1,9 @@
-//! Filling what is unknown.
+//! Filling unknown pixels.
 
 use crate::DisparityMap;
 
-/// Gives every unknown pixel the smaller of the next known disparities to its left and right in the row: what is hidden
-/// from one camera belongs to the surface behind. A row without any takes over the row above, else that below.
+/// Fills every unknown pixel with the smaller of the next known disparities to its left and right: a pixel that one camera
+/// does not see belongs to the surface behind. A row without known pixels is copied from the row above, else from below.
 #[must_use]
 pub fn fill(map: DisparityMap) -> DisparityMap {
     let width = map.size().width;
@@ -31,7 +31,7 @@ fn fill_row(row: &mut [f32]) {
     }
 }
 
-/// Copies row `from` to row `to` where that is unknown; rows are known or unknown as a whole by now.
+/// Copies row `from` to row `to` if that is unknown. By now a row is known or unknown as a whole.
 fn take_over(values: &mut [f32], width: usize, from: usize, to: usize) {
     if !values[to * width].is_finite() {
         values.copy_within(from * width..(from + 1) * width, to * width);

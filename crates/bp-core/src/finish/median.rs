@@ -1,4 +1,4 @@
-//! The median of a window.
+//! The median filter.
 
 use super::window::{Frame, Framed};
 use crate::{DisparityMap, Error};
@@ -6,17 +6,17 @@ use crate::{DisparityMap, Error};
 /// The sides of windows that [`median`] knows.
 pub const MEDIANS: [usize; 3] = [3, 5, 7];
 
-/// Columns that are sorted at once.
+/// How many columns are sorted together.
 const LANES: usize = 16;
 
 /// One value of each of some windows.
 type Lanes = [f32; LANES];
 
-/// Replaces every known disparity by the median of those known in the window of `side` x `side` around it, the border
-/// repeated outward; of an even number, the smaller one of the two in the middle.
+/// Replaces every known disparity by the median of the known ones in the window of `side` x `side` around it. The border
+/// repeats outward. Of an even number of values, the smaller of the two in the middle counts.
 ///
 /// # Errors
-/// [`Error::Plan`] where `side` is none of [`MEDIANS`], [`Error::OutOfMemory`].
+/// [`Error::Plan`] if `side` is none of [`MEDIANS`], [`Error::OutOfMemory`].
 pub fn median(map: &DisparityMap, side: usize) -> Result<DisparityMap, Error> {
     if !MEDIANS.contains(&side) {
         return Err(Error::Plan("a median is over windows of 3, 5 or 7 pixels"));
@@ -68,12 +68,12 @@ fn middle(mut values: &mut [Lanes]) -> Lanes {
 
 fn sort(low: &mut Lanes, high: &mut Lanes) {
     for (low, high) in low.iter_mut().zip(high) {
-        // Not f32::min, which also has to think of NaN.
+        // Not f32::min, which also handles NaN and is slower.
         (*low, *high) = if *low < *high { (*low, *high) } else { (*high, *low) };
     }
 }
 
-/// The median of what is known in one window; an unknown pixel stays so.
+/// The median of the known values in one window. An unknown pixel stays unknown.
 fn of_known(values: &[Lanes], lane: usize, own: f32) -> f32 {
     let mut known: Vec<f32> = values.iter().map(|values| values[lane]).filter(|value| value.is_finite()).collect();
     if known.is_empty() || !own.is_finite() {

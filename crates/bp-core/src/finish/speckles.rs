@@ -1,16 +1,17 @@
-//! Small surfaces that are wrong more often than not.
+//! Removal of small surfaces, which are usually wrong.
 
 use super::check::AGREE;
 use crate::{DisparityMap, Error, memory};
 
-/// Makes surfaces of fewer than `least` pixels unknown: pixels joined over sides, each within [`AGREE`] of the next.
+/// Makes surfaces of fewer than `least` pixels unknown. A surface consists of adjacent pixels, each of which differs from
+/// the next by no more than [`AGREE`].
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
     let mut seen = memory::filled("surfaces", pixels, false)?;
-    // Room for a surface of all pixels: none is pushed twice.
+    // A surface may have all pixels; none is pushed twice.
     let mut surface = memory::filled("surfaces", pixels, 0)?;
     Ok(map.replaced(|values| {
         for start in 0..pixels {

@@ -6,12 +6,14 @@ use super::{
 };
 use crate::{DisparityMap, Error};
 
-/// Half the side of the window, less the middle.
+/// How far the window reaches from its centre.
 const REACH: usize = 4;
 
-/// Replaces every disparity by the mean of those in the window of 9x9 around it that lie within [`AGREE`] of it: labels
-/// of a slanted surface are steps, and the mean is the slope. Ours: it halves the errors above 0.5 px where truth is
-/// finer than whole pixels, which a parabola through the matching costs did not (docs/algorithms.md).
+/// Replaces every disparity by the mean of those in the window of 9x9 around it that differ by no more than [`AGREE`]. The
+/// labels of a slanted surface form steps; their mean follows the slope.
+///
+/// The method is ours. It halves the number of errors above 0.5 px if the truth is finer than whole pixels. A parabola
+/// through the matching costs did not (docs/algorithms.md).
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].

@@ -2,24 +2,24 @@
 
 use crate::{DisparityMap, Error, Size, memory};
 
-/// A map with a frame around it, so that windows need no limits: `[height + 2 frame][width + 2 frame]`.
+/// A map with a frame around it, `[height + 2 frame][width + 2 frame]`, so that windows never leave it.
 pub(super) struct Framed {
     width: usize,
     frame: usize,
     values: Vec<f32>,
 }
 
-/// What the frame holds.
+/// The contents of the frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Frame {
-    /// Nothing known.
+    /// Unknown pixels.
     Unknown,
     /// The nearest pixel of the map.
     Repeated,
 }
 
 impl Framed {
-    /// `values` `[height][width]` in a frame so many pixels wide.
+    /// Puts `values`, `[height][width]`, in a frame of this width.
     pub(super) fn new(size: Size, values: &[f32], frame: usize, kind: Frame) -> Result<Self, Error> {
         let (width, height) = (size.width + 2 * frame, size.height + 2 * frame);
         let mut framed = memory::filled("a map with a frame", width * height, DisparityMap::UNKNOWN)?;
@@ -38,7 +38,7 @@ impl Framed {
         Ok(Self { width: size.width, frame, values: framed })
     }
 
-    /// The row shifted so that entry x is what lies (dx - frame, dy - frame) from pixel (x, y), for dx and dy in
+    /// A shifted row: entry x is the value (dx - frame) columns and (dy - frame) rows away from pixel (x, y), for dx and dy in
     /// `0..=2 frame`.
     pub(super) fn row(&self, y: usize, dx: usize, dy: usize) -> &[f32] {
         &self.values[(y + dy) * (self.width + 2 * self.frame) + dx..][..self.width]
