@@ -5,7 +5,7 @@ mod traffic;
 use crate::{BAND_ROWS, Error, MessageStart, Model, Node, Schedule, Settings, Side, Size};
 
 /// Most grids of a plan: the longest side allowed, [`crate::MAX_SIDE`], halves to 1 in as many.
-pub const MAX_GRIDS: usize = 25;
+pub const MAX_GRIDS: u32 = 25;
 
 /// Settings checked against an image size and a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +39,8 @@ impl Plan {
         if settings.schedule == Schedule::Sweep && settings.message_start == MessageStart::Sender {
             return Err(Error::Plan("message start sender has no meaning under the schedule sweep"));
         }
-        let sizes = std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids).collect();
+        let sizes =
+            std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids as usize).collect();
         Ok(Self { model, settings, sizes })
     }
 

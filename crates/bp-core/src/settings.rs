@@ -67,7 +67,7 @@ impl Algorithm {
         let log2 = size.width.max(1).ilog2();
         if self == Self::Sweep {
             return Settings {
-                grids: log2.clamp(1, 5) as usize,
+                grids: log2.clamp(1, 5),
                 steps: 1,
                 schedule: Schedule::Sweep,
                 message_start: MessageStart::Receiver,
@@ -79,7 +79,7 @@ impl Algorithm {
         let z = if self.divides_loops() { z.max(1) } else { 1 };
         let loops = (k / (z.saturating_mul(levels))).max(1);
         Settings {
-            grids: if self.is_coarse_to_fine() { log2.max(1) as usize } else { 1 },
+            grids: if self.is_coarse_to_fine() { log2.max(1) } else { 1 },
             steps: loops.saturating_mul(schedule.steps_per_loop()),
             schedule,
             message_start: MessageStart::Receiver,
@@ -209,7 +209,7 @@ impl Cut {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Settings {
     /// Number of grids; grid 0 is the image, each further one has half the width and height, rounded up.
-    pub grids: usize,
+    pub grids: u32,
     /// Steps on each grid: loops, or half-steps under [`Schedule::Checkerboard`].
     pub steps: u32,
     /// Order of the message updates.

@@ -61,7 +61,7 @@ fn settings(random: &mut Rng, width: usize, height: usize) -> Settings {
     let grids = match random.u8(..10) {
         0 => 13,
         1 => MAX_GRIDS,
-        _ => random.usize(1..6),
+        _ => random.usize(1..6) as u32,
     };
     let start = one_of(random, &MessageStart::ALL);
     // A sweep has no other message start, and what more than three of them do, three do.

@@ -30,6 +30,7 @@ use crate::{
     files::{write_text, write_whole},
     note,
     record::{RECORD_FILE, Record, load},
+    speed,
 };
 use readme::{BEGIN, END};
 use results::Results;
@@ -111,6 +112,10 @@ pub(crate) fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure
 
 /// `bp report`.
 pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
+    if speed::is_record(&args.run) {
+        note(&format!("report: {}", speed::renew(&args.run)?.display()));
+        return Ok(());
+    }
     let run = if args.run.ends_with(RECORD_FILE) { args.run.parent().unwrap_or(&args.run) } else { &args.run };
     let record = load(&args.run)?;
     match &args.readme {

@@ -1,10 +1,8 @@
 //! A record in brief: every plan on every backend, over all scenes.
 
-mod interval;
-
 use std::collections::HashMap;
 
-pub(crate) use interval::{interval, mean_of_medians, ratio_interval};
+pub(crate) use crate::statistics::{interval, mean_of_medians, ratio_interval};
 
 use crate::record::{Cell, Measurement, Record, Sample};
 

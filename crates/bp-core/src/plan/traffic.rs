@@ -47,7 +47,7 @@ impl Plan {
 mod tests {
     use crate::{Model, Plan, Profile, Schedule, Settings, Size};
 
-    fn moved(schedule: Schedule, grids: usize, steps: u32) -> Option<[u64; 5]> {
+    fn moved(schedule: Schedule, grids: u32, steps: u32) -> Option<[u64; 5]> {
         let size = Size { width: 4, height: 2 };
         let settings = crate::Algorithm::Bp.settings(size, 1, 1, schedule);
         let model = Model::new(Profile::Thesis, 3).unwrap();
