@@ -17,10 +17,10 @@ const YEAR: &str = "2019";
 
 const WHY: [&str; 3] = [
     "The thesis measured CUDA programs on a GeForce GTX 750 Ti, so compare speed-ups, not milliseconds.",
-    "A model of its printed times says that about 40 % of BP's was not message passing, which CFBP and CFCSBP cannot \
-     speed up; in this program almost all of the time is message passing, so their speed-ups come out larger.",
-    "The thesis ran the four parts of CTBP and CTCSBP at once, whereas here all workers share the whole image in every plan, \
-     BP's included, so cutting the image gains almost nothing.",
+    "A model of its printed times says that about 40 % of BP's time was not message passing; here that share is small, \
+     so CFBP and CFCSBP, which save message passing, can be much faster than BP.",
+    "The thesis ran the four parts of CTBP and CTCSBP at once, whereas here all workers share the whole image in every \
+     plan, BP's included, so cutting the image gains nothing but a smaller working set.",
 ];
 
 /// A part of the summary.
@@ -33,7 +33,7 @@ pub(super) struct Passage {
 /// The summary, in order.
 pub(super) fn passages(report: &Report<'_>) -> Vec<Passage> {
     let results = &report.results;
-    let thesis = format!("The experiment is that of the thesis: {AUTHOR}, \"{TITLE}\", {YEAR}.");
+    let thesis = format!("The experiment follows this thesis: {AUTHOR}, \"{TITLE}\", {YEAR}.");
     let abbreviations = "In every chart a plan keeps its name and the shape of its marker. BP is belief propagation.";
     vec![
         Passage { title: "What came out", lines: outcomes(results), table: Some(readme::table(results)) },
@@ -61,8 +61,12 @@ fn outcomes(results: &Results<'_>) -> Vec<String> {
     let ours: Vec<Named> = all_plans(results).into_iter().filter(|plan| plan.printed.is_none()).collect();
     let lines: Vec<String> =
         [outcome(results, &thesis_plans()), outcome(results, &ours)].into_iter().flatten().collect();
-    let none = || vec!["No plan has numbers for every scene.".to_owned()];
-    if lines.is_empty() { none() } else { lines.into_iter().map(|line| line + ".").collect() }
+    if lines.is_empty() {
+        return vec!["No plan has numbers for every scene.".to_owned()];
+    }
+    let table = "The table shows means over the scenes. Its speed-ups are in percent, as the thesis counts them: 100 % is \
+                 twice as fast as BP. Times go from images to labels.";
+    lines.into_iter().map(|line| line + ".").chain([table.to_owned()]).collect()
 }
 
 /// The fastest of some plans on the fastest backend, beside BP. Software rasterisers count only if there is nothing else.
@@ -169,7 +173,8 @@ mod tests {
         let record = crate::record::load(std::path::Path::new(run)).unwrap();
         assert_eq!(
             headline(&record).unwrap(),
-            "CFCSBP, Z''=2: 8.3 times as fast as BP on rayon (printed: 2.3 times), 23.1 % bad pixels non-occluded (BP: 23.8 %)"
+            "CFCSBP, Z''=2: 8.3 times as fast as BP on rayon (printed: 2.3 times), \
+             23.1 % bad pixels non-occluded (BP: 23.8 %)"
         );
         assert_eq!(headline(&Record { cells: Vec::new(), ..record }), None);
     }

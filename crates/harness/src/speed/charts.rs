@@ -62,9 +62,11 @@ fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
         let ms = Sample::spread(&own.outcome.measured()?.samples, |sample| sample.total_ms)?;
         Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
     };
+    let place = speed.place(&first.contestant);
     Series {
         name: speed.label(first),
-        style: Style::numbered(speed.place(&first.contestant)).with_line(Line::Solid),
+        // A dashed line shows the one it coincides with.
+        style: Style::numbered(place).with_line(if place.is_multiple_of(2) { Line::Solid } else { Line::Dashes }),
         points: speed.contests_of(Some(family)).filter_map(point).collect(),
     }
 }
@@ -77,6 +79,7 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
         let name = format!("{}: copying", device.label());
         Some(Level { name, value: device.copy_gb_per_s?, colour: Some(speed.place(&device.name)) })
     };
+    let is_shown = |stage: &Stage| devices.iter().flat_map(|(_, rates)| rates).any(|(shown, _)| shown == stage);
     let key = |stage: Stage| Key { name: stage.name().to_owned(), style: Style::marked(BLACK, stage as usize) };
     let title = "Stages beside the rate of copying";
     let plot = Plot {
@@ -85,7 +88,7 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
         x: Axis::logarithmic("MB that a stage has to read and write at least"),
         y: Axis::logarithmic("GB/s read and written"),
         levels: devices.iter().filter_map(level).collect(),
-        keys: Stage::ALL.map(key).into(),
+        keys: Stage::ALL.into_iter().filter(is_shown).map(key).collect(),
         series: devices.iter().flat_map(|(device, rates)| stages(speed, device, rates)).collect(),
     };
     let others: Vec<_> = others.iter().map(|(contestant, _)| contestant.label()).collect();

@@ -2,7 +2,7 @@
 
 use super::{
     BP, Named, Table, family,
-    measured::{mib, which},
+    measured::{NOT_PRINTED, mib, table},
     thesis_plans,
 };
 use crate::report::{
@@ -31,46 +31,26 @@ fn time(row: &Row<'_>, plan: &str, part: Part) -> String {
     or(row.time(plan, part).map(|time| time.to_string()), row.missing(plan))
 }
 
-/// Every scene and backend with every plan.
-fn pairs<'a>(results: &'a Results<'a>, plans: &'a [Named]) -> impl Iterator<Item = (Row<'a>, &'a Named)> {
-    results.rows().flat_map(|row| plans.iter().map(move |plan| (row, plan)))
-}
-
 /// Tables 3.18, 3.21, 3.24, 3.26.
 pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
-    let columns = [
-        "#",
-        "scene",
-        "backend",
-        "plan",
-        "printed: BP, ms",
-        "plan, ms",
-        "speed-up, %",
-        "ours: updates, BP / plan",
-        "message passing: BP, ms",
-        "plan, ms",
-        "speed-up, %",
-        "total: BP, ms",
-        "plan, ms",
-        "speed-up, %",
-        "B>1 all: BP, %",
-        "plan, %",
-    ];
-    let rows = pairs(results, plans).map(|(row, plan)| {
-        let [printed_ms, printed_percent] = printed(results, &row, plan);
-        let [bp_ms, _] = printed(results, &row, &BP);
-        let fewer = fewer_updates(&row, plan).map(|ratio| format!("{ratio:.2}"));
-        let mut cells = which(&row, plan);
-        cells.extend([bp_ms, printed_ms, printed_percent, or(fewer, "")]);
+    let columns = "printed: BP, ms | plan, ms | speed-up, % | ours: updates, BP / plan | message passing: BP, ms | \
+                   plan, ms | speed-up, % | total: BP, ms | plan, ms | speed-up, % | B>1 all: BP, % | plan, %";
+    let title = format!("{} against BP: processing speed", family(plans));
+    let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device. A range covers the rounds in which the two \
+                took turns.";
+    table(results, number, title, plans, columns, |row, plan| {
+        let [bp_ms, _] = printed(results, row, &BP);
+        let fewer = fewer_updates(row, plan).map(|ratio| format!("{ratio:.2}"));
+        let mut cells = vec![bp_ms];
+        cells.extend(printed(results, row, plan));
+        cells.push(or(fewer, ""));
         for part in [Part::MessagePassing, Part::Total] {
-            cells.extend([time(&row, "bp", part), time(&row, plan.plan, part), speed_up(&row, plan.plan, part)]);
+            cells.extend([time(row, "bp", part), time(row, plan.plan, part), speed_up(row, plan.plan, part)]);
         }
-        cells.extend([bad(&row, "bp"), bad(&row, plan.plan)]);
+        cells.extend([bad(row, "bp"), bad(row, plan.plan)]);
         cells
-    });
-    let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device. A range covers the rounds in which the two took \
-                turns.";
-    Table::new(number, format!("{} against BP: processing speed", family(plans)), &columns).note(note).rows(rows)
+    })
+    .note(note)
 }
 
 /// The printed time of a plan and its speed-up over BP.
@@ -88,88 +68,54 @@ fn fewer_updates(row: &Row<'_>, plan: &Named) -> Option<f64> {
 
 /// Tables 3.19, 3.22, 3.25a, 3.27.
 pub(super) fn memory(results: &Results<'_>, number_of: &str, plans: &[Named]) -> Table {
-    let columns = ["#", "scene", "backend", "plan", "printed", "ours: BP, MiB", "plan, MiB", "plan / BP"];
-    let rows = pairs(results, plans).map(|(row, plan)| {
-        let bytes = |plan: &str| row.measured(plan).map(|measured| measured.allocated_bytes);
-        let ratio = bytes("bp").zip(bytes(plan.plan)).map(|(bp, other)| number(other as f64 / bp as f64, 3));
-        let mut cells = which(&row, plan);
-        cells.push("not printed".to_owned());
-        cells.extend(["bp", plan.plan].map(|plan| or(bytes(plan).map(mib), row.missing(plan))));
-        cells.push(or(ratio, ""));
-        cells
-    });
+    let columns = "printed | ours: BP, MiB | plan, MiB | plan / BP";
     let ours = if number_of == "3.25a" { " (not in the thesis)" } else { "" };
     let parts = if plans.iter().any(|plan| plan.is_cut()) { " All four parts are in memory at once." } else { "" };
-    Table::new(number_of, format!("{} against BP: required memory{ours}", family(plans)), &columns)
-        .note(format!("Allocated bytes, as counted.{parts}"))
-        .rows(rows)
+    let title = format!("{} against BP: required memory{ours}", family(plans));
+    table(results, number_of, title, plans, columns, |row, plan| {
+        let bytes = |plan: &str| row.measured(plan).map(|measured| measured.allocated_bytes);
+        let ratio = bytes("bp").zip(bytes(plan.plan)).map(|(bp, other)| number(other as f64 / bp as f64, 3));
+        let [bp, own] = ["bp", plan.plan].map(|plan| or(bytes(plan).map(mib), row.missing(plan)));
+        vec![NOT_PRINTED.to_owned(), bp, own, or(ratio, "")]
+    })
+    .note(format!("Allocated bytes, as counted.{parts}"))
 }
 
 /// Tables 3.20, 3.23, 3.25, 3.28.
 pub(super) fn reliability(results: &Results<'_>, number_of: &str, plans: &[Named]) -> Table {
-    let columns = [
-        "#",
-        "scene",
-        "backend",
-        "plan",
-        "printed",
-        "ours: R all, BP",
-        "plan",
-        "B>1 all, BP",
-        "plan",
-        "B>1 non-occluded, BP",
-        "plan",
-        "energy, BP",
-        "plan",
-    ];
-    let rows = pairs(results, plans).map(|(row, plan)| {
-        let mut cells = which(&row, plan);
-        cells.push("not printed".to_owned());
+    let columns =
+        "printed | ours: R all, BP | plan | B>1 all, BP | plan | B>1 non-occluded, BP | plan | energy, BP | plan";
+    let title = format!("{} against BP: reliability", family(plans));
+    let note = "R is in pixels, B in percent. Under the schedule sync, plain BP's energy stays well above that of as many \
+                checkerboard loops.";
+    table(results, number_of, title, plans, columns, |row, plan| {
+        let mut cells = vec![NOT_PRINTED.to_owned()];
         let Some((bp, other)) = row.measured("bp").zip(row.measured(plan.plan)) else {
             cells.push(row.missing(plan.plan).to_owned());
             return cells;
         };
-        cells.extend([number(bp.all.rmse, 2), number(other.all.rmse, 2)]);
-        cells.extend([number(bp.all.bad[1], 2), number(other.all.bad[1], 2)]);
-        cells.extend([number(bp.visible.bad[1], 2), number(other.visible.bad[1], 2)]);
-        cells.extend([whole(bp.energy.total), whole(other.energy.total)]);
+        cells.extend([bp, other].map(|measured| number(measured.all.rmse, 2)));
+        cells.extend([bp, other].map(|measured| number(measured.all.bad[1], 2)));
+        cells.extend([bp, other].map(|measured| number(measured.visible.bad[1], 2)));
+        cells.extend([bp, other].map(|measured| whole(measured.energy.total)));
         cells
-    });
-    Table::new(number_of, format!("{} against BP: reliability", family(plans)), &columns)
-        .note(
-            "R is in pixels, B in percent. Under the schedule sync, plain BP's energy stays well above that of as many \
-               checkerboard loops.",
-        )
-        .rows(rows)
+    })
+    .note(note)
 }
 
 /// Table 3.29.
 pub(super) fn all_speeds(results: &Results<'_>) -> Table {
-    let columns = [
-        "#",
-        "scene",
-        "backend",
-        "plan",
-        "printed, ms",
-        "speed-up, %",
-        "ours: message passing, ms",
-        "speed-up, %",
-        "total, ms",
-        "speed-up, %",
-        "B>1 all, %",
-    ];
-    let plans = thesis_plans();
-    let rows = pairs(results, &plans).map(|(row, plan)| {
-        let mut cells = which(&row, plan);
-        cells.extend(printed(results, &row, plan));
+    let columns =
+        "printed, ms | speed-up, % | ours: message passing, ms | speed-up, % | total, ms | speed-up, % | B>1 all, %";
+    table(results, "3.29", "All algorithms: processing speed".to_owned(), &thesis_plans(), columns, |row, plan| {
+        let mut cells = Vec::from(printed(results, row, plan));
         for part in [Part::MessagePassing, Part::Total] {
-            let ours = if plan.plan == "bp" { String::new() } else { speed_up(&row, plan.plan, part) };
-            cells.extend([time(&row, plan.plan, part), ours]);
+            let ours = if plan.plan == "bp" { String::new() } else { speed_up(row, plan.plan, part) };
+            cells.extend([time(row, plan.plan, part), ours]);
         }
-        cells.push(bad(&row, plan.plan));
+        cells.push(bad(row, plan.plan));
         cells
-    });
-    Table::new("3.29", "All algorithms: processing speed", &columns).rows(rows.collect::<Vec<_>>())
+    })
 }
 
 /// Table 3.30, ours.
@@ -189,33 +135,17 @@ pub(super) fn all_memory(results: &Results<'_>) -> Table {
 
 /// Table 3.31, ours.
 pub(super) fn all_reliability(results: &Results<'_>) -> Table {
-    let columns = [
-        "#",
-        "scene",
-        "backend",
-        "plan",
-        "R all, px",
-        "R non-occluded, px",
-        "B>1 all, %",
-        "B>1 non-occluded, %",
-        "energy",
-    ];
-    let plans = thesis_plans();
-    let rows = pairs(results, &plans).map(|(row, plan)| {
-        let mut cells = which(&row, plan);
-        match row.measured(plan.plan) {
-            None => cells.push(row.missing(plan.plan).to_owned()),
-            Some(measured) => cells.extend([
-                number(measured.all.rmse, 2),
-                number(measured.visible.rmse, 2),
-                number(measured.all.bad[1], 2),
-                number(measured.visible.bad[1], 2),
-                whole(measured.energy.total),
-            ]),
-        }
-        cells
-    });
-    Table::new("3.31", "All algorithms: reliability (not in the thesis)", &columns)
-        .note("The thesis prints no reliability figure.")
-        .rows(rows.collect::<Vec<_>>())
+    let columns = "R all, px | R non-occluded, px | B>1 all, % | B>1 non-occluded, % | energy";
+    let title = "All algorithms: reliability (not in the thesis)".to_owned();
+    table(results, "3.31", title, &thesis_plans(), columns, |row, plan| match row.measured(plan.plan) {
+        None => vec![row.missing(plan.plan).to_owned()],
+        Some(measured) => vec![
+            number(measured.all.rmse, 2),
+            number(measured.visible.rmse, 2),
+            number(measured.all.bad[1], 2),
+            number(measured.visible.bad[1], 2),
+            whole(measured.energy.total),
+        ],
+    })
+    .note("The thesis prints no reliability figure.")
 }

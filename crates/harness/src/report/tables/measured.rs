@@ -9,36 +9,33 @@ use crate::{
     },
 };
 
-const NOT_PRINTED: &str = "not printed";
+pub(super) const NOT_PRINTED: &str = "not printed";
 
-/// The columns that name the measurement of a row.
-const WHICH: [&str; 4] = ["#", "scene", "backend", "plan"];
-
-/// The cells under [`WHICH`].
-pub(super) fn which(row: &Row<'_>, plan: &Named) -> Vec<String> {
-    vec![(row.index + 1).to_string(), row.scene.name.clone(), row.label(), plan.title.to_owned()]
-}
-
-/// A table with a row for every scene, backend and plan.
-fn table<'a>(
+/// A table with a row for every scene, backend and plan. Its columns follow those that name the measurement.
+pub(super) fn table<'a>(
     results: &'a Results<'a>,
-    (number, title): (&str, String),
+    number: &str,
+    title: String,
     plans: &[Named],
-    columns: &[&str],
+    columns: &str,
     cells: impl Fn(&Row<'a>, &Named) -> Vec<String>,
 ) -> Table {
+    let which = |row: &Row<'_>, plan: &Named| {
+        vec![(row.index + 1).to_string(), row.scene.name.clone(), row.label(), plan.title.to_owned()]
+    };
     let rows = results.rows().flat_map(|row| plans.iter().map(move |plan| (row, plan)));
     let rows = rows.map(|(row, plan)| [which(&row, plan), cells(&row, plan)].concat());
-    Table::new(number, title, &[WHICH.as_slice(), columns].concat()).rows(rows)
+    let columns: Vec<_> = ["#", "scene", "backend", "plan"].into_iter().chain(columns.split(" | ")).collect();
+    Table::new(number, title, &columns).rows(rows)
 }
 
 /// Tables 3.3, 3.6, 3.9, 3.12, 3.15.
 pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
-    let columns = ["grids x loops", "printed, ms", "ours: message passing, ms", "total, ms", "samples"];
+    let columns = "grids x loops | printed, ms | ours: message passing, ms | total, ms | samples";
     let title = format!("{}: processing speed", family(plans));
     let note = "Times are medians, with their range from three samples on. Message passing is the stages refine and \
                 update_messages. The total goes from the images to the labels.";
-    let table = table(results, (number, title), plans, &columns, |row, plan| {
+    let table = table(results, number, title, plans, columns, |row, plan| {
         let printed = plan.printed.and_then(|name| results.thesis.time_ms(name, row.index));
         let time = |part| or(row.time(plan.plan, part).map(|time| time.to_string()), row.missing(plan.plan));
         vec![
@@ -68,11 +65,11 @@ fn grids_and_loops(cell: &Cell) -> String {
 
 /// Tables 3.4, 3.7, 3.10, 3.13, 3.16.
 pub(super) fn memory(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
-    let columns = ["printed", "ours: predicted, MiB", "allocated, MiB"];
+    let columns = "printed | ours: predicted, MiB | allocated, MiB";
     let title = format!("{}: required memory", family(plans));
     let note = "The plan's formulas predict memory before the run; allocated bytes are counted. The thesis prints no memory \
                 figure.";
-    table(results, (number, title), plans, &columns, |row, plan| {
+    table(results, number, title, plans, columns, |row, plan| {
         let allocated = row.measured(plan.plan).map(|measured| measured.allocated_bytes);
         vec![
             NOT_PRINTED.to_owned(),
@@ -90,12 +87,14 @@ pub(super) fn mib(bytes: u64) -> String {
 
 /// Tables 3.5, 3.8, 3.11, 3.14, 3.17.
 pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
+    let columns = "printed | R all | B>0.5 all | B>1 all | B>2 all | B>4 all | R non-occluded | B>0.5 non-occluded | \
+                   B>1 non-occluded | B>2 non-occluded | B>4 non-occluded | energy | schedule";
     let title = format!("{}: reliability", family(plans));
     let note = "R is the root mean squared error in pixels (equation 2.82). B>1 is the percentage of pixels wrong by more \
                 than 1 px (2.83). Both are over all pixels of known truth and over the non-occluded ones, which both \
                 cameras see. The energy depends on the schedule: under sync, plain BP's stays well above that of as many \
                 checkerboard loops. The thesis prints no reliability figure.";
-    table(results, (number, title), plans, &reliability_columns(), |row, plan| {
+    table(results, number, title, plans, columns, |row, plan| {
         let Some(measured) = row.measured(plan.plan) else {
             return vec![NOT_PRINTED.to_owned(), row.missing(plan.plan).to_owned()];
         };
@@ -107,24 +106,6 @@ pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) 
         cells
     })
     .note(note)
-}
-
-fn reliability_columns() -> [&'static str; 13] {
-    [
-        "printed",
-        "R all",
-        "B>0.5 all",
-        "B>1 all",
-        "B>2 all",
-        "B>4 all",
-        "R non-occluded",
-        "B>0.5 non-occluded",
-        "B>1 non-occluded",
-        "B>2 non-occluded",
-        "B>4 non-occluded",
-        "energy",
-        "schedule",
-    ]
 }
 
 fn errors(errors: &Errors) -> Vec<String> {

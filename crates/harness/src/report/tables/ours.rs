@@ -33,16 +33,10 @@ pub(in crate::report) fn all_plans(results: &Results<'_>) -> Vec<Named> {
 
 /// Means over the scenes for every plan.
 pub(super) fn profiles(results: &Results<'_>) -> Table {
-    let columns = [
-        "backend",
-        "plan",
-        "B>1 non-occluded, %",
-        "B>1 all, %",
-        "R all, px",
-        "message passing, ms",
-        "total, ms",
-        "energy / 1000",
-    ];
+    let columns: Vec<_> = "backend | plan | B>1 non-occluded, % | B>1 all, % | R all, px | \
+                           message passing, ms | total, ms | energy / 1000"
+        .split(" | ")
+        .collect();
     let plans = all_plans(results);
     let rows = results.backends().flat_map(|backend| plans.iter().map(move |plan| (backend, plan)));
     let rows = rows.map(|(backend, plan)| {

@@ -37,18 +37,11 @@ fn gpus(results: &Results<'_>) -> String {
 
 /// Table 3.2.
 pub(super) fn images(results: &Results<'_>) -> Table {
-    let columns = [
-        "#",
-        "thesis: name",
-        "size",
-        "\"disparity true\"",
-        "ours: scene",
-        "size",
-        "labels L",
-        "largest true disparity, px",
-        "pixels of known truth",
-        "non-occluded pixels",
-    ];
+    let columns: Vec<_> = "# | thesis: name | size | \"disparity true\" | ours: scene | \
+                           size | labels L | \
+                           largest true disparity, px | pixels of known truth | non-occluded pixels"
+        .split(" | ")
+        .collect();
     let rows = results.scenes().zip(&results.thesis.images).map(|((index, scene), printed)| {
         vec![
             (index + 1).to_string(),
@@ -63,7 +56,7 @@ pub(super) fn images(results: &Results<'_>) -> Table {
             whole(scene.visible),
         ]
     });
-    let note = "\"Disparity true\" is the data set's horizontal crop in full-size pixels, not a number of labels. Non-occluded \
-                pixels are those of known truth that both cameras see.";
+    let note = "\"Disparity true\" is the data set's horizontal crop in full-size pixels, not a number of labels. \
+                Non-occluded pixels are those of known truth that both cameras see.";
     Table::new("3.2", "The images", &columns).note(note).rows(rows)
 }
