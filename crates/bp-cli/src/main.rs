@@ -21,6 +21,7 @@ use harness::threads;
 use notes::tell;
 
 fn main() -> ExitCode {
+    notes::quieten_driver();
     let cli = Cli::parse();
     notes::set_up(cli.quiet);
     match run(&cli.command) {

@@ -63,3 +63,13 @@ pub(crate) fn note(line: &str) {
         tell(line);
     }
 }
+
+/// Keeps a layer of Mesa's Vulkan drivers from complaining on standard error where no desktop runs. All that the layer does is
+/// to sort the list of devices.
+#[expect(unsafe_code, reason = "the layer takes nothing but a variable of the environment")]
+pub(crate) fn quieten_driver() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: called first of all, before there is another thread.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}

@@ -1,9 +1,6 @@
 //! What people see while the libraries work: a bar, notes and warnings on standard error.
 
-use std::sync::{
-    LazyLock, Mutex, PoisonError,
-    atomic::{AtomicUsize, Ordering},
-};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use bp_stereo::{Event, Stop, Watch};
 
@@ -13,13 +10,8 @@ use crate::{
     notes::{self, note, tell},
 };
 
-/// How many warnings are shown: a video may have one for every frame.
-const MOST_WARNINGS: usize = 20;
-
 /// Set by Ctrl-C.
 pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
-
-static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
 /// The bar of the work that goes on.
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
@@ -61,13 +53,9 @@ fn show(event: Event<'_>) {
     }
 }
 
-/// Shows a warning, unless many were shown.
+/// Shows a warning.
 pub(crate) fn warn(text: &str) {
-    match WARNINGS.fetch_add(1, Ordering::Relaxed) {
-        ..MOST_WARNINGS => note(&format!("warning: {text}")),
-        MOST_WARNINGS => note("further warnings are not shown; the records of the pairs have them"),
-        _ => {}
-    }
+    note(&format!("warning: {text}"));
 }
 
 /// Makes Ctrl-C and SIGTERM stop the work at its next step.

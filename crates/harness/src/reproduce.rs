@@ -81,7 +81,9 @@ pub fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Fa
     let late = outcome?;
     report::write(storage.folder(), storage.record())?;
     watch.note(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
-    report::headline(storage.record()).map_or((), |line| watch.note(&line));
+    if let Some(line) = report::headline(storage.record()) {
+        watch.note(&line);
+    }
     check_cells(storage.record(), late)
 }
 

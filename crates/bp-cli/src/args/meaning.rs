@@ -47,7 +47,13 @@ impl MatchArgs {
 
     /// Where the files of one pair go.
     pub(crate) fn outputs(&self) -> Outputs {
-        Outputs { confidence: self.finish.confidence.clone(), ..self.outputs.outputs(Some(&self.output)) }
+        let map = Some(self.output.as_path()).filter(|_| !self.is_piped());
+        Outputs { confidence: self.finish.confidence.clone(), ..self.outputs.outputs(map) }
+    }
+
+    /// Whether the map goes to standard output.
+    pub(crate) fn is_piped(&self) -> bool {
+        self.output == Path::new("-")
     }
 
     /// The batch that the arguments ask for; none for one pair.
@@ -79,6 +85,9 @@ impl MatchArgs {
 }
 
 fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
+    if args.is_piped() && (args.json || args.many.pairs.is_some() || args.many.video.is_some()) {
+        return Err(Failure::usage("--output - writes one map to standard output: no --json, --pairs or --video"));
+    }
     let finish = &args.finish;
     if finish.fill.is_some() && finish.check.is_none() && finish.speckle.is_none() {
         return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));

@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{DeviceKind, GroundTruth, Size, StereoPair, survey::Survey};
-use bp_io::{Limits, read_image};
+use bp_core::{DeviceKind, DisparityMap, GroundTruth, Size, StereoPair, survey::Survey};
+use bp_io::{Limits, MapFormat, Raster, read_image};
 use bp_stereo::{
     AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Memory, Outputs, Planned, Start, batch,
 };
@@ -78,7 +78,11 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let mut matcher = Matcher::new(&options)?.beside(beside);
     let job = Job { args, files, pair, truth, outputs, making };
     let report = job.run(&mut matcher)?;
-    if args.json { print_json(&report) } else { Ok(write!(std::io::stdout(), "{}", text(&report))?) }
+    match () {
+        () if args.json => print_json(&report),
+        () if args.is_piped() => Ok(()),
+        () => Ok(write!(std::io::stdout(), "{}", text(&report))?),
+    }
 }
 
 impl Job<'_> {
@@ -98,6 +102,9 @@ impl Job<'_> {
             inputs: &sources(self.args).collect::<Vec<_>>(),
         };
         self.outputs.write(&self.making, &content, &terminal::watch())?;
+        if self.args.is_piped() {
+            pipe(&answer.map)?;
+        }
         let asked = Asked { size: self.pair.size(), warnings, errors, messages_sha256 };
         Ok(Report::new(matcher, answer, &times, asked, self.outputs.paths(&self.making)))
     }
@@ -107,6 +114,7 @@ impl Job<'_> {
         let survey = Survey::of(&self.pair)?;
         let planned = matcher.plan_within(&self.pair, &survey, &|disparity| self.outputs.hold(disparity))?;
         planned.warnings.iter().for_each(|warning| terminal::warn(&as_options(&warning.about(&self.name()))));
+        self.hint_at_scale(&planned);
         self.outputs.check_plan(&self.making, &planned.plan)?;
         if matcher.options().labels == Labels::Auto {
             let model = planned.plan.model();
@@ -115,6 +123,17 @@ impl Job<'_> {
             note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
         }
         Ok(planned)
+    }
+
+    /// Ground truth beyond the labels was most likely stored as a multiple of disparities.
+    fn hint_at_scale(&self, Planned { plan, .. }: &Planned) {
+        let last = plan.model().disparity(plan.model().labels() as u16 - 1);
+        let truth = self.truth.as_ref().and_then(|truth| truth.disparities().range());
+        let (Some((_, largest)), Some(path)) = (truth, &self.args.ground_truth) else { return };
+        if largest > last as f32 + 1.0 {
+            let what = format!("disparities up to {largest:.0} px, but the labels end at {last} px");
+            terminal::warn(&format!("{}: {what}; is another --scale needed?", path.display()));
+        }
     }
 
     /// The last answer of as many matches as the arguments ask for, and the times of all. Only one answer is in memory at a
@@ -135,6 +154,12 @@ impl Job<'_> {
         let [left, right] = self.files;
         format!("{} and {}", left.display(), right.display())
     }
+}
+
+/// Writes a map to standard output.
+fn pipe(map: &DisparityMap) -> Result<(), Failure> {
+    let bytes = Raster::disparities(map).floats(MapFormat::Pfm).unwrap_or_else(|| Ok(Vec::new()));
+    Ok(std::io::stdout().write_all(&bytes.map_err(Failure::other)?)?)
 }
 
 /// The files that the outputs are made of.
