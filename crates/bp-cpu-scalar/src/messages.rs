@@ -3,6 +3,7 @@
 use bp_core::{Error, Plan, Schedule, Side, memory};
 
 /// Adds a message to the sums of one node, label by label.
+#[inline(always)]
 pub(crate) fn add(message: &[u8], sums: &mut [u8]) {
     sums.iter_mut().zip(message).for_each(|(sum, &message)| *sum = sum.saturating_add(message));
 }

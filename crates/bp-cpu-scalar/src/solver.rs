@@ -72,14 +72,16 @@ impl Solver for ScalarSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];
-            let grid = Grid { plan: &self.plan, index: grid, costs: &self.costs[grid], greys: &self.greys[grid] };
+            let size = self.plan.size(grid);
+            let grid = Grid { plan: &self.plan, index: grid, size, costs: &self.costs[grid], greys: &self.greys[grid] };
             update_messages(&grid, step, messages, &mut self.h);
         }
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        let grid = Grid { plan: &self.plan, index: 0, costs: &self.costs[0], greys: &self.greys[0] };
+        let size = self.plan.image_size();
+        let grid = Grid { plan: &self.plan, index: 0, size, costs: &self.costs[0], greys: &self.greys[0] };
         select_labels(&grid, &self.messages[0], labels, &mut self.h);
         Ok(())
     }
