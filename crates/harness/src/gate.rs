@@ -10,22 +10,21 @@ mod judge;
 mod measure;
 mod renew;
 mod runners;
+mod subject;
 mod table;
 #[cfg(test)]
 mod tests;
 mod verdict;
 
-use std::path::PathBuf;
-
-use crate::{failure::Failure, machine, record::Machine, scenes, watch::Watch};
+use crate::{failure::Failure, machine, scenes, watch::Watch};
 use baseline::Baselines;
 pub(crate) use callgrind::Counted;
-use guarded::Guarded;
 pub(crate) use instructions::instructions;
 pub(crate) use judge::Judgement;
-use measure::{Measured, Problem, measure};
-pub(crate) use renew::Renewal;
+use measure::Problem;
 use runners::Runners;
+use subject::Gate;
+pub(crate) use subject::{GateOptions, Renewal};
 pub(crate) use table::page;
 
 /// Whether the text of a file holds baselines, of one kind or the other.
@@ -43,19 +42,6 @@ const QUICK: (usize, usize, u32) = (3, 40, 18);
 /// Measurements that a baseline is the median of: each makes everything ready anew, and where memory happens to lie
 /// is a part of the noise.
 const MEASUREMENTS_OF_A_BASELINE: usize = 3;
-
-/// What is measured, and what it is held against.
-#[derive(Debug)]
-pub(crate) struct GateOptions {
-    /// A smaller image and fewer loops.
-    pub(crate) quick: bool,
-    /// Rounds of a measurement.
-    pub(crate) rounds: u32,
-    /// The folder of the baselines.
-    pub(crate) baselines: PathBuf,
-    /// Baselines to write anew.
-    pub(crate) update: Option<Renewal>,
-}
 
 /// Measures and judges, or renews the baselines if that is asked for.
 pub(crate) fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
@@ -82,24 +68,4 @@ pub(crate) fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement
 fn problem(quick: bool) -> Result<Problem, Failure> {
     let (divisor, labels, k) = if quick { QUICK } else { FULL };
     Ok(Problem { scene: scenes::made_up(0, divisor)?, labels, k })
-}
-
-/// What is measured, and where.
-struct Gate<'a> {
-    options: &'a GateOptions,
-    guarded: Vec<Guarded>,
-    problem: Problem,
-    runners: Runners,
-    machine: Machine,
-}
-
-impl Gate<'_> {
-    fn measure(&self, watch: &Watch<'_>) -> Result<Measured, Failure> {
-        measure(&self.guarded, &self.runners, &self.problem, self.options.rounds, watch)
-    }
-
-    /// Which of a baseline's runs is like this one.
-    fn setting(&self) -> &'static str {
-        if self.options.quick { "quick" } else { "full" }
-    }
 }

@@ -6,22 +6,7 @@ mod problems;
 mod run;
 mod tables;
 
-use std::path::PathBuf;
-
 pub(crate) use files::{Files, is_record, renew};
 pub(crate) use problems::Problem;
-pub(crate) use run::{check, measure};
+pub(crate) use run::{SpeedOptions, check, measure};
 pub(crate) use tables::page;
-
-/// What is measured.
-#[derive(Debug, Default)]
-pub(crate) struct SpeedOptions {
-    /// The problems, by the names in [`Problem::ASKED`]; none means all but those that take long.
-    pub(crate) problems: Vec<String>,
-    /// Rounds, by default nine, or one in a quick run.
-    pub(crate) rounds: Option<u32>,
-    /// Images of a third of the width and height.
-    pub(crate) quick: bool,
-    /// The folder of the record, the page and the charts.
-    pub(crate) output: Option<PathBuf>,
-}
