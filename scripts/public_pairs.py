@@ -39,7 +39,7 @@ def enter_venv(folder):
 
 
 def build():
-    subprocess.run(["cargo", "build", "--quiet", "--release", "--locked", "--package", "harness"], cwd=ROOT, check=True)
+    subprocess.run(["cargo", "build", "--quiet", "--release", "--locked", "--bin", "bp"], cwd=ROOT, check=True)
 
 
 def bp(*words):
@@ -51,7 +51,7 @@ class Pair:
         self.name = name
         self.labels, folder, (left, right, truth, option, visible) = files
         self.images = [data / folder / left, data / folder / right]
-        manifest = json.loads((ROOT / "bench-data" / "middlebury.json").read_text())["files"]
+        manifest = json.loads((ROOT / "crates" / "harness" / "data" / "middlebury.json").read_text())["files"]
         scale = next(file["scale"] for file in manifest if file["path"] == f"{folder}/{truth}")
         self.truth = [data / folder / truth, "--scale", scale, option, data / folder / visible]
         missing = [path for path in (*self.images, data / folder / truth) if not path.exists()]

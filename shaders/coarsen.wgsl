@@ -1,12 +1,12 @@
-// Data costs of a coarser grid: label by label the sum of a node's up to four children.
+// Data costs of a coarser grid. A node sums the costs of its children, four at most, label by label.
 
-// The finer grid's nodes of colour 0 and 1: stored costs, which count where they never were clipped, and sums.
+// The nodes of the finer grid of colour 0 and 1: their sums, and their stored costs, which serve if they were never clipped.
 @group(0) @binding(3) var<storage, read> even_costs: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> odd_costs: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read> even_sums: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read> odd_sums: array<vec2<u32>>;
 
-// Bytes of the finer grid's sums, 0 where its stored costs are to be read.
+// The bytes of the finer grid's sums; 0 to read its stored costs instead.
 override FINE_SUM_BYTES: u32 = 0;
 
 // Two of a word's four 16-bit sums, those of the nodes 2 apart from `parity`.

@@ -1,6 +1,6 @@
-// Grey values of a coarser grid, of the nodes of one colour: the mean of a node's up to four children, rounded.
+// Grey values of a coarser grid, for the nodes of one colour. A node has the rounded mean of its children, four at most.
 
-// The finer grid's, as `greys` has them.
+// The grey values of the finer grid, in the layout of `greys`.
 @group(0) @binding(1) var<storage, read> fine: array<u32>;
 @group(0) @binding(2) var<storage, read_write> written: array<u32>;
 

@@ -1,14 +1,14 @@
-// Storing data costs of four nodes, for match_cost and coarsen: each node's least one is taken off and what is left is
-// clipped; beside them the unclipped ones, where the next coarser grid is summed from those.
+// Stores the data costs of four nodes, for match_cost and coarsen: normalised by each node's least cost, then clipped. Also
+// stores the unclipped costs if the next coarser grid sums those.
 
 @group(0) @binding(1) var<storage, read_write> cost: array<vec4<u32>>;
 // [row][quad][word][label of the quad], of 2 or 4 bytes for each of the four nodes.
 @group(0) @binding(2) var<storage, read_write> sums: array<vec2<u32>>;
 
-// Bytes of a stored sum, 0 where none is stored.
+// The bytes of a stored sum; 0 if none is stored.
 override SUM_BYTES: u32 = 0;
 
-// What is stored of one label.
+// The stored costs of one label.
 fn stored(nodes: Nodes, label: u32, unclipped: vec4<u32>, least: vec4<u32>) -> u32 {
     let clipped = min(unclipped - least, vec4(parameters.clip));
     let costs = select(clipped, vec4(parameters.padding_cost), label >= parameters.labels);

@@ -1,9 +1,9 @@
-// What the profile compares, of every pixel of one image: its grey value, its census code or those of its channels, its
-// colour, or its grey value with what lies beside it.
+// The features of every pixel of one image, which the profile compares: its grey value, its census code or those of its
+// channels, its colour, or its grey value with those beside it.
 
 @group(0) @binding(2) var<storage, read_write> values: array<u32>;
 
-// The column so many aside, where border columns are repeated outward.
+// The column dx columns aside. Border columns repeat outward.
 fn aside(x: u32, dx: i32) -> u32 {
     return u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1));
 }
@@ -12,7 +12,7 @@ fn grey_aside(x: u32, dx: i32, row: u32) -> u32 {
     return grey(aside(x, dx), row);
 }
 
-// What the census transform compares: each channel, or the grey value.
+// The value that the census transform compares: a channel, or the grey value.
 fn lightness(x: u32, row: u32) -> vec3<u32> {
     if PROFILE == CENSUS_RGB {
         return colour(x, row);
@@ -20,8 +20,8 @@ fn lightness(x: u32, row: u32) -> vec3<u32> {
     return vec3(grey(x, row), 0u, 0u);
 }
 
-// A bit for each neighbour up to so many columns and rows away, in row order, from the highest bit: whether it is lighter
-// (Zabih and Woodfill 1994). Of channels the codes follow each other.
+// One bit for each neighbour within reach, in row order from the highest bit: 1 if it is lighter (Zabih and Woodfill 1994).
+// The codes of several channels follow each other.
 fn census(x: u32, row: u32, reach: i32) -> u32 {
     let centre = lightness(x, row);
     var codes = vec3(0u);

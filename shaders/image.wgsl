@@ -1,6 +1,6 @@
 // The bytes of an image, for features and greys.
 
-// Red, green and blue bytes of all pixels, without gaps, and of those of so many rows above and below the image.
+// The red, green and blue bytes of all pixels, without gaps, including APRON rows above and below the image.
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 
 override APRON: u32 = 2;
@@ -9,7 +9,7 @@ fn image_byte(index: u32) -> u32 {
     return (image[index / 4] >> (8 * (index % 4))) & 0xff;
 }
 
-// Of a pixel whose row is counted from the apron's first.
+// The colour of a pixel. Its row is counted from the first row of the apron.
 fn colour(x: u32, row: u32) -> vec3<u32> {
     let first = 3 * (row * parameters.width + x);
     return vec3(image_byte(first), image_byte(first + 1), image_byte(first + 2));

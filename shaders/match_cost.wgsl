@@ -8,12 +8,12 @@ struct Seed {
     exists: u32,
 }
 
-// What the profile compares, of every pixel of both images.
+// The features of every pixel of both images.
 @group(0) @binding(3) var<storage, read> left: array<u32>;
 @group(0) @binding(4) var<storage, read> right: array<u32>;
 @group(0) @binding(5) var<storage, read> seed: Seed;
 
-// Of the profile.
+// Numbers of the profile.
 override LARGEST_COST: u32 = 0;
 override OUT_OF_RANGE_COST: u32 = 0;
 

@@ -1,14 +1,15 @@
-// The data costs of the nodes of one colour, and what they received from the other, for update_messages and select_labels.
+// The data costs of the nodes of one colour, and the messages they received from the other colour, for update_messages and
+// select_labels.
 
 @group(0) @binding(1) var<storage, read> cost: array<vec4<u32>>;
-// What all nodes of the other colour sent to their left, right, upper and lower neighbours.
+// The messages that all nodes of the other colour sent to their left, right, upper and lower neighbours.
 @group(0) @binding(2) var<storage, read> sent_left: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read> sent_right: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> sent_up: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read> sent_down: array<vec4<u32>>;
 
-// What came from each side, for a quad of labels. At even columns the left neighbour is one node back in its row and
-// colour, at odd ones the right neighbour is one node on; all others are as far along as the node itself.
+// The messages from each side, for a quad of labels. In even columns the left neighbour has the index before the node's own
+// in its row and colour; in odd columns the right neighbour has the next index. All other neighbours have the same index.
 
 fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
     let aligned = sent_right[index];

@@ -1,8 +1,8 @@
-// First messages of a grid: what the nodes of one colour sent to one side, as the next coarser grid has it.
+// First messages of a grid: those from the nodes of one colour to one side, copied from the next coarser grid.
 //
-// A node receives at first what its parent received last, or, with another start, sends at first what its parent sent
-// last. Messages are kept with their senders, so that the coarse sender is looked for: under the first rule it is the
-// neighbour of the receiver's parent.
+// A node starts with the messages that its parent received last or, under the other rule, with those that its sender's
+// parent sent last. Buffers keep messages with their senders, so this looks for the coarse sender. Under the first rule
+// that is the neighbour of the receiver's parent.
 
 @group(0) @binding(1) var<storage, read_write> fine: array<vec4<u32>>;
 // The coarser grid's messages to that side, of colour 0 and 1.

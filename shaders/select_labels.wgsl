@@ -1,8 +1,8 @@
-// Labels of the nodes of one colour: those of least belief or, under the schedule `sweep`, decided one after another.
+// Labels of the nodes of one colour: by the lowest belief or, under the schedule `sweep`, one after another.
 
 // [colour][row of the grid][word], two bytes for each of the four nodes.
 @group(0) @binding(6) var<storage, read_write> labels: array<vec2<u32>>;
-// Grey values, see weak_edges.wgsl.
+// Grey values; see weak_edges.wgsl.
 @group(0) @binding(7) var<storage, read> greys: array<u32>;
 
 // Enough for 1024 labels and those that fill the last quad.

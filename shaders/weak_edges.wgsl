@@ -1,12 +1,12 @@
-// Which edges are weak, for update_messages and select_labels: those between nodes whose grey values differ by more than a
-// threshold. The grey values of the whole grid are the kernel's `greys`: [colour][row][word], a byte for each of the four
+// Finds weak edges, for update_messages and select_labels: edges between nodes whose grey values differ by more than a
+// threshold. The kernel's `greys` has the grey values of the whole grid: [colour][row][word], one byte for each of the four
 // nodes.
 
-// Whether any edge is.
+// Whether the model has weak edges.
 override WEAK: bool = false;
 
-// Those of the left, right, upper and lower neighbours, which lie as messages from there do. Where there is none, any will
-// do.
+// The grey values of the left, right, upper and lower neighbours, with the indices of their messages. Missing neighbours
+// have arbitrary values.
 fn neighbour_greys(nodes: Nodes) -> vec4<u32> {
     let other = 1 - parameters.colour;
     let aligned = greys[grid_index(other, nodes.y, nodes.word)];

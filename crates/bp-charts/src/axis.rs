@@ -1,25 +1,25 @@
-//! Axes: what they show, from where to where, and which values they mark.
+//! Axes: their names, ranges and ticks.
 
 use plotters::{coord::types::RangedCoordf64, prelude::Ranged};
 
-/// What stands along an axis.
+/// An axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What the values are, with their unit.
+    /// The name of the values, with their unit.
     pub name: String,
-    /// Whether it is logarithmic; one that is not shows 0.
+    /// Whether it is logarithmic. A linear axis always shows 0.
     pub logarithmic: bool,
-    /// The values that are marked; none to have them chosen.
+    /// The values of its ticks. If empty, the chart chooses them.
     pub ticks: Vec<f64>,
 }
 
 impl Axis {
-    /// An axis that shows 0, whose marks are chosen.
+    /// A linear axis with chosen ticks.
     pub fn linear(name: impl Into<String>) -> Self {
         Self { name: name.into(), logarithmic: false, ticks: Vec::new() }
     }
 
-    /// A logarithmic axis, whose marks are chosen.
+    /// A logarithmic axis with chosen ticks.
     pub fn logarithmic(name: impl Into<String>) -> Self {
         Self { logarithmic: true, ..Self::linear(name) }
     }
@@ -34,7 +34,7 @@ impl Axis {
         value.abs() <= 1e15 && (!self.logarithmic || value >= 1e-6)
     }
 
-    /// The axis over those of some values that it can show; none where there are none.
+    /// The scale for the values that the axis can show; `None` if it can show none of them.
     pub(crate) fn scale(&self, values: impl IntoIterator<Item = f64>) -> Option<Scale> {
         let values: Vec<f64> = values.into_iter().filter(|&value| self.shows(value)).collect();
         let first = *values.first()?;
@@ -43,7 +43,7 @@ impl Axis {
     }
 }
 
-/// Where an axis begins and ends, as heights, and the values that it marks.
+/// Where an axis begins and ends, as heights, and the values of its ticks.
 pub(crate) struct Scale {
     logarithmic: bool,
     low: f64,
@@ -76,14 +76,14 @@ impl Scale {
         (self.low..=self.high).contains(&self.height(value))
     }
 
-    /// How far along the axis a value lies, from 0 to 1; what is beyond an end is put there.
+    /// The position of a value on the axis, from 0 to 1. Values beyond an end are moved to it.
     pub(crate) fn fraction(&self, value: f64) -> f64 {
         (self.height(value).clamp(self.low, self.high) - self.low) / (self.high - self.low)
     }
 }
 
-/// Ticks at 1, 2 and 5 times the powers of ten between two heights; at more or fewer digits where they are not 4 to 12,
-/// and at equal steps where the range is too narrow for those.
+/// Ticks at 1, 2 and 5 times the powers of ten between two heights. If those are not 4 to 12, it uses more or fewer digits.
+/// If the range is too narrow for that, it uses equal steps.
 fn decade_ticks(low: f64, high: f64) -> Vec<f64> {
     const DIGITS: [(&[f64], usize); 4] =
         [(&[1.0, 2.0, 5.0], 1), (&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1), (&[1.0], 1), (&[1.0], 3)];

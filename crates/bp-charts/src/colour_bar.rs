@@ -1,4 +1,4 @@
-//! A bar of colours with its numbers, to stand beside a picture that is made of them.
+//! A colour bar with numbers: the scale of a picture beside it.
 
 use plotters::{coord::types::RangedCoordf64, prelude::Ranged};
 
@@ -9,28 +9,28 @@ use crate::{
     picture::{Colour, Pixels, pixels},
 };
 
-/// Heights of bars in pixels: below, numbers would not fit, and above, nobody sees more.
+/// The range of heights of bars in pixels. Numbers would not fit a lower bar, and a higher one shows no more.
 const HEIGHTS: (u32, u32) = (72, 4096);
 
 /// The least and the largest size of text in pixels.
 const TEXT: (f64, f64) = (12.0, 56.0);
 
-/// What a bar shows.
+/// A colour bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourBar<'a> {
     /// The value of its lower end.
     pub low: f64,
     /// The value of its upper end.
     pub high: f64,
-    /// What stands above it.
+    /// The text above it.
     pub unit: &'a str,
-    /// The height of the picture beside it, which its own follows within bounds.
+    /// The height of the picture beside it. The bar has the same height, within bounds.
     pub height: u32,
 }
 
 impl ColourBar<'_> {
-    /// The bar on white, about a seventh as wide as high; `colour` gives the colour of a place from 0, the lower end, to
-    /// 1. One value alone has the colour of the middle.
+    /// Draws the bar on white, about a seventh as wide as high. `colour` gives the colour at a position from 0, the lower end,
+    /// to 1. A bar of a single value has the colour of the middle.
     ///
     /// # Errors
     ///
@@ -63,17 +63,17 @@ impl ColourBar<'_> {
         Ok(pixels)
     }
 
-    /// Whether there is one value alone.
+    /// Whether both ends have the same value.
     fn is_flat(&self) -> bool {
         self.high <= self.low
     }
 
-    /// How far up a value lies, from 0 to 1.
+    /// The position of a value, from 0 to 1.
     fn place(&self, value: f64) -> f64 {
         if self.is_flat() { 0.5 } else { (value - self.low) / (self.high - self.low) }
     }
 
-    /// At most so many round values, but two at least.
+    /// At most this many round values, but at least two.
     fn ticks(&self, most: usize) -> Vec<f64> {
         if self.is_flat() {
             return vec![self.low];

@@ -1,10 +1,10 @@
-//! What charts show.
+//! The data of charts.
 
 use plotters::style::RGBColor;
 
 use crate::{Style, canvas::INK, style::colour};
 
-/// A number and its interval, whose ends equal it where there is none.
+/// A number with its interval. Without an interval, both ends equal the number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
     /// The number.
@@ -22,23 +22,23 @@ impl From<f64> for Value {
     }
 }
 
-/// What has one name and one look.
+/// A series: points with one name and one style.
 #[derive(Clone, Debug)]
 pub struct Series<P> {
     /// Its name.
     pub name: String,
-    /// Its look.
+    /// Its style.
     pub style: Style,
-    /// What is drawn.
+    /// Its points.
     pub points: Vec<P>,
 }
 
 /// An entry of a legend.
 #[derive(Clone, Debug)]
 pub struct Key {
-    /// What looks like this.
+    /// The name.
     pub name: String,
-    /// The look.
+    /// The style.
     pub style: Style,
 }
 
@@ -60,7 +60,7 @@ pub struct Level {
     pub name: String,
     /// Where it lies on the vertical axis.
     pub value: f64,
-    /// The number of its colour; none for that of the text.
+    /// The number of its colour; `None` for the colour of texts.
     pub colour: Option<usize>,
 }
 

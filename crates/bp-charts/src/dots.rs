@@ -1,4 +1,4 @@
-//! Markers side by side in categories.
+//! Dot charts: markers side by side in categories.
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 
@@ -10,18 +10,18 @@ use crate::{
     style::{MARKER_UNIT, colour, draw_marker, draw_path, draw_whisker},
 };
 
-/// A dot chart: categories from left to right and, within each, one marker a series.
+/// A dot chart: categories from left to right, with one marker for each series in each category.
 #[derive(Clone, Debug)]
 pub struct DotChart {
-    /// The heading; the ids in the SVG derive from it, so no two charts of a page may share it.
+    /// The heading. The ids in the SVG derive from it, so all charts of a page need different headings.
     pub title: String,
-    /// What the chart shows, for those who cannot see it.
+    /// A description of the chart for screen readers.
     pub description: String,
-    /// The vertical axis; its name stands above it.
+    /// The vertical axis. Its name is written above it.
     pub axis: Axis,
     /// Values to compare with.
     pub levels: Vec<Level>,
-    /// What the legend holds besides the levels; where empty, the series.
+    /// The entries of the legend besides the levels. If empty, the series.
     pub keys: Vec<Key>,
     /// The names along the horizontal axis.
     pub categories: Vec<String>,
@@ -78,12 +78,12 @@ impl DotChart {
         (RIGHT - left) / self.categories.len().max(1) as f64
     }
 
-    /// Rows that the names of the categories take turns in, where they are too wide for one.
+    /// The number of rows for the names of categories. Several rows take turns if the names are too wide for one.
     fn name_rows(&self, left: f64) -> usize {
         ((widest(&self.categories) + 8.0) / self.slot(left)).ceil() as usize
     }
 
-    /// The bands that tell the categories apart, and their names below.
+    /// Draws the bands that separate the categories, and their names below.
     fn draw_categories(&self, canvas: &Canvas<'_>, sheet: &Sheet<'_>) -> Drawn {
         let (slot, rows) = (self.slot(sheet.left), self.name_rows(sheet.left));
         for (place, name) in self.categories.iter().enumerate() {

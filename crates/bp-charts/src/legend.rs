@@ -1,4 +1,4 @@
-//! The legend: what stands below the plot.
+//! The legend below the plot.
 
 use plotters::style::text_anchor::HPos;
 
@@ -8,7 +8,7 @@ use crate::{
     style::{MARKER_UNIT, draw_dashes, draw_line, draw_marker},
 };
 
-/// What an entry shows beside its name.
+/// The look of an entry beside its name.
 pub(crate) enum Look<'a> {
     Of(Style),
     Level(&'a Level),

@@ -1,9 +1,8 @@
-//! Charts: markers side by side in categories, and points and lines between two numeric axes; and bars of colours that
-//! stand beside pictures.
+//! Charts as SVG: [`DotChart`] draws markers in categories, [`Plot`] points and lines between two numeric axes, and
+//! [`ColourBar`] the colour scale beside a picture.
 //!
-//! They are drawn as SVG text, which scales with its page, names itself to those who cannot see it, and stands on a
-//! white sheet of its own, so that it can be read on a dark page. [`png()`] makes a picture of such a text that is the
-//! same on every machine.
+//! A chart scales with its page, has a title and a description for screen readers, and has a white background, so that it can
+//! be read on a dark page. [`png()`] renders a chart to the same pixels on every machine.
 
 mod axis;
 mod canvas;

@@ -1,4 +1,4 @@
-//! What both kinds of charts have in common: the sheet that they are drawn on, the vertical axis and the legend.
+//! The sheet: the parts that both kinds of charts share, which are the heading, the vertical axis and the legend.
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 

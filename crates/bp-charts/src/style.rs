@@ -1,4 +1,4 @@
-//! How series look: the colours, the shapes of markers, the lines.
+//! Styles of series: colours, shapes of markers, and lines.
 
 use std::f64::consts::TAU;
 
@@ -6,18 +6,18 @@ use plotters::{element::DashedPathElement, prelude::*};
 
 use crate::canvas::{At, Canvas, Drawn, FINE};
 
-/// How a series looks.
+/// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Style {
     /// The number of its colour; after the last, the first follows.
     pub colour: usize,
-    /// What stands at its points.
+    /// The marker at its points.
     pub marker: Option<Marker>,
-    /// What goes from one of a plot's points to the next.
+    /// The line from one point of a plot to the next.
     pub line: Option<Line>,
 }
 
-/// What stands at a point.
+/// The marker of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Marker {
     /// The number of its shape; after the last, the first follows.
@@ -47,7 +47,7 @@ impl Fill {
     }
 }
 
-/// What goes from point to point.
+/// The line between points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
     /// A straight line.

@@ -2,11 +2,11 @@
 
 use crate::{Image, Model, Node, StereoPair, image::grey};
 
-/// Half length of the strip that is compared around the centre: the thesis's "length scan".
+/// Half the length of the strip that is compared around the centre: the "length scan" of the thesis.
 const HALF_LENGTH: usize = 10;
 
-/// A known match that CTBP and CTCSBP start from: the image is cut at (x, y), and `label` is what the census
-/// transform found for that pixel.
+/// A known match, from which census-transform BP starts: the image is cut at (x, y), and `label` is the label that the
+/// census transform found for that pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed {
     /// Column of the cut.
@@ -18,7 +18,7 @@ pub struct Seed {
 }
 
 impl Seed {
-    /// Whether (x, y) is one of the up to four nodes around the point where the cuts cross.
+    /// Whether (x, y) is one of the nodes around the point where the cuts cross. There are four at most.
     #[must_use]
     pub fn touches(&self, x: usize, y: usize) -> bool {
         (x == self.x || x + 1 == self.x) && (y == self.y || y + 1 == self.y)
@@ -26,34 +26,34 @@ impl Seed {
 }
 
 /// The census code of the pixel at (x, y): its eight neighbours in row order, from the highest bit to the lowest, 1
-/// where the neighbour's grey value is greater. Border pixels are repeated outward, see [`Image::grey_near`].
+/// where the neighbour's grey value is greater. Border pixels are repeated outward; see [`Image::grey_near`].
 ///
 /// # Panics
-/// Where (x, y) lies outside.
+/// If (x, y) lies outside the image.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
     compare_window(image, Node { x, y }, 1, grey) as u8
 }
 
-/// The same of a colour channel, 0 for red to 2 for blue, in place of grey values.
+/// The same code by a colour channel, 0 for red to 2 for blue, instead of grey values.
 ///
 /// # Panics
-/// Where (x, y) lies outside, or `channel` is above 2.
+/// If (x, y) lies outside, or `channel` is above 2.
 #[must_use]
 pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
     compare_window(image, Node { x, y }, 1, |colour| colour[channel]) as u8
 }
 
-/// As [`code`], with the 24 neighbours in a window of 5x5 pixels, in as many bits.
+/// The same code with the 24 neighbours in a window of 5x5 pixels, in 24 bits.
 ///
 /// # Panics
-/// Where (x, y) lies outside.
+/// If (x, y) lies outside the image.
 #[must_use]
 pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
     compare_window(image, Node { x, y }, 2, grey)
 }
 
-/// A bit for each neighbour at most `reach` columns and rows away, by a value of colours.
+/// One bit for each neighbour at most `reach` columns and rows away. `value` turns colours into the compared values.
 fn compare_window(image: &Image, node: Node, reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
     let Node { x, y } = node;
     let centre = value(image.rgb(x, y));
@@ -69,11 +69,11 @@ fn compare_window(image: &Image, node: Node, reach: isize, value: impl Fn([u8; 3
     code
 }
 
-/// The match of a left pixel: the smallest label whose strip of 21x3 census codes differs least, where the
-/// strip, shortened at the image's border, lies inside both images. `None` where no label's does.
+/// The match of a left pixel: the label whose strip of 21x3 census codes differs least. The strip is shortened at the border
+/// of the image and has to lie inside both images. The smallest label wins a tie. `None` if no strip lies inside.
 ///
 /// # Panics
-/// Where (x, y) lies outside.
+/// If (x, y) lies outside the image.
 #[must_use]
 pub fn find_match(pair: &StereoPair, model: &Model, node: Node) -> Option<Seed> {
     let Node { x, y } = node;

@@ -2,7 +2,7 @@
 
 use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, features, memory};
 
-/// What a profile compares of every pixel, `[height][width]`, of both images.
+/// The features of every pixel that a profile compares, `[height][width]`, of both images.
 #[derive(Clone, Debug)]
 enum Planes {
     Thesis([Vec<u8>; 2]),
@@ -14,7 +14,7 @@ enum Planes {
     CensusRgb([Vec<[u8; 3]>; 2]),
 }
 
-/// The data cost of every pixel and label of a pair; allocated once, loaded with pair after pair.
+/// The data costs of all pixels and labels of a pair. It is allocated once and loaded with one pair after another.
 #[derive(Clone, Debug)]
 pub struct DataCost {
     size: Size,
@@ -24,7 +24,7 @@ pub struct DataCost {
 }
 
 impl DataCost {
-    /// Room for pairs of `size`, holding two black images.
+    /// Allocates room for pairs of `size`. It holds two black images at first.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -41,7 +41,7 @@ impl DataCost {
         Ok(Self { size, model, planes, seed: None })
     }
 
-    /// The data cost of one pair, without a seed.
+    /// The data costs of one pair, without a seed.
     ///
     /// # Errors
     /// As [`DataCost::new`].
@@ -51,10 +51,10 @@ impl DataCost {
         Ok(cost)
     }
 
-    /// Takes in another pair. Without a seed every cost is the images' own.
+    /// Loads a pair. A seed sets the costs around it.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the pair is of another size.
+    /// [`Error::WrongSize`] if the pair is of another size.
     pub fn load(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         if pair.size() != self.size {
             return Err(Error::WrongSize { what: "the pair", found: pair.size(), expected: self.size });
@@ -77,7 +77,7 @@ impl DataCost {
     /// D(p, d) of the pixel at (x, y) for one label.
     ///
     /// # Panics
-    /// Where (x, y) lies outside.
+    /// If (x, y) lies outside the image.
     #[must_use]
     pub fn at(&self, x: usize, y: usize, label: u16) -> u16 {
         if let Some(seed) = self.seed.filter(|seed| seed.touches(x, y)) {
@@ -89,7 +89,7 @@ impl DataCost {
         }
     }
 
-    /// Bytes held.
+    /// The bytes held.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         match &self.planes {

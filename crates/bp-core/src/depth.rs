@@ -1,12 +1,12 @@
 //! Depth and points from disparities, by the geometry of a rectified pair.
 //!
-//! A point at depth Z before the left camera has the disparity `d = f B / Z - doffs`, with the focal length f in pixels,
-//! the distance B of the cameras, and doffs, by how many pixels the right principal point lies right of the left one
-//! (Scharstein et al. 2014, whose `calib.txt` names them so).
+//! A point at depth Z in front of the left camera has the disparity `d = f B / Z - doffs`. Here f is the focal length in
+//! pixels, B the baseline (the distance between the cameras), and doffs says how many pixels the right principal point
+//! lies to the right of the left one. These names come from `calib.txt` of Scharstein et al. (2014).
 
 use crate::{DisparityMap, Error, Image};
 
-/// The geometry of a rectified pair, in pixels of its images: an image of half the size has half the focal length, doffs
+/// The geometry of a rectified pair, in pixels of its images. An image of half the size has half the focal length, doffs
 /// and principal point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
@@ -17,11 +17,11 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// A geometry from the focal length in pixels, the baseline in any unit, which depth will have too, doffs in pixels,
-    /// and column and row of the left image's principal point, the centre of the first pixel being (0, 0).
+    /// A calibration from the focal length in pixels, the baseline, doffs in pixels, and the column and row of the left
+    /// image's principal point, where (0, 0) is the centre of the first pixel. Depth has the unit of the baseline.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where a length is not above 0 or a number is not finite.
+    /// [`Error::Calibration`] if a length is not above 0 or a number is not finite.
     pub fn new(focal: f64, baseline: f64, doffs: f64, principal_point: [f64; 2]) -> Result<Self, Error> {
         let is_length = |value: f64| value > 0.0 && value.is_finite();
         if !is_length(focal) {
@@ -36,32 +36,32 @@ impl Calibration {
         Ok(Self { focal, baseline, doffs, principal_point })
     }
 
-    /// Focal length in pixels.
+    /// The focal length in pixels.
     #[must_use]
     pub fn focal(&self) -> f64 {
         self.focal
     }
 
-    /// Distance of the cameras, in the unit of depth.
+    /// The distance between the cameras, in the unit of depth.
     #[must_use]
     pub fn baseline(&self) -> f64 {
         self.baseline
     }
 
-    /// What is added to disparities before they give depth, in pixels.
+    /// The offset that is added to disparities to compute depth, in pixels.
     #[must_use]
     pub fn doffs(&self) -> f64 {
         self.doffs
     }
 
-    /// Column and row of the left image's principal point.
+    /// The column and row of the left image's principal point.
     #[must_use]
     pub fn principal_point(&self) -> [f64; 2] {
         self.principal_point
     }
 
-    /// The depth of a disparity, `f B / (d + doffs)`; `None` where d is unknown or d + doffs is not above 0, which no
-    /// point before the cameras has.
+    /// The depth of a disparity, `f B / (d + doffs)`. `None` if d is unknown, or if d + doffs is not above 0: no point in
+    /// front of the cameras has such a disparity.
     #[must_use]
     pub fn depth(&self, disparity: f32) -> Option<f32> {
         let shift = f64::from(disparity) + self.doffs;
@@ -69,7 +69,7 @@ impl Calibration {
         (shift > 0.0 && depth > 0.0 && depth.is_finite()).then_some(depth)
     }
 
-    /// Where the point lies that left pixel (x, y) shows at some depth: x to the right, y down, z forward from the left
+    /// The position of the point that left pixel (x, y) shows at a depth: x to the right, y down, z forward from the left
     /// camera, in the unit of depth.
     #[must_use]
     pub fn position(&self, x: usize, y: usize, depth: f32) -> [f32; 3] {
@@ -79,7 +79,7 @@ impl Calibration {
     }
 }
 
-/// The depths of a map `[height][width]`, in the unit of the baseline; plus infinity where unknown.
+/// The depths of a map, `[height][width]`, in the unit of the baseline. Unknown depths are plus infinity.
 #[must_use]
 pub fn depth_map(map: &DisparityMap, calibration: &Calibration) -> Vec<f32> {
     map.values().iter().map(|&disparity| calibration.depth(disparity).unwrap_or(DisparityMap::UNKNOWN)).collect()
@@ -94,10 +94,10 @@ pub struct Point {
     pub colour: [u8; 3],
 }
 
-/// The points that the left image shows, row by row; pixels without depth give none.
+/// The points that the left image shows, row by row. Pixels without depth are left out.
 ///
 /// # Errors
-/// [`Error::WrongSize`] where image and map differ in size.
+/// [`Error::WrongSize`] if image and map differ in size.
 pub fn points(
     map: &DisparityMap,
     image: &Image,

@@ -1,4 +1,4 @@
-//! The driver: runs a prepared plan on pair after pair, in the one order that all backends follow, and times it.
+//! The driver: runs a prepared plan on one pair after another, calls the kernels in order, and takes their times.
 
 use std::{
     ops::{AddAssign, ControlFlow},
@@ -7,18 +7,19 @@ use std::{
 
 use crate::{Device, DisparityMap, Error, Node, Plan, Schedule, Side, Solver, Stage, StereoPair, census, memory};
 
-/// Times of one solve.
+/// The times of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Times {
-    /// Each stage over all grids by the wall clock, in the order of [`Stage::ALL`].
+    /// The wall-clock time of each stage over all grids, in the order of [`Stage::ALL`].
     pub wall: [Duration; Stage::ALL.len()],
-    /// The same by the device's clock, where it has one; see [`Solver::device_times`].
+    /// The same by the device's clock, if it has one; see [`Solver::device_times`].
     pub device: Option<[Duration; Stage::ALL.len()]>,
-    /// From the images in memory to the labels in memory; the census search of a cut plan is in here and in no stage. Wall clock.
+    /// The wall-clock time from images in memory to labels in memory. It includes the census search of a cut plan, which
+    /// belongs to no stage.
     pub total: Duration,
 }
 
-/// Adds stage by stage; where only one has the device's clock, its times stand.
+/// Adds stage by stage. If only one of them has device times, it keeps those.
 impl AddAssign for Times {
     fn add_assign(&mut self, other: Self) {
         let sum = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
@@ -31,29 +32,29 @@ impl AddAssign for Times {
     }
 }
 
-/// How far a solve has come, in message entries.
+/// The progress of a solve, in message entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Computed so far.
+    /// The entries computed so far.
     pub done: u64,
-    /// Of the whole plan, as predicted by [`Plan::message_updates`].
+    /// The entries of the whole plan; see [`Plan::message_updates`].
     pub total: u64,
 }
 
-/// Called after every call of [`Solver::update_messages`]; breaking stops the solve.
+/// A function that is called after every [`Solver::update_messages`]. If it breaks, the solve stops.
 pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
-/// A plan prepared on a device, ready to match pairs of its size one after another.
+/// A plan prepared on a device, ready to match one pair of its size after another.
 pub struct Driver {
     plan: Plan,
     solver: Box<dyn Solver>,
     labels: Vec<u16>,
-    /// Whether the last solve came to its end.
+    /// Whether the last solve was completed.
     has_answer: bool,
 }
 
 impl Driver {
-    /// Prepares `plan` on `device`; everything is allocated here.
+    /// Prepares `plan` on `device`. It allocates everything.
     ///
     /// # Errors
     /// Those of [`Device::prepare`].
@@ -72,34 +73,34 @@ impl Driver {
         &self.plan
     }
 
-    /// Bytes allocated for the plan, counted.
+    /// The bytes allocated for the plan, counted.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
         self.solver.allocated_bytes() + memory::bytes(&self.labels)
     }
 
-    /// Time that compiling kernels took within [`Driver::new`], where the device compiles any.
+    /// The time that [`Driver::new`] spent on compiling kernels, if the device compiles any.
     #[must_use]
     pub fn compile_time(&self) -> Option<Duration> {
         self.solver.compile_time()
     }
 
-    /// Bytes that each stage of the last match had to read and write at least, in the order of [`Stage::ALL`], where
-    /// the device counts them; see [`Solver::moved_bytes`].
+    /// The bytes that each stage of the last solve had to read and write at least, in the order of [`Stage::ALL`], if the
+    /// device counts them; see [`Solver::moved_bytes`].
     #[must_use]
     pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         self.solver.moved_bytes()
     }
 
-    /// Matches a pair; [`Driver::labels`] and [`Driver::disparities`] hold the answer until the next.
+    /// Matches a pair. [`Driver::labels`] and [`Driver::disparities`] hold the result until the next solve.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the pair is not of the plan's size, and those of the device.
+    /// [`Error::WrongSize`] if the pair is not of the plan's size, and those of the device.
     pub fn solve(&mut self, pair: &StereoPair) -> Result<Times, Error> {
         self.solve_observed(pair, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same, with an observer that is told of progress and may stop it.
+    /// The same with an observer, which receives the progress and may stop the solve.
     ///
     /// # Errors
     /// As [`Driver::solve`], and [`Error::Stopped`].
@@ -107,14 +108,14 @@ impl Driver {
         self.solve_from(pair, Start::Cold, observer)
     }
 
-    /// Matches the next frame of a video, starting from the messages of the frame before: the last messages of grid 0 are
-    /// its first ones, and the plan's steps run on grid 0 alone, counted from 0. No coarser grid takes part, so that such
-    /// a solve is the faster one, and as good only where little moved. The first solve of a driver, and one after a
-    /// solve that was stopped or failed, is that of [`Driver::solve_observed`].
+    /// Matches the next frame of a video, starting from the messages of the frame before. The last messages of grid 0 become
+    /// its first ones, and the plan's steps run on grid 0 alone, counted from 0. Without coarser grids such a solve is
+    /// faster, but as good only where little has moved. The first solve of a driver, and one after a solve that was stopped
+    /// or failed, is a [`Driver::solve_observed`].
     ///
     /// # Errors
     /// As [`Driver::solve_observed`]; [`Error::Plan`] under [`Schedule::Sweep`], whose bands hold messages only while
-    /// they are swept, and [`Error::Unsupported`] where the device does not keep the plan's messages.
+    /// they are swept, and [`Error::Unsupported`] if the device does not keep the plan's messages.
     pub fn solve_warm_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
             return Err(Error::Plan("a warm start needs messages that are kept: the schedule sync or checkerboard"));
@@ -146,19 +147,19 @@ impl Driver {
         Ok(times)
     }
 
-    /// The last answer: a label for every pixel, `[height][width]`.
+    /// The labels of the last solve, `[height][width]`.
     #[must_use]
     pub fn labels(&self) -> &[u16] {
         &self.labels
     }
 
-    /// The last answer in pixels; allocates the map.
+    /// The disparity map of the last solve. It allocates the map.
     #[must_use]
     pub fn disparities(&self) -> DisparityMap {
         DisparityMap::from_labels(self.plan.image_size(), self.plan.model(), &self.labels)
     }
 
-    /// The last messages received from `side`, see [`Solver::read_messages`]; allocates the volume.
+    /// The last messages received from `side`; see [`Solver::read_messages`]. It allocates their volume.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], and those of the device.
@@ -169,17 +170,17 @@ impl Driver {
     }
 }
 
-/// What a solve starts from.
+/// The messages that a solve starts with.
 #[derive(Clone, Copy)]
 enum Start {
     /// Zeros on the coarsest grid.
     Cold,
-    /// What grid 0 holds.
+    /// Those that grid 0 holds.
     Warm,
 }
 
 impl Start {
-    /// On how many grids messages are passed.
+    /// The number of grids on which messages are passed.
     fn grids(self, plan: &Plan) -> usize {
         match self {
             Self::Cold => plan.grids(),

@@ -12,11 +12,11 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The energy of `labels` `[height][width]`: data costs are the images' own, without a seed, and the smoothness is
-    /// over all edges of the image, cut ones included, so that the energies of all plans compare.
+    /// The energy of `labels` `[height][width]`. It uses data costs without a seed and all edges of the image, even those
+    /// across a cut, so that energies of all plans can be compared.
     ///
     /// # Errors
-    /// [`Error::PixelCount`] where `labels` does not hold one label a pixel, [`Error::OutOfMemory`].
+    /// [`Error::PixelCount`] if `labels` does not hold one label a pixel, [`Error::OutOfMemory`].
     pub fn of(pair: &StereoPair, model: &Model, labels: &[u16]) -> Result<Self, Error> {
         let size = pair.size();
         if labels.len() != size.pixels() {
@@ -37,15 +37,15 @@ impl Energy {
         Ok(energy)
     }
 
-    /// Data and smoothness together.
+    /// The sum of data and smoothness.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.data + self.smoothness
     }
 }
 
-/// The label of least data cost of every pixel, the smallest on ties, `[height][width]`: what remains of matching
-/// without smoothness.
+/// The label of the lowest data cost of every pixel, `[height][width]`: matching without smoothness. The smallest label
+/// wins a tie.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].

@@ -1,4 +1,4 @@
-//! What can go wrong, sorted by who can mend it.
+//! Errors, sorted by who can fix them.
 
 use crate::{
     limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
@@ -15,13 +15,13 @@ pub enum Error {
         /// The size asked for.
         size: Size,
     },
-    /// A side longer than [`MAX_SIDE`].
+    /// An image with a side longer than [`MAX_SIDE`].
     #[error("an image of {size} pixels is too large: a side holds at most {MAX_SIDE}")]
     TooLarge {
         /// The size asked for.
         size: Size,
     },
-    /// Values that do not fill their image.
+    /// Too few or too many values for an image.
     #[error("{found} values for {size} pixels")]
     PixelCount {
         /// The size asked for.
@@ -29,7 +29,7 @@ pub enum Error {
         /// How many values there were.
         found: usize,
     },
-    /// Two images that should be of one size.
+    /// Two images of a pair that differ in size.
     #[error("the left image has {left} pixels and the right one {right}: a rectified pair has one size")]
     SizesDiffer {
         /// Size of the left image.
@@ -37,7 +37,7 @@ pub enum Error {
         /// Size of the right image.
         right: Size,
     },
-    /// Something of another size than was prepared or compared with.
+    /// Something that has another size than expected.
     #[error("{what} has {found} pixels where {expected} were expected")]
     WrongSize {
         /// What has the size.
@@ -53,35 +53,35 @@ pub enum Error {
         /// How many were asked for.
         labels: usize,
     },
-    /// A least disparity so far out that no pixel of any image could match.
+    /// A least disparity with which no pixel of any image could match.
     #[error("a least disparity of {min_disparity} px is beyond any image: from {low} to {high} are possible", low = -(MAX_SIDE as i64), high = MAX_SIDE)]
     MinDisparity {
         /// What was asked for.
         min_disparity: i32,
     },
-    /// A truncation K with which u8 would not be exact.
+    /// A truncation K with which messages of 8 bits would not be exact.
     #[error("a truncation of {truncation} is above {MAX_TRUNCATION}, the most with which 8-bit messages are exact")]
     Truncation {
         /// What was asked for.
         truncation: u8,
     },
-    /// A geometry that no pair of cameras has.
+    /// A calibration that no pair of cameras has.
     #[error("{0}")]
     Calibration(&'static str),
-    /// A plan setting that no run can follow.
+    /// Settings that contradict each other.
     #[error("{0}")]
     Plan(&'static str),
-    /// More memory needed than there is.
+    /// More memory needed than available.
     #[error("out of memory: {needed} bytes are needed for {what}{}", available.map_or_else(String::new, |bytes| format!(" and {bytes} are available")))]
     OutOfMemory {
-        /// What the memory was for.
+        /// The purpose of the memory.
         what: &'static str,
         /// Bytes needed.
         needed: u64,
-        /// Bytes that there are, where that is known.
+        /// Bytes available, if known.
         available: Option<u64>,
     },
-    /// A device that is not there.
+    /// A device that does not exist or cannot be opened.
     #[error("backend {backend} has no device {device}: {reason}")]
     Unavailable {
         /// Name of the backend.
@@ -91,28 +91,28 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A plan beyond what a device is made for, though memory would do.
+    /// A plan beyond the limits of a device, although its memory would do.
     #[error("{device} cannot run this plan: {reason}")]
     Unsupported {
         /// Name of the device.
         device: String,
-        /// Which limit, and what would pass it.
+        /// The limit, and what exceeds it.
         reason: String,
     },
-    /// A device that went away or was reset while it worked; what was prepared on it is lost.
+    /// A device that went away or was reset while it worked. Everything prepared on it is lost.
     #[error("{device} was lost: {reason}")]
     DeviceLost {
         /// Name of the device.
         device: String,
-        /// What its driver says.
+        /// The message of its driver.
         reason: String,
     },
-    /// A device that did not answer in time; what was prepared on it is lost.
+    /// A device that did not answer in time. Everything prepared on it is lost.
     #[error("{device} did not answer within {seconds} s")]
     Timeout {
         /// Name of the device.
         device: String,
-        /// How long it was given.
+        /// The time limit.
         seconds: u64,
     },
     /// Any other failure of a device or its driver.

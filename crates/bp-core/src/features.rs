@@ -1,4 +1,4 @@
-//! What the profiles compare: a few bytes of a pixel, and the cost of matching two pixels by them.
+//! Features: the few bytes of a pixel that a profile compares, and the cost of matching two pixels by them.
 
 use crate::{Image, census};
 

@@ -4,14 +4,14 @@ use std::{ops::Range, sync::Arc};
 
 use crate::{Error, Size, limits::MAX_SIDE};
 
-/// Most rows of an apron, see [`Image::strip`]: as far up and down as any data cost looks.
+/// The most rows of an apron (see [`Image::strip`]): no data cost looks further up or down.
 pub const APRON: usize = 2;
 
 impl Size {
     /// A size.
     ///
     /// # Errors
-    /// [`Error::Empty`] where a side is 0, [`Error::TooLarge`] where one exceeds [`MAX_SIDE`].
+    /// [`Error::Empty`] where a side is 0, [`Error::TooLarge`] if one exceeds [`MAX_SIDE`].
     pub fn new(width: usize, height: usize) -> Result<Self, Error> {
         let size = Self { width, height };
         if width == 0 || height == 0 {
@@ -26,15 +26,15 @@ impl Size {
 
 /// An image of 8-bit colours, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
 ///
-/// A strip of a larger image may have an *apron*: up to [`APRON`] rows of what lies above and below it there. They belong
-/// to no pixel of the strip, but data costs that look at neighbouring rows see them.
+/// A strip of a larger image may have an *apron*: up to [`APRON`] rows of the larger image above and below it. They are no
+/// part of the strip, but data costs that look at neighbouring rows see them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     size: Size,
-    /// Rows of the apron above the image, and below.
+    /// The rows of the apron above and below the image.
     above: usize,
     below: usize,
-    /// `[above + height + below][width]`; clones share them.
+    /// Colours `[above + height + below][width]`. Clones share them.
     pixels: Arc<Vec<[u8; 3]>>,
 }
 
@@ -42,7 +42,7 @@ impl Image {
     /// An image from its colours, `[height][width]`.
     ///
     /// # Errors
-    /// As [`Size::new`]; [`Error::PixelCount`] where `pixels` does not hold `width * height` colours.
+    /// As [`Size::new`]; [`Error::PixelCount`] if `pixels` does not hold `width * height` colours.
     pub fn from_rgb(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Result<Self, Error> {
         let size = Size::new(width, height)?;
         if pixels.len() != size.pixels() {
@@ -59,7 +59,7 @@ impl Image {
         Self::from_rgb(width, height, pixels.iter().map(|&v| [v; 3]).collect())
     }
 
-    /// The same turned left to right.
+    /// The image mirrored left to right.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let mut pixels = self.pixels.to_vec();
@@ -73,14 +73,14 @@ impl Image {
         self.size
     }
 
-    /// All colours, `[height][width]`; those of an apron are not among them.
+    /// All colours, `[height][width]`, without those of an apron.
     #[must_use]
     pub fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels[self.above * self.size.width..][..self.size.pixels()]
     }
 
-    /// The colours of the row `y`, `[width]`, which may lie outside the image: those of its apron where it has one, else
-    /// those of the last row known in that direction.
+    /// The colours of row `y`, `[width]`. Outside the image, they come from the apron, and beyond the apron from the last
+    /// row in that direction.
     #[must_use]
     pub fn row_near(&self, y: isize) -> &[[u8; 3]] {
         let last = self.above + self.size.height + self.below - 1;
@@ -88,18 +88,18 @@ impl Image {
         &self.pixels[row * self.size.width..][..self.size.width]
     }
 
-    /// The grey value at column `x`, row `y`, which may lie outside the image: its border columns are repeated outward,
-    /// rows are those of [`Image::row_near`].
+    /// The grey value at column `x`, row `y`. Outside the image, border columns repeat, and rows come from
+    /// [`Image::row_near`].
     #[must_use]
     pub fn grey_near(&self, x: isize, y: isize) -> u8 {
         grey(self.row_near(y)[x.clamp(0, self.size.width as isize - 1) as usize])
     }
 
-    /// A copy of some rows as an image of its own, with an apron of what lies above and below them: rows of this image, or
-    /// of its own apron. So the strip's data costs are what they are in the whole image.
+    /// Copies some rows to an image of its own. Its apron has the rows above and below them, so its data costs equal those
+    /// of the whole image.
     ///
     /// # Panics
-    /// Where `rows` are none, or lie outside.
+    /// If `rows` is empty or lies outside the image.
     #[must_use]
     pub fn strip(&self, rows: Range<usize>) -> Self {
         assert!(rows.start < rows.end && rows.end <= self.size.height, "rows {rows:?} of an image of {}", self.size);
@@ -111,10 +111,10 @@ impl Image {
         Self { size: Size { width, height: rows.len() }, above, below, pixels: pixels.into() }
     }
 
-    /// A copy of some columns as an image of its own, with the apron's. Nothing is known of the columns beside them.
+    /// Copies some columns to an image of its own, those of the apron included. The columns beside them are lost.
     ///
     /// # Panics
-    /// Where `columns` are none, or lie outside.
+    /// If `columns` is empty or lies outside the image.
     #[must_use]
     pub fn columns(&self, columns: Range<usize>) -> Self {
         let Self { size: Size { width, height }, above, below, ref pixels } = *self;
@@ -126,7 +126,7 @@ impl Image {
     /// The colour at column `x`, row `y`.
     ///
     /// # Panics
-    /// Where (x, y) lies outside.
+    /// If (x, y) lies outside the image.
     #[must_use]
     pub fn rgb(&self, x: usize, y: usize) -> [u8; 3] {
         self.pixels()[y * self.size.width + x]
@@ -135,7 +135,7 @@ impl Image {
     /// The grey value at column `x`, row `y`.
     ///
     /// # Panics
-    /// Where (x, y) lies outside.
+    /// If (x, y) lies outside the image.
     #[must_use]
     pub fn grey(&self, x: usize, y: usize) -> u8 {
         grey(self.rgb(x, y))
@@ -148,20 +148,20 @@ impl std::fmt::Debug for Image {
     }
 }
 
-/// Luma of a colour in integers with the weights of ITU-R BT.601; equal channels keep their value.
+/// The luma of a colour, in integers with the weights of ITU-R BT.601. Equal channels keep their value.
 #[must_use]
 pub fn grey([r, g, b]: [u8; 3]) -> u8 {
     let sum = 299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b);
     ((sum + 500) / 1000) as u8
 }
 
-/// A 16-bit channel value as 8 bits, rounded to nearest: 65535 becomes 255.
+/// Converts a 16-bit channel value to 8 bits, rounded to nearest: 65535 becomes 255.
 #[must_use]
 pub fn narrow(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
 }
 
-/// A rectified pair: left pixel (x, y) with disparity d shows what right pixel (x - d, y) shows.
+/// A rectified pair: left pixel (x, y) with disparity d and right pixel (x - d, y) show the same point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StereoPair {
     left: Image,
@@ -169,10 +169,10 @@ pub struct StereoPair {
 }
 
 impl StereoPair {
-    /// A pair of two images of one size.
+    /// Pairs two images of the same size.
     ///
     /// # Errors
-    /// [`Error::SizesDiffer`].
+    /// [`Error::SizesDiffer`] if they differ in size.
     pub fn new(left: Image, right: Image) -> Result<Self, Error> {
         if left.size() != right.size() {
             return Err(Error::SizesDiffer { left: left.size(), right: right.size() });
@@ -180,9 +180,9 @@ impl StereoPair {
         Ok(Self { left, right })
     }
 
-    /// The pair in a mirror: the right image, turned left to right, is its left one and the other way round. What is its
-    /// disparity map in the mirror is the right image's: right pixel (x, y) with disparity d shows what left pixel
-    /// (x + d, y) shows.
+    /// The mirrored pair: its left image is the right image mirrored, and its right image the left one mirrored. Mirror its
+    /// disparity map back to get the map of the right image, whose pixel (x, y) with disparity d and left pixel (x + d, y)
+    /// show the same point.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         Self { left: self.right.mirrored(), right: self.left.mirrored() }
@@ -194,7 +194,7 @@ impl StereoPair {
         self.left.size()
     }
 
-    /// The left image: the one that the disparity map belongs to.
+    /// The left image, to which the disparity map belongs.
     #[must_use]
     pub fn left(&self) -> &Image {
         &self.left
@@ -206,7 +206,7 @@ impl StereoPair {
         &self.right
     }
 
-    /// Some rows of both images, see [`Image::strip`].
+    /// Copies some rows of both images; see [`Image::strip`].
     ///
     /// # Panics
     /// As there.
@@ -215,7 +215,7 @@ impl StereoPair {
         Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
     }
 
-    /// Some columns of both images, the same of each, see [`Image::columns`].
+    /// Copies the same columns of both images; see [`Image::columns`].
     ///
     /// # Panics
     /// As there.
@@ -253,7 +253,7 @@ mod tests {
         let strip = rows().strip(3..4);
         assert_eq!((strip.size().height, strip.pixels()), (1, [[3; 3]; 2].as_slice()));
         assert_eq!(near(&strip), [1, 1, 1, 2, 3, 4, 4, 4, 4, 4]);
-        // Nothing is known any more of what lies further away than an apron.
+        // Rows beyond the apron are lost.
         assert_eq!(near(&rows().strip(0..2)), [0, 0, 0, 0, 0, 1, 2, 3, 3, 3]);
         assert_eq!(strip.grey_near(isize::MIN, isize::MIN), 1);
         assert_eq!(strip.grey_near(isize::MAX, isize::MAX), 4);

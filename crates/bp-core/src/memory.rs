@@ -4,10 +4,11 @@ use std::{hint::black_box, time::Instant};
 
 use crate::Error;
 
-/// A vector of `len` copies of `value`, its memory written, so that no page is first touched while a solve is timed.
+/// Allocates a vector of `len` copies of `value`. Its memory is written now, so that no page is first touched while a solve
+/// is timed.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] where the allocator refuses; `what` names the buffer there.
+/// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer there.
 pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
     let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
@@ -16,20 +17,20 @@ pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<
     Ok(values)
 }
 
-/// Bytes that a vector holds.
+/// The bytes that a vector holds.
 #[must_use]
 pub fn bytes<T>(values: &Vec<T>) -> u64 {
     (values.capacity() * size_of::<T>()) as u64
 }
 
-/// Bytes copied at a time: more than the caches of all but a few processors hold.
+/// The bytes of a copy: more than the caches of most CPUs hold.
 const COPIED: usize = 256 << 20;
 
-/// Copies of which the median is taken, after one that is not timed.
+/// The number of copies of which the median is taken, after one that warms up.
 const COPIES: usize = 9;
 
-/// Bytes a second, read and written ones together, at which `copy` copies one buffer in main memory to another: what
-/// [`crate::Device::copy_rate`] is for a processor.
+/// Measures how many bytes a second `copy` reads and writes, together, when it copies a buffer in main memory. This is
+/// [`crate::Device::copy_rate`] for a CPU.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].

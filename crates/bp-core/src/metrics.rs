@@ -1,14 +1,14 @@
-//! Errors of a disparity map against ground truth (Scharstein and Szeliski 2002; the thesis's equations 2.82, 2.83).
+//! The errors of a disparity map against ground truth (Scharstein and Szeliski 2002; the thesis's equations 2.82, 2.83).
 
 use crate::{DisparityMap, Error, Size};
 
 /// The error thresholds of the bad-pixel percentages, in pixels.
 pub const THRESHOLDS: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
 
-/// Largest difference between left and right truth at a pixel that both cameras see, in pixels.
+/// The largest difference between left and right truth, in pixels, at which a pixel counts as non-occluded.
 const VISIBLE_WITHIN: f32 = 1.0;
 
-/// Ground truth of the left image, and which of its pixels the right camera sees too.
+/// The ground truth of the left image, and which of its pixels are non-occluded: seen by the right camera too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundTruth {
     disparities: DisparityMap,
@@ -16,16 +16,16 @@ pub struct GroundTruth {
 }
 
 impl GroundTruth {
-    /// Truth without knowledge of what is visible.
+    /// Ground truth that does not say which pixels are non-occluded.
     #[must_use]
     pub fn new(disparities: DisparityMap) -> Self {
         Self { disparities, visible: None }
     }
 
-    /// Truth whose visible pixels are given, `[height][width]`.
+    /// Ground truth with a mask of its non-occluded pixels, `[height][width]`.
     ///
     /// # Errors
-    /// [`Error::PixelCount`] where `visible` does not hold one value a pixel.
+    /// [`Error::PixelCount`] if `visible` does not hold one value a pixel.
     pub fn with_mask(disparities: DisparityMap, visible: Vec<bool>) -> Result<Self, Error> {
         let size = disparities.size();
         if visible.len() != size.pixels() {
@@ -34,11 +34,11 @@ impl GroundTruth {
         Ok(Self { disparities, visible: Some(visible) })
     }
 
-    /// Truth whose visible pixels follow from the right image's truth: known dL at x, known dR at
-    /// `x' = floor(x - dL + 1/2)` inside the image, and `|dL - dR| <= 1`.
+    /// Ground truth whose non-occluded pixels follow from the truth of the right image. Such a pixel has a known dL at x, a
+    /// known dR at `x' = floor(x - dL + 1/2)` inside the image, and `|dL - dR| <= 1`.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the two maps differ in size.
+    /// [`Error::WrongSize`] if the two maps differ in size.
     pub fn with_right(disparities: DisparityMap, right: &DisparityMap) -> Result<Self, Error> {
         let size = disparities.size();
         check_size("the right ground truth", right.size(), size)?;
@@ -53,22 +53,22 @@ impl GroundTruth {
         Ok(Self { disparities, visible: Some(visible) })
     }
 
-    /// True disparities.
+    /// The true disparities.
     #[must_use]
     pub fn disparities(&self) -> &DisparityMap {
         &self.disparities
     }
 
-    /// Visible pixels `[height][width]`, where that is known.
+    /// The mask of non-occluded pixels `[height][width]`, if known.
     #[must_use]
     pub fn visible(&self) -> Option<&[bool]> {
         self.visible.as_deref()
     }
 
-    /// Errors of `map` over all pixels of known truth, and over the visible ones among them.
+    /// The errors of `map` over all pixels of known truth, and over the non-occluded ones among them.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the map has another size than the truth.
+    /// [`Error::WrongSize`] if the map has another size than the truth.
     pub fn errors(&self, map: &DisparityMap) -> Result<Errors, Error> {
         check_size("the disparity map", map.size(), self.disparities.size())?;
         let pixels = || map.values().iter().zip(self.disparities.values());
@@ -81,32 +81,32 @@ impl GroundTruth {
     }
 }
 
-/// Refuses a map of another size.
+/// Fails if a map has another size.
 pub(crate) fn check_size(what: &'static str, found: Size, expected: Size) -> Result<(), Error> {
     if found == expected { Ok(()) } else { Err(Error::WrongSize { what, found, expected }) }
 }
 
-/// Errors of a map over two sets of pixels.
+/// The errors of a map over two sets of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Over all pixels of known truth.
     pub all: MapErrors,
-    /// Over those that the right camera sees too; `None` where that is not known.
+    /// Over the non-occluded ones; `None` if those are not known.
     pub visible: Option<MapErrors>,
 }
 
-/// Errors over a set of pixels of known truth. Figures over no pixel at all are NaN: nothing was measured.
+/// The errors over a set of pixels of known truth. A figure over no pixels is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapErrors {
-    /// Pixels of known truth (N).
+    /// The number of pixels of known truth (N).
     pub known: u64,
-    /// Those of them that the map answers; `answered / known` is its density.
+    /// How many of them have a disparity in the map. `answered / known` is the density of the map.
     pub answered: u64,
-    /// Root of the mean squared error over answered pixels, in pixels.
+    /// The root mean squared error over answered pixels, in pixels.
     pub rmse: f64,
-    /// Percentage of answered pixels wrong by more than each of [`THRESHOLDS`].
+    /// The percentage of answered pixels with an error above each of [`THRESHOLDS`].
     pub bad: [f64; 4],
-    /// Percentage of known pixels unanswered or wrong by more than each of [`THRESHOLDS`].
+    /// The percentage of known pixels that are unanswered or have an error above each of [`THRESHOLDS`].
     pub bad_or_unanswered: [f64; 4],
 }
 

@@ -1,34 +1,34 @@
-//! The grid Markov random field: labels, data cost profile and smoothness.
+//! The model: labels, data cost profile and smoothness of a Markov random field on a grid.
 
 use crate::{
     Error, Smoothness,
     limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
 };
 
-/// A data cost D(p, d) with the smoothness that goes with it, all in whole units.
+/// A data cost D(p, d) and the smoothness that goes with it, all in whole units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Profile {
-    /// Truncated absolute grey difference in tenths of the literature's unit: `(7 min(|Il - Ir|, 15) + 5) div 10`,
+    /// The truncated absolute grey difference, in tenths of the unit used in the literature: `(7 min(|Il - Ir|, 15) + 5) div 10`,
     /// after Felzenszwalb and Huttenlocher (2006): lambda 0.07, tau 15, s 1, K 1.7.
     Thesis,
     /// `min(Hamming distance of 3x3 census codes, 6)`; the census transform is Zabih and Woodfill's (1994).
     Census,
-    /// Sum of absolute differences over R, G, B, untruncated: the default energy of the Middlebury MRF code
+    /// The sum of absolute differences over R, G and B, not truncated: the default energy of the Middlebury MRF code
     /// (Szeliski et al. 2008).
     Mrf,
-    /// `min(Hamming distance of 5x5 census codes, 20)`, see [`Profile::Census`].
+    /// `min(Hamming distance of 5x5 census codes, 20)`; see [`Profile::Census`].
     Census5x5,
     /// Truncated absolute differences of grey values and of their horizontal gradients,
     /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`.
     /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the numbers
     /// are ours.
     Gradient,
-    /// Grey difference insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`, where d is the
-    /// distance of one image's grey value from the range of the other's around the match: from the least to the greatest
-    /// of I(x) and the halves `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`; the smaller of both ways.
+    /// The grey difference that is insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`. Here
+    /// d is the distance of one image's grey value from the range of the other's around the match. That range spans I(x)
+    /// and the halves `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`. The smaller of both directions counts.
     BirchfieldTomasi,
-    /// `min(sum over R, G, B of the Hamming distances of 3x3 census codes, 18)`, see [`Profile::Census`].
+    /// `min(sum over R, G, B of the Hamming distances of 3x3 census codes, 18)`; see [`Profile::Census`].
     CensusRgb,
 }
 
@@ -58,7 +58,7 @@ impl Profile {
         }
     }
 
-    /// Bytes that are compared of a pixel.
+    /// How many bytes of a pixel it compares.
     #[must_use]
     pub fn channels(self) -> usize {
         match self {
@@ -106,9 +106,9 @@ impl Profile {
     }
 }
 
-/// What is to be minimised: the labels and the energy
+/// The labels, and the energy that matching minimises:
 /// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q), with
-/// half of s and K where that edge is weak, see [`Model::with_weak_edges`].
+/// half of s and K on weak edges; see [`Model::with_weak_edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Model {
     profile: Profile,
@@ -120,10 +120,10 @@ pub struct Model {
 }
 
 impl Model {
-    /// A model of `labels` labels with the smoothness of its profile; label i is a disparity of i pixels.
+    /// A model with this many labels and the smoothness of its profile. Label i is a disparity of i pixels.
     ///
     /// # Errors
-    /// [`Error::Labels`] where `labels` is 0 or above [`MAX_LABELS`].
+    /// [`Error::Labels`] if `labels` is 0 or above [`MAX_LABELS`].
     pub fn new(profile: Profile, labels: usize) -> Result<Self, Error> {
         if labels == 0 || labels > MAX_LABELS {
             return Err(Error::Labels { labels });
@@ -132,10 +132,10 @@ impl Model {
         Ok(Self { profile, labels: labels as u16, min_disparity: 0, slope, truncation, weak_edges: None })
     }
 
-    /// The same with label i standing for a disparity of `min_disparity + i` pixels.
+    /// The same model, but label i is a disparity of `min_disparity + i` pixels.
     ///
     /// # Errors
-    /// [`Error::MinDisparity`] where it exceeds the longest side of an image either way.
+    /// [`Error::MinDisparity`] if its absolute value exceeds the longest side of an image.
     pub fn with_min_disparity(self, min_disparity: i32) -> Result<Self, Error> {
         if min_disparity.unsigned_abs() as usize > MAX_SIDE {
             return Err(Error::MinDisparity { min_disparity });
@@ -143,10 +143,10 @@ impl Model {
         Ok(Self { min_disparity, ..self })
     }
 
-    /// The same with another slope s and truncation K, in the units of the profile's data cost.
+    /// The same model with another slope s and truncation K, in the units of the profile's data cost.
     ///
     /// # Errors
-    /// [`Error::Truncation`] where K exceeds [`MAX_TRUNCATION`].
+    /// [`Error::Truncation`] if K exceeds [`MAX_TRUNCATION`].
     pub fn with_smoothness(self, slope: u8, truncation: u8) -> Result<Self, Error> {
         if truncation > MAX_TRUNCATION {
             return Err(Error::Truncation { truncation });
@@ -154,10 +154,10 @@ impl Model {
         Ok(Self { slope, truncation, ..self })
     }
 
-    /// The same with *weak edges*: surfaces are expected to end where the image changes, so that an edge between two
-    /// nodes whose grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2.
-    /// On every grid edges are told weak by that grid's own grey values, see [`Model::coarse_grey`]. `None`, which is how a
-    /// model starts: no edge is weak. That smoothness should give way there is Boykov, Veksler and Zabih's (2001).
+    /// The same model with *weak edges*. Surfaces tend to end where the image changes. So an edge between two nodes whose
+    /// grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2 (after
+    /// Boykov, Veksler and Zabih 2001). Every grid decides by its own grey values; see [`Model::coarse_grey`]. With
+    /// `None`, the default, no edge is weak.
     #[must_use]
     pub fn with_weak_edges(self, threshold: Option<u8>) -> Self {
         Self { weak_edges: threshold, ..self }
@@ -199,7 +199,7 @@ impl Model {
         self.truncation
     }
 
-    /// The grey difference above which edges are weak; `None` where none is.
+    /// The grey difference above which edges are weak; `None` if no edge is.
     #[must_use]
     pub fn weak_edges(&self) -> Option<u8> {
         self.weak_edges
@@ -218,30 +218,30 @@ impl Model {
         if is_weak { self.smoothness().weakened() } else { self.smoothness() }
     }
 
-    /// The grey value of a node of a coarser grid: the mean of those of its `count` children, whose sum is given, rounded
-    /// as `(sum + count div 2) div count`.
+    /// The grey value of a node of a coarser grid: the mean of its `count` children's grey values, which add up to `sum`. It
+    /// is rounded as `(sum + count div 2) div count`.
     ///
     /// # Panics
-    /// Where `count` is 0.
+    /// If `count` is 0.
     #[must_use]
     pub fn coarse_grey(sum: u16, count: u16) -> u8 {
         ((sum + count / 2) / count) as u8
     }
 
-    /// The value `4K + 1` that stored data costs are clipped at: no label as dear as that is ever chosen. See also
+    /// The value `4K + 1` at which stored data costs are clipped. No label with such a cost is ever chosen. See also
     /// [`crate::Plan::clip`].
     #[must_use]
     pub fn clip(&self) -> u8 {
         4 * self.truncation + 1
     }
 
-    /// Largest data cost on `grid`, where a node's cost is the sum over up to `4^grid` pixels.
+    /// The largest data cost on `grid`, where a node sums up to `4^grid` pixels.
     #[must_use]
     pub fn max_cost(&self, grid: usize) -> u64 {
         u64::from(self.profile.max_cost()) << (2 * grid)
     }
 
-    /// Column of the right image that column `x` of the left one matches under `label`, if it lies in an image
+    /// The column of the right image that column `x` of the left image matches under `label`, if it lies in an image
     /// `width` pixels wide.
     #[must_use]
     pub fn matching_column(&self, x: usize, label: u16, width: usize) -> Option<usize> {

@@ -1,13 +1,13 @@
-//! One plan for every algorithm: what is run, and what it will cost in work and memory, known before anything runs.
+//! The plan: what runs, and how much work and memory it needs. All of it is known before anything runs.
 
 mod traffic;
 
 use crate::{BAND_ROWS, Error, MessageStart, Model, Node, Schedule, Settings, Side, Size};
 
-/// Most grids of a plan: the longest side allowed, [`crate::MAX_SIDE`], halves to 1 in as many.
-pub const MAX_GRIDS: usize = 25;
+/// The most grids of a plan: the longest side, [`crate::MAX_SIDE`], halves to 1 in as many.
+pub const MAX_GRIDS: u32 = 25;
 
-/// Settings checked against an image size and a model.
+/// Settings that were checked against an image size and a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     model: Model,
@@ -16,12 +16,11 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan for pairs of `size`.
+    /// Makes a plan for pairs of `size`.
     ///
     /// # Errors
-    /// [`Error::Plan`] where a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or
-    /// comes with more than one grid, or [`MessageStart::Sender`] with [`Schedule::Sweep`]; those of [`Size::new`] for
-    /// a size that is no image's.
+    /// [`Error::Plan`] if a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or comes with
+    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`]. Also the errors of [`Size::new`].
     pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
         let size = Size::new(size.width, size.height)?;
         if settings.grids == 0 || settings.steps == 0 {
@@ -39,47 +38,48 @@ impl Plan {
         if settings.schedule == Schedule::Sweep && settings.message_start == MessageStart::Sender {
             return Err(Error::Plan("message start sender has no meaning under the schedule sweep"));
         }
-        let sizes = std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids).collect();
+        let sizes =
+            std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids as usize).collect();
         Ok(Self { model, settings, sizes })
     }
 
-    /// Labels, data cost and smoothness.
+    /// The labels, the data cost and the smoothness.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// What is run.
+    /// The settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Number of grids.
+    /// The number of grids. Their indices are `0..grids()`.
     #[must_use]
     pub fn grids(&self) -> usize {
         self.sizes.len()
     }
 
-    /// Size of the image, which is grid 0.
+    /// The size of the image, which is grid 0.
     #[must_use]
     pub fn image_size(&self) -> Size {
         self.sizes[0]
     }
 
-    /// Size of a grid.
+    /// The size of a grid.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn size(&self, grid: usize) -> Size {
         self.sizes[grid]
     }
 
-    /// Number of data costs of a grid: nodes times labels.
+    /// The number of data costs of a grid: nodes times labels.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn volume(&self, grid: usize) -> usize {
         self.sizes[grid].pixels().saturating_mul(self.model.labels())
@@ -88,7 +88,7 @@ impl Plan {
     /// The neighbour on `side` that a node of `grid` exchanges messages with; `None` at the border and across a cut.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn neighbour(&self, grid: usize, node: Node, side: Side) -> Option<Node> {
         let size = self.size(grid);
@@ -102,10 +102,10 @@ impl Plan {
         }
     }
 
-    /// Pairs of neighbouring nodes on a grid that exchange messages.
+    /// The number of pairs of neighbours on a grid that exchange messages.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn edges(&self, grid: usize) -> u64 {
         let Size { width, height } = self.sizes[grid];
@@ -118,11 +118,11 @@ impl Plan {
         all - cut
     }
 
-    /// Message entries that one step on a grid computes: a loop every directed message, a half-step half of them; a
-    /// loop of [`Schedule::Sweep`] all but those across a seam.
+    /// The message entries that one step on a grid computes. A loop computes every directed message, a half-step half of
+    /// them, and a loop of [`Schedule::Sweep`] all but those across a seam.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn updates_per_step(&self, grid: usize) -> u64 {
         let edges = self.edges(grid);
@@ -134,7 +134,7 @@ impl Plan {
         messages.saturating_mul(self.model.labels() as u64)
     }
 
-    /// Edges between two bands of [`Schedule::Sweep`]; there are none where a cut lies on the seam.
+    /// The number of edges between bands of [`Schedule::Sweep`]. A cut on a seam removes its edges.
     fn seam_edges(&self, grid: usize) -> u64 {
         let Size { width, height } = self.sizes[grid];
         let seams = (BAND_ROWS..height)
@@ -143,29 +143,28 @@ impl Plan {
         width as u64 * seams.count() as u64
     }
 
-    /// Message entries that the whole plan computes.
+    /// The message entries that the whole plan computes.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
         let per_step = (0..self.grids()).map(|grid| self.updates_per_step(grid));
         per_step.fold(0, |sum: u64, updates| sum.saturating_add(updates.saturating_mul(self.settings.steps.into())))
     }
 
-    /// What stored data costs of a grid are clipped at: [`Model::clip`], which changes nothing, or the lower
-    /// `K + K div 2` of [`Settings::coarse_clip`], which does.
+    /// The value at which stored data costs of a grid are clipped: [`Model::clip`], which never changes a result, or the
+    /// lower `K + K div 2` of [`Settings::coarse_clip`], which does.
     #[must_use]
     pub fn clip(&self, grid: usize) -> u8 {
         let truncation = self.model.truncation();
         if grid > 0 && self.settings.coarse_clip { truncation + truncation / 2 } else { self.model.clip() }
     }
 
-    /// Whether the coarser grid's costs are summed from wide sums kept beside this grid's stored costs, because those
-    /// may have been clipped.
+    /// Whether the next coarser grid needs wide sums beside this grid's stored costs, because those may have been clipped.
     #[must_use]
     pub fn keeps_sums(&self, grid: usize) -> bool {
         grid + 1 < self.grids() && self.model.max_cost(grid) > u64::from(self.clip(grid))
     }
 
-    /// Bytes of one such sum: the fewest of 1, 2, 4 and 8 that hold the largest.
+    /// The bytes of one such sum: the fewest of 1, 2, 4 and 8 that hold the largest sum.
     #[must_use]
     pub fn sum_bytes(&self, grid: usize) -> usize {
         match self.model.max_cost(grid) {
@@ -176,10 +175,11 @@ impl Plan {
         }
     }
 
-    /// The buffers of a straightforward implementation; a backend may pad them or do without some, see
-    /// [`crate::Device::planned_bytes`]. Messages of two grids are held at a
-    /// time: one each way over every edge, of which a node has two; double buffered under [`Schedule::Sync`]; a single
-    /// one an edge under [`Schedule::Sweep`].
+    /// The buffers of a straightforward implementation. A backend may pad them or do without some; see
+    /// [`crate::Device::planned_bytes`].
+    ///
+    /// It keeps the messages of two grids at a time: two messages for each edge, with two edges for each node. They are
+    /// double buffered under [`Schedule::Sync`]. Under [`Schedule::Sweep`] there is one message for each edge.
     #[must_use]
     pub fn buffers(&self) -> Vec<Buffer> {
         let pixels = self.image_size().pixels() as u64;
@@ -210,28 +210,28 @@ impl Plan {
         buffers
     }
 
-    /// Bytes of the grey values that tell a grid's weak edges, one a node, where there are any.
+    /// The bytes of the grey values that tell the weak edges of a grid: one for each node, or 0 without weak edges.
     ///
     /// # Panics
-    /// Where there is no such grid.
+    /// If there is no such grid.
     #[must_use]
     pub fn grey_bytes(&self, grid: usize) -> u64 {
         if self.model.weak_edges().is_some() { self.sizes[grid].pixels() as u64 } else { 0 }
     }
 
-    /// Sum over [`Plan::buffers`].
+    /// The bytes of all [`Plan::buffers`].
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.buffers().iter().fold(0, |sum, buffer| sum.saturating_add(buffer.bytes))
     }
 }
 
-/// A buffer that a plan asks for.
+/// A buffer that a plan needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Buffer {
-    /// What it holds.
+    /// The kind of its contents.
     pub name: &'static str,
-    /// For which grid.
+    /// The grid that it belongs to.
     pub grid: usize,
     /// Its size in bytes.
     pub bytes: u64,

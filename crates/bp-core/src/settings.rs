@@ -1,31 +1,30 @@
-//! What a plan runs, and the algorithms as ways to fill it.
+//! The settings of a plan, and the algorithms as ways to fill them.
 
 use crate::Size;
 
-/// The algorithms of Doan Van Tuan's thesis (2019), and one of ours. Each is a way to fill [`Settings`]; nothing else
-/// knows their names.
+/// The algorithms of Doan Van Tuan's thesis (2019), and one of ours. Each is a way to fill [`Settings`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Algorithm {
-    /// Plain belief propagation: k loops on the full grid.
+    /// Plain belief propagation (BP): k loops on the full grid.
     Bp,
-    /// Coarse to fine: `floor(log2 m)` grids, `floor(k / (floor(log2 m) + 1))` loops on each.
+    /// Coarse-to-fine BP: `floor(log2 m)` grids with `floor(k / (floor(log2 m) + 1))` loops on each.
     Cfbp,
-    /// Coarse to fine with Z'' times fewer loops.
+    /// Coarse-to-fine constant-space BP: coarse-to-fine BP with Z'' times fewer loops.
     Cfcsbp,
-    /// Four parts, cut at the image's centre, whose match the census transform finds.
+    /// Census-transform BP: four parts, cut at the centre of the image, whose match the census transform finds.
     Ctbp,
-    /// The same with Z'''' times fewer loops.
+    /// Census-transform constant-space BP: census-transform BP with Z'''' times fewer loops.
     Ctcsbp,
     /// Ours: coarse to fine on five grids with one loop of [`Schedule::Sweep`] on each.
     Sweep,
 }
 
 impl Algorithm {
-    /// The thesis's algorithms, in its order.
+    /// The algorithms of the thesis, in its order.
     pub const THESIS: [Self; 5] = [Self::Bp, Self::Cfbp, Self::Cfcsbp, Self::Ctbp, Self::Ctcsbp];
 
-    /// All algorithms: the thesis's, then ours.
+    /// All algorithms: first those of the thesis, then ours.
     pub const ALL: [Self; 6] = [Self::Bp, Self::Cfbp, Self::Cfcsbp, Self::Ctbp, Self::Ctcsbp, Self::Sweep];
 
     /// The name used in options and records.
@@ -59,15 +58,15 @@ impl Algorithm {
         matches!(self, Self::Ctbp | Self::Ctcsbp)
     }
 
-    /// The thesis's settings for an image of `size`: `k` loops in all (equations 2.37, 2.38, 2.50 and 2.71), divided by
-    /// `z` where the algorithm divides, under `schedule`, where a checkerboard loop is two half-steps. No count falls
-    /// below 1. [`Algorithm::Sweep`] has settings of its own and takes nothing but the size.
+    /// The settings of the thesis for an image of `size`: `k` loops in all (equations 2.37, 2.38, 2.50 and 2.71), divided
+    /// by `z` if the algorithm divides. Under [`Schedule::Checkerboard`] a loop is two half-steps. No count falls below 1.
+    /// [`Algorithm::Sweep`] has settings of its own, which depend on the size alone.
     #[must_use]
     pub fn settings(self, size: Size, k: u32, z: u32, schedule: Schedule) -> Settings {
         let log2 = size.width.max(1).ilog2();
         if self == Self::Sweep {
             return Settings {
-                grids: log2.clamp(1, 5) as usize,
+                grids: log2.clamp(1, 5),
                 steps: 1,
                 schedule: Schedule::Sweep,
                 message_start: MessageStart::Receiver,
@@ -79,7 +78,7 @@ impl Algorithm {
         let z = if self.divides_loops() { z.max(1) } else { 1 };
         let loops = (k / (z.saturating_mul(levels))).max(1);
         Settings {
-            grids: if self.is_coarse_to_fine() { log2.max(1) as usize } else { 1 },
+            grids: if self.is_coarse_to_fine() { log2.max(1) } else { 1 },
             steps: loops.saturating_mul(schedule.steps_per_loop()),
             schedule,
             message_start: MessageStart::Receiver,
@@ -89,50 +88,55 @@ impl Algorithm {
     }
 }
 
-/// Rows of a band of [`Schedule::Sweep`]: band b has the rows `32 b..32 b + 32` of its grid, the last perhaps fewer.
+/// The rows of a band of [`Schedule::Sweep`]. Band b has the rows `32 b..32 b + 32` of its grid; the last band may have
+/// fewer.
 pub const BAND_ROWS: usize = 32;
 
-/// In which order messages are updated. A loop is one update of every directed message; under [`Schedule::Sweep`] of
-/// all but those across a seam.
+/// The order in which messages are updated. A loop updates every directed message once; under [`Schedule::Sweep`] all but
+/// those across a seam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Schedule {
-    /// All messages of a loop come from those of the loop before.
+    /// Synchronous: all messages of a loop are computed from those of the loop before.
     Sync,
-    /// Half-step t, counted from 0 on every grid, updates in place what the nodes with (x + y + t) even send; two
-    /// half-steps are a loop (Felzenszwalb and Huttenlocher 2006).
+    /// In half-step t, counted from 0 on every grid, the nodes with (x + y + t) even send, in place. Two half-steps are a
+    /// loop (Felzenszwalb and Huttenlocher 2006).
     Checkerboard,
-    /// Sequential passes down and up the rows, in place. An edge holds one message, the one sent last over it, either
-    /// way: sending takes the place of what came the other way, which is used up and counts as zeros for its receiver.
-    /// A node is even where (x + y) of its own grid is even. Where there is no neighbour, nothing is sent.
+    /// Sequential passes down and up the rows, in place. An edge holds one message: the last one sent over it, in either
+    /// direction. Sending over an edge uses up the opposite message, which counts as zeros from then on. A node is even
+    /// if x + y is even on its own grid. Nothing is sent to missing neighbours.
     ///
-    /// Rows are cut into bands of [`BAND_ROWS`]; the edges between two bands are a seam. Nothing is sent across a seam,
-    /// so that bands are independent of each other: in all loops a band's last row holds its first message from below,
-    /// and its first row nothing from above. A loop processes each band so:
+    /// Rows are cut into bands of [`BAND_ROWS`]. The edges between two bands are a seam. Nothing is sent across a seam, so
+    /// bands do not depend on each other: in all loops the last row of a band holds its first messages from below, and
+    /// its first row holds nothing from above. A loop runs over each band in two passes:
     ///
     /// 1. Forward, rows from top to bottom. In a row all even nodes send left, right and down, each message computed
-    ///    from what the node holds before it sends any; then all odd nodes send down. The band's last row sends
-    ///    nothing down.
-    /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up, computed likewise; then
-    ///    all even nodes send up. The band's first row sends nothing up.
+    ///    from the messages that the node holds before it sends any; then all odd nodes send down. The last row of the
+    ///    band sends nothing down.
+    /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up in the same manner; then all
+    ///    even nodes send up. The first row of the band sends nothing up.
     ///
-    /// So after a loop every vertical edge holds a message up, that of a seam the first one; every horizontal edge holds
+    /// So after a loop every vertical edge holds a message up (at a seam, the first one), and every horizontal edge holds
     /// the message from its odd to its even end.
     ///
-    /// **First messages** of a finer grid are what those edges hold on the coarser one. The parent P of (x, y) is
-    /// (x div 2, y div 2). From below every node starts with what P received from below; from above with zeros. From
-    /// left and right only even nodes start with a message: from the left with what P received from its left where P
-    /// is even, else with what P's left neighbour received from its left, zeros where P has none; from the right
-    /// likewise with left and right swapped. As everywhere, only where the node has a neighbour on that side.
+    /// **First messages** of a finer grid come from these edges of the coarser grid. The parent P of (x, y) is
+    /// (x div 2, y div 2). If a node has a neighbour on that side, its first message is
     ///
-    /// **Labels** of each band are decided one after another, from its top row to its bottom row, in a row first of even
-    /// nodes, then of odd ones. A label is the smallest that minimises D plus, with f the labels of neighbours decided
-    /// before and V the smoothness cost,
+    /// - from below: the message that P received from below;
+    /// - from above: zeros;
+    /// - from the left, for an odd node: zeros;
+    /// - from the left, for an even node: the message that P received from its left if P is even, else the one that the
+    ///   left neighbour of P received from its left, or zeros if P has no left neighbour;
+    /// - from the right: the same with left and right swapped.
+    ///
+    /// **Labels** of each band are decided one after another, from its top row to its bottom row, in each row first for the
+    /// even nodes, then for the odd ones. With f the labels decided before and V the smoothness cost, a label is the
+    /// smallest that minimises D plus
     ///
     /// - of an even node: `V(d, f_up)` and the messages from the left, the right and below;
     /// - of an odd node: `V(d, f_up) + V(d, f_left) + V(d, f_right)` and the message from below.
     ///
-    /// `V(d, f_up)` is left out in the first row of every band, and every term where there is no neighbour.
+    /// The first row of every band leaves out `V(d, f_up)`. Missing neighbours add nothing.
     Sweep,
 }
 
@@ -150,7 +154,7 @@ impl Schedule {
         }
     }
 
-    /// Steps of a loop: 1, or 2 half-steps.
+    /// The steps of a loop: 1, or 2 half-steps.
     #[must_use]
     pub fn steps_per_loop(self) -> u32 {
         match self {
@@ -160,14 +164,15 @@ impl Schedule {
     }
 }
 
-/// Which of the parent's messages a node of the next finer grid starts with. The coarsest grid starts with zeros.
-/// [`Schedule::Sweep`] says itself what is taken over, and goes with [`MessageStart::Receiver`] only.
+/// Which message of the next coarser grid a node starts with. The coarsest grid starts with zeros. [`Schedule::Sweep`] has
+/// a rule of its own and requires [`MessageStart::Receiver`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum MessageStart {
-    /// A node receives at first what its parent received last.
+    /// A node starts with the messages that its parent received last.
     Receiver,
-    /// A node sends at first what its parent sent last (as in Felzenszwalb and Huttenlocher's program).
+    /// A node's first message from a neighbour is the one that the neighbour's parent sent last, as in the program of
+    /// Felzenszwalb and Huttenlocher.
     Sender,
 }
 
@@ -185,42 +190,43 @@ impl MessageStart {
     }
 }
 
-/// A cut into four parts that exchange no message: columns `0..x` and `x..`, rows `0..y` and `y..`. A part without
-/// columns or rows does not exist.
+/// A cut into four parts that exchange no messages: columns `0..x` and `x..`, rows `0..y` and `y..`. Parts without columns
+/// or rows do not exist.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cut {
-    /// First column right of the cut.
+    /// The first column right of the cut.
     pub x: usize,
-    /// First row below the cut.
+    /// The first row below the cut.
     pub y: usize,
-    /// Whether the census match of (x, y) fixes the data cost of the nodes around that point, see [`crate::Seed`].
+    /// Whether the census match of (x, y) sets the data costs of the nodes around that point; see [`crate::Seed`].
     pub seed_start: bool,
 }
 
 impl Cut {
-    /// The thesis's cut at `(floor(m / 2), floor(n / 2))`, with `seed_start`.
+    /// The cut of the thesis, at `(floor(m / 2), floor(n / 2))`, with `seed_start`.
     #[must_use]
     pub fn at_centre(size: Size) -> Self {
         Self { x: size.width / 2, y: size.height / 2, seed_start: true }
     }
 }
 
-/// What a plan runs.
+/// The settings of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Settings {
-    /// Number of grids; grid 0 is the image, each further one has half the width and height, rounded up.
-    pub grids: usize,
-    /// Steps on each grid: loops, or half-steps under [`Schedule::Checkerboard`].
+    /// The number of grids (pyramid levels). Grid 0 is the image; each further grid has half the width and height, rounded
+    /// up.
+    pub grids: u32,
+    /// The steps on each grid: loops, or half-steps under [`Schedule::Checkerboard`].
     pub steps: u32,
-    /// Order of the message updates.
+    /// The order of the message updates.
     pub schedule: Schedule,
-    /// What finer grids start with.
+    /// The first messages of finer grids.
     pub message_start: MessageStart,
-    /// Where the image is cut, if it is.
+    /// Where the image is cut, if at all.
     pub cut: Option<Cut>,
-    /// Whether the data costs of grids from 1 on are clipped at `K + K div 2`, each node's least one taken off before;
-    /// sums for coarser grids stay unclipped. It lowers energy and root mean squared error of [`Algorithm::Sweep`]; off
-    /// for the thesis's algorithms.
+    /// Whether data costs from grid 1 on are clipped at `K + K div 2`, after each node's least cost is subtracted. Sums for
+    /// coarser grids stay unclipped. Clipping lowers the energy and the root mean squared error of [`Algorithm::Sweep`].
+    /// It is off for the algorithms of the thesis.
     pub coarse_clip: bool,
 }
 

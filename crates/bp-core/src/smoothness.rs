@@ -1,4 +1,4 @@
-//! What it costs that two neighbours differ.
+//! The smoothness cost: the price of different labels at two neighbours.
 
 /// The smoothness cost of an edge: `min(slope |a - b|, truncation)` for the labels a and b of its two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,13 +16,13 @@ impl Smoothness {
         (u32::from(self.slope) * u32::from(a.abs_diff(b))).min(u32::from(self.truncation))
     }
 
-    /// Cost of one step between neighbouring labels, `min(s, K)`: what the two passes of a message update add.
+    /// The cost of one step between neighbouring labels, `min(s, K)`. The two passes of a message update add it.
     #[must_use]
     pub fn step(self) -> u8 {
         self.slope.min(self.truncation)
     }
 
-    /// That of a weak edge, see [`crate::Model::with_weak_edges`]: slope and truncation are halved, rounded down.
+    /// The smoothness of a weak edge: slope and truncation are halved, rounded down; see [`crate::Model::with_weak_edges`].
     #[must_use]
     pub fn weakened(self) -> Self {
         Self { slope: self.slope / 2, truncation: self.truncation / 2 }

@@ -11,7 +11,7 @@ pub enum Stage {
     Refine,
     /// Message passing.
     UpdateMessages,
-    /// Labels of least belief.
+    /// Label selection.
     SelectLabels,
 }
 
@@ -19,7 +19,7 @@ impl Stage {
     /// All stages, in the order in which they first run.
     pub const ALL: [Self; 5] = [Self::MatchCost, Self::Coarsen, Self::Refine, Self::UpdateMessages, Self::SelectLabels];
 
-    /// The name of stage and kernel.
+    /// The name of the stage, and of its kernel.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,12 +1,12 @@
-//! A quick coarse look at a pair before it is matched: which disparities there are, and whether the two images are a
-//! rectified pair in the right order at all.
+//! A quick survey of a pair before it is matched. It estimates the range of disparities, and detects images that are
+//! exchanged, not rectified, or not a pair at all.
 //!
-//! Both images are shrunk to at most [`LONGEST_SIDE`] pixels a side and matched window by window over all disparities
-//! from minus to plus half the width, from both sides (`coarse`). What both sides agree on, is clearly better than
-//! every other match and is no speck says where the range ends (`range`) and of which sign it is; a few hundred of
-//! these matches, looked at in full size, say whether rows correspond (`rows`).
+//! Both images are shrunk to at most [`LONGEST_SIDE`] pixels a side. Then `coarse` matches them window by window, from both
+//! sides, over all disparities from minus to plus half the width. It keeps matches on which both sides agree, that are
+//! clearly better than all others, and that are no specks. Their disparities give the `range` and its sign. A few hundred
+//! of them, matched again in full size, tell whether `rows` correspond.
 //!
-//! It is plain integer arithmetic on one thread, so that every machine gives the same answer whatever backend matches.
+//! The survey is plain integer arithmetic on one thread, so it gives the same result on every machine and backend.
 
 mod coarse;
 mod codes;
@@ -22,44 +22,44 @@ pub use range::{DisparityRange, SeenDisparities};
 pub use rows::RowOffsets;
 pub use shrink::LONGEST_SIDE;
 
-/// Least share of pixels with a match in a pair. Real pairs keep more than six tenths, two photographs of different
-/// things less than one in a hundred.
+/// The least share of pixels with a match in a pair. Real pairs have more than 0.6, photographs of different things less
+/// than 0.01.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Where a smaller share of pixels has a match, rows may not correspond: a pair whose rows do seldom falls below.
+/// If a smaller share of pixels has a match, rows may not correspond. Pairs whose rows correspond are seldom below.
 const USUAL_SHARE: f64 = 0.5;
 
-/// Rows of the shrunk images that the right one is then moved by, up and down.
+/// By how many rows the shrunk right image is then moved, up and down.
 const MOST_ROWS: isize = 3;
 
-/// Fewest matches that anything is concluded from.
+/// The fewest matches that allow a conclusion.
 const LEAST_MATCHES: usize = 64;
 
-/// Nearly all, as a share: so many matches of negative disparity mean exchanged images.
+/// If this share of matches has negative disparities, the images are exchanged.
 const NEARLY_ALL: f64 = 0.9;
 
-/// What a coarse look at a pair found.
+/// What the survey of a pair found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// Share of pixels of the shrunk left image that have a trustworthy match, 0 to 1.
+    /// The share of pixels of the shrunk left image that have a reliable match, from 0 to 1.
     pub matched: f64,
-    /// The disparities of the pair; `None` where too few pixels have a match.
+    /// The disparities of the pair; `None` if too few pixels have a match.
     pub seen: Option<SeenDisparities>,
     /// Whether nearly all matches have a negative disparity, as if the images were exchanged.
     pub exchanged: bool,
-    /// By how many rows corresponding rows are apart, where another offset than 0 is clearly better somewhere.
+    /// How many rows corresponding rows are apart, if an offset other than 0 is clearly better somewhere.
     pub rows: Option<RowOffsets>,
     /// Whether both images are the same.
     pub identical: bool,
-    /// Whether there was enough to look at, and yet hardly any match: these are no two views of one scene.
+    /// Whether hardly any pixel has a match, although the images are large enough: they do not show the same scene.
     pub unlike: bool,
 }
 
 impl Survey {
-    /// Looks at a pair.
+    /// Surveys a pair.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], and nothing else: every pair can be looked at.
+    /// [`Error::OutOfMemory`]. Every pair can be surveyed.
     pub fn of(pair: &StereoPair) -> Result<Self, Error> {
         let factor = shrink::factor(pair.size());
         let small = shrink::shrunk(pair, factor)?;
@@ -79,7 +79,7 @@ impl Survey {
     }
 }
 
-/// Matches of the small pair row by row; where those are few, also with the right image higher and lower.
+/// Matches the small pair row by row. If it finds few matches, it also tries the right image higher and lower.
 fn looks(small: &StereoPair) -> Result<Vec<Matches>, Error> {
     let first = coarse::find(small, 0)?;
     if first.share() >= USUAL_SHARE {

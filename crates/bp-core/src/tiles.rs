@@ -1,4 +1,4 @@
-//! Pairs of any size in limited memory: matched tile by tile, one tile at a time.
+//! Pairs of any size in limited memory, matched one tile at a time.
 
 mod tile;
 mod tiling;
@@ -10,20 +10,20 @@ pub use tiling::{HALO, Likeness, Needed, Tiling};
 
 use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 
-/// A tiled plan prepared on a device, ready to match pairs of its size one after another. A single tile is matched as
-/// [`Driver`] does it, without a copy of the pair.
+/// A tiled plan prepared on a device, ready to match one pair of its size after another. A plan with a single tile runs
+/// as in [`Driver`], without a copy of the pair.
 pub struct Tiled {
     tiling: Tiling,
-    /// Prepared for the tile that was matched last.
+    /// The driver of the tile that was matched last.
     driver: Option<Driver>,
-    /// The labels of all tiles; none where there is one tile.
+    /// The labels of all tiles; empty if there is only one.
     labels: Vec<u16>,
     most_bytes: u64,
 }
 
 impl Tiled {
-    /// Prepares the first tile on `device`; tiles of other sizes are prepared when it is their turn, and the one before is
-    /// freed first.
+    /// Prepares the first tile on `device`. Tiles of other sizes are prepared when it is their turn, after the tile before
+    /// is freed.
     ///
     /// # Errors
     /// Those of [`Device::prepare`].
@@ -49,14 +49,14 @@ impl Tiled {
         self.tiling.plan()
     }
 
-    /// Most bytes that were allocated at once so far, counted: for a tile, and for the labels of all.
+    /// The most bytes that were allocated at the same time so far, counted: for a tile, and for the labels of all tiles.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
         self.most_bytes + memory::bytes(&self.labels)
     }
 
-    /// Matches a pair on the device that this was prepared on; [`Tiled::labels`] and [`Tiled::disparities`] hold the
-    /// answer until the next. Stages are summed over all tiles; preparing tiles of further sizes is in the total.
+    /// Matches a pair on the same device as in [`Tiled::new`]. [`Tiled::labels`] and [`Tiled::disparities`] hold the result
+    /// until the next solve. Stage times are summed over all tiles. The total includes preparing tiles of other sizes.
     ///
     /// # Errors
     /// As [`Driver::solve_observed`], and those of [`Device::prepare`].
@@ -84,8 +84,8 @@ impl Tiled {
         Ok(times)
     }
 
-    /// Matches the next frame of a video from the messages of the frame before, see [`Driver::solve_warm_observed`]. Where
-    /// there are several tiles, whose messages are gone, every frame is matched as if it were the first.
+    /// Matches the next frame of a video from the messages of the frame before; see [`Driver::solve_warm_observed`]. Several
+    /// tiles do not keep their messages, so with them every frame is matched as the first one.
     ///
     /// # Errors
     /// As there, and those of [`Tiled::solve_observed`].
@@ -130,7 +130,7 @@ impl Tiled {
         Ok(times)
     }
 
-    /// What is prepared, if it is for such a tile; else that is freed, and the tile's plan is prepared.
+    /// The current driver if it fits the tile. Otherwise frees it and prepares the tile's plan.
     fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
         let plan = tile.plan(self.tiling.plan())?;
         let driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
@@ -141,29 +141,29 @@ impl Tiled {
         Ok(driver)
     }
 
-    /// Frees all but the last answer, where that is kept apart: where there are several tiles.
+    /// Frees everything but the last result, if there are several tiles. (A single tile holds the result itself.)
     pub fn free_tiles(&mut self) {
         if !self.tiling.is_whole() {
             self.driver = None;
         }
     }
 
-    /// The last answer: a label for every pixel, `[height][width]`.
+    /// The labels of the last solve, `[height][width]`.
     #[must_use]
     pub fn labels(&self) -> &[u16] {
         if self.tiling.is_whole() { self.driver.as_ref().map_or(&[], Driver::labels) } else { &self.labels }
     }
 
-    /// The last answer in pixels; allocates the map.
+    /// The disparity map of the last solve. It allocates the map.
     #[must_use]
     pub fn disparities(&self) -> DisparityMap {
         DisparityMap::from_labels(self.plan().image_size(), self.plan().model(), self.labels())
     }
 
-    /// The last messages received from `side`, see [`Driver::messages`].
+    /// The last messages received from `side`; see [`Driver::messages`].
     ///
     /// # Errors
-    /// As there; and [`Error::Plan`] where there are several tiles, whose messages are gone.
+    /// As there; also [`Error::Plan`] if there are several tiles, which do not keep their messages.
     pub fn messages(&mut self, side: Side) -> Result<Vec<u8>, Error> {
         match self.driver.as_mut().filter(|_| self.tiling.is_whole()) {
             Some(driver) => driver.messages(side),

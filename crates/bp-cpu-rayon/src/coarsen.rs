@@ -1,4 +1,15 @@
 //! Data costs of a coarser grid.
+//!
+//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//!
+//! ```text
+//! for each node (X, Y) of the coarse grid:
+//!     for each label d:   sum(d) = sum of the unclipped costs of its children (2X, 2Y), (2X + 1, 2Y), (2X, 2Y + 1), ...
+//!     least = min over d of sum(d)
+//!     for each label d:   cost(d) = min(sum(d) - least, clip)
+//! ```
+//!
+//! Here one lane of a vector is one coarse node.
 
 use bp_core::Plan;
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
@@ -7,15 +18,15 @@ use crate::{
     costs::{self, Costs, Sum, Sums, Widen},
     layout::Layout,
     match_cost::Matching,
-    shape::{BLOCK, STRIP},
+    shape::{BLOCK, BlockStart, STRIP, Strip},
     windows::Windows,
 };
 
-/// A coarse node's cost is the sum of its up to four children's unclipped costs, label by label. Layouts and costs are
-/// those of the finer grid, `grid - 1`, and of `grid`.
+/// Computes the costs of `grid` from those of the finer grid, `grid - 1`. `layouts` has the layouts of both, the finer
+/// one first.
 pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout; 2], fine: &Costs, coarse: &mut Costs) {
     let args = Grids { level, layouts, clip: plan.clip(grid) };
-    // The type that sums fit, also where none are kept.
+    // The width of the sums decides the type, even if they are not kept.
     let bytes = plan.sum_bytes(grid);
     match (&fine.sums, bytes) {
         (Sums::None, 1) => args.narrow_rows(&fine.stored, coarse),
@@ -30,7 +41,7 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
     }
 }
 
-/// The same from a grid 0 whose costs are not stored: its rows are computed two at a time.
+/// The same for a grid 0 whose costs are not stored: it computes them again, two rows at a time.
 pub(crate) fn coarsen_unstored(matching: &Matching<'_>, windows: &Windows, layout: &Layout, coarse: &mut Costs) {
     let (fine, clip) = (matching.layout, matching.plan.clip(1));
     let grids = Grids { level: matching.level, layouts: [fine, layout], clip };
@@ -51,7 +62,7 @@ struct Grids<'a> {
     clip: u8,
 }
 
-/// Finds the kept sums of a type.
+/// A type of sums that a grid may keep.
 pub(crate) trait Kept: Sum {
     fn of(sums: &mut Sums) -> Option<&mut [Self]>;
 }
@@ -78,19 +89,19 @@ impl Grids<'_> {
                 self.layouts[1],
                 self.clip,
                 #[inline(always)]
-                |place, label| sum_children(fine_layout, children, place, label),
+                |start, label| sum_children(fine_layout, children, start, label),
                 stored,
                 keep,
             ));
         });
     }
 
-    /// The same where all sums fit 8 bits, as those of the largest grids do.
+    /// The same for sums that fit 8 bits, as those of the largest grids do.
     fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
         self.narrow_rows_of(coarse, |y, sum| sum(self.children(fine, y)));
     }
 
-    /// The same of rows that are made when needed: `children(y, sum)` calls `sum` with them.
+    /// The same for rows that are computed on demand: `children(y, sum)` calls `sum` with them.
     fn narrow_rows_of(&self, coarse: &mut Costs, children: impl Fn(usize, &mut dyn FnMut([&[u8]; 2])) + Sync) {
         let Costs { stored, sums } = coarse;
         costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, mut keep| {
@@ -100,7 +111,7 @@ impl Grids<'_> {
         });
     }
 
-    /// The two rows of the finer grid that make row `y`; the second may be missing.
+    /// The two rows of the finer grid below row `y`. The second may be missing; it is empty then.
     fn children<'a, F>(&self, fine: &'a [F], y: usize) -> [&'a [F]; 2] {
         let row = self.layouts[0].row();
         let (upper, rest) = fine[2 * y * row..].split_at(row);
@@ -128,13 +139,7 @@ impl Grids<'_> {
 
     /// Sums a strip of nodes of either plane and returns the least cost of each.
     #[inline(always)]
-    fn narrow_strip<S: Simd>(
-        &self,
-        simd: S,
-        children: [&[u8]; 2],
-        (at, lanes): (usize, usize),
-        raw: &mut [u8],
-    ) -> [[u8; STRIP]; 2] {
+    fn narrow_strip<S: Simd>(&self, simd: S, children: [&[u8]; 2], strip: Strip, raw: &mut [u8]) -> [[u8; STRIP]; 2] {
         let [fine, layout] = self.layouts;
         let (first, second) = raw.split_at_mut(layout.plane());
         let raw = [first, second];
@@ -144,12 +149,12 @@ impl Grids<'_> {
                 let lanes = |plane: usize| row.get(plane * fine.plane() + label * fine.lanes..).unwrap_or_default();
                 [lanes(0), lanes(1)].map(|lanes| lanes.get(..fine.lanes).unwrap_or_default())
             });
-            for lane in (0..lanes).step_by(S::u8s::LEN) {
-                let from = 2 * (at + lane);
+            for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
+                let from = 2 * (strip.first + lane);
                 let half = |from: usize| sum_of_children(simd, &rows, from);
                 let planes = half(from).deinterleave(half(from + S::u8s::LEN));
                 for (plane, sum) in [planes.0, planes.1].into_iter().enumerate() {
-                    let start = label * layout.lanes + at + lane;
+                    let start = label * layout.lanes + strip.first + lane;
                     sum.store_slice(&mut raw[plane][start..start + S::u8s::LEN]);
                     let least = &mut least[plane][lane..lane + S::u8s::LEN];
                     sum.min(S::u8s::from_slice(simd, least)).store_slice(least);
@@ -160,7 +165,7 @@ impl Grids<'_> {
     }
 }
 
-/// Sums of fine lanes over planes and rows; nothing where there are no such lanes.
+/// Sums a vector of fine lanes over both planes and rows. Lanes beyond the end count as zeros.
 #[inline(always)]
 fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::u8s {
     let mut sum = S::u8s::splat(simd, 0);
@@ -178,7 +183,7 @@ fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::
 fn sum_children<F: Sum + Widen<C>, C: Sum>(
     fine: &Layout,
     children: [&[F]; 2],
-    (plane, at): (usize, usize),
+    BlockStart { plane, lane: at }: BlockStart,
     label: usize,
 ) -> [C; BLOCK] {
     let mut sums = [C::default(); 2 * BLOCK];

@@ -4,19 +4,19 @@ use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::shape::{BLOCK, STRIP, Shape};
+use crate::shape::{BLOCK, BlockStart, STRIP, Shape, Strip};
 
-/// Data costs as they are stored and as coarser grids are summed from, both `[height][plane][label][lane]`.
+/// Data costs `[height][plane][label][lane]`: as messages need them, and as coarser grids sum them.
 pub(crate) struct Costs {
-    /// Each node's least taken off, and clipped at [`Plan::clip`], where 8 bits need that.
+    /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless the sums fit 8 bits without.
     pub(crate) stored: Vec<u8>,
-    /// Unclipped, nothing taken off; where the plan keeps them.
+    /// Neither normalised nor clipped, if the plan keeps them.
     pub(crate) sums: Sums,
 }
 
 /// Unclipped costs in the narrowest integer that holds them.
 pub(crate) enum Sums {
-    /// The stored costs serve.
+    /// None are kept: the stored costs serve.
     None,
     U8(Vec<u8>),
     U16(Vec<u16>),
@@ -25,7 +25,7 @@ pub(crate) enum Sums {
 }
 
 impl Costs {
-    /// Room for the costs of `grid`.
+    /// Allocates room for the costs of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
@@ -43,7 +43,7 @@ impl Costs {
         Self { stored: Vec::new(), sums: Sums::None }
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.stored)
             + match &self.sums {
@@ -56,12 +56,12 @@ impl Costs {
     }
 }
 
-/// Costs of a grid, with padding.
+/// The number of costs of a grid, padding included.
 pub(crate) fn volume(shape: &Shape) -> usize {
     shape.row().saturating_mul(shape.size.height)
 }
 
-/// Bytes that [`Costs`] hold, predicted.
+/// The bytes that [`Costs`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
     (volume(&Shape::new(plan, grid)) as u64).saturating_mul(1 + sum_bytes as u64)
@@ -94,7 +94,7 @@ pub(crate) trait Sum:
     fn clipped(self, clip: u8) -> u8;
 }
 
-/// A narrower one, made wider.
+/// A narrower integer that can be made wider.
 pub(crate) trait Widen<T> {
     fn widen(self) -> T;
 }
@@ -127,14 +127,14 @@ macro_rules! widen {
 
 widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
-/// Stores a row, block by block: `raw((plane, lane), label)` gives the unclipped costs of a block, `keep` takes those in
-/// as well.
+/// Stores the costs of a row, block by block. `raw(start, label)` gives the unclipped costs of a block; `keep` receives
+/// them too.
 #[inline(always)]
 pub(crate) fn store<S: Simd, T: Sum>(
     simd: S,
     shape: &Shape,
     clip: u8,
-    raw: impl Fn((usize, usize), usize) -> [T; BLOCK],
+    raw: impl Fn(BlockStart, usize) -> [T; BLOCK],
     stored: &mut [u8],
     mut keep: Option<&mut [T]>,
 ) {
@@ -143,14 +143,14 @@ pub(crate) fn store<S: Simd, T: Sum>(
         || {
             for (plane, stored) in stored.chunks_exact_mut(shape.plane()).enumerate() {
                 let mut keep = keep.as_mut().map(|keep| &mut keep[plane * shape.plane()..][..shape.plane()]);
-                for at in (0..shape.nodes(plane)).step_by(BLOCK) {
+                for lane in (0..shape.nodes(plane)).step_by(BLOCK) {
                     let keep = keep.as_deref_mut();
                     store_block(
                         shape,
                         clip,
-                        at,
+                        lane,
                         #[inline(always)]
-                        |label| raw((plane, at), label),
+                        |label| raw(BlockStart { plane, lane }, label),
                         stored,
                         keep,
                     );
@@ -160,7 +160,7 @@ pub(crate) fn store<S: Simd, T: Sum>(
     );
 }
 
-/// `raw` is called twice for every label, since what to take off is not known before all have been seen.
+/// Calls `raw` twice for every label, because the least cost is known only after all labels.
 #[inline(always)]
 fn store_block<T: Sum>(
     shape: &Shape,
@@ -189,12 +189,13 @@ fn store_block<T: Sum>(
     }
 }
 
-/// Stores a strip of nodes whose unclipped costs are in `kept`, or already in `stored`, and whose least ones are known.
+/// Normalises and clips a strip of nodes whose least costs are known. The unclipped costs are in `kept`, or already in
+/// `stored`.
 #[inline(always)]
 pub(crate) fn normalise<S: Simd>(
     simd: S,
     shape: &Shape,
-    (at, lanes): (usize, usize),
+    strip: Strip,
     clip: u8,
     least: &[u8; STRIP],
     kept: Option<&[u8]>,
@@ -202,10 +203,10 @@ pub(crate) fn normalise<S: Simd>(
 ) {
     let clip = S::u8s::splat(simd, clip);
     for label in 0..shape.labels {
-        let start = label * shape.lanes + at;
-        let stored = &mut stored[start..start + lanes];
-        let kept = kept.map(|kept| &kept[start..start + lanes]);
-        for lane in (0..lanes).step_by(S::u8s::LEN) {
+        let start = label * shape.lanes + strip.first;
+        let stored = &mut stored[start..start + strip.lanes];
+        let kept = kept.map(|kept| &kept[start..start + strip.lanes]);
+        for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
             let range = lane..lane + S::u8s::LEN;
             let raw = S::u8s::from_slice(simd, kept.map_or(&stored[range.clone()], |kept| &kept[range.clone()]));
             let least = S::u8s::from_slice(simd, &least[range.clone()]);

@@ -1,4 +1,4 @@
-//! Messages, one an edge.
+//! Messages, one for each edge.
 
 use bp_core::{Error, Plan, Side, memory};
 use rayon::{prelude::*, slice::ChunksMut};
@@ -8,19 +8,19 @@ use crate::{
     shape::{BLOCK, Shape},
 };
 
-/// Planes of a row: the edges to the row above of both planes of nodes, then those inside the pairs of columns, then
-/// those between the pairs.
+/// The planes of a row: the edges up from both planes of nodes, then the edges inside pairs of columns, then those
+/// between pairs.
 const PLANES: usize = 4;
 
-/// One message an edge, updated in place: a node that sends over an edge has just read what came the other way, and the
-/// other end will read before it answers. Row y of storage holds the edges up from row y and those inside row y; one
-/// row more, of zeros, follows the last.
+/// One message for each edge, updated in place. A node that sends over an edge has just read the message that came the
+/// other way, and the other end reads it before it answers. Row y of storage holds the edges up from row y and those
+/// inside row y. A row of zeros follows the last one.
 pub(crate) struct Edges {
     values: Vec<u8>,
 }
 
 impl Edges {
-    /// Room for the edges of `grid` and of every coarser one.
+    /// Allocates room for the edges of `grid`, which is enough for every coarser grid too.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         Ok(Self { values: memory::filled("messages", bytes(&Shape::new(plan, grid)), 0)? })
     }
@@ -35,24 +35,24 @@ impl Edges {
         Rows { layout, first: 0, values: self.values.get(..bytes(layout)).unwrap_or_default() }
     }
 
-    /// For every band of so many rows, the edges inside its rows and down from them, as [`inside_and_down`] has them.
+    /// For every band of so many rows, the edges inside and down from its rows, ordered as in [`inside_and_down`].
     pub(crate) fn bands_mut(&mut self, layout: &Layout, rows: usize) -> ChunksMut<'_, u8> {
         let all = layout.size.height * row_bytes(layout);
         self.rows_mut(layout)[2 * plane(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
     }
 
-    /// The rows of a grid, to be split among threads by [`row_bytes`].
+    /// The rows of a grid, which threads can split by [`row_bytes`].
     pub(crate) fn rows_mut(&mut self, layout: &Layout) -> &mut [u8] {
         self.values.get_mut(..bytes(layout)).unwrap_or_default()
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.values)
     }
 }
 
-/// Of rows of edges, all but those up from the first row.
+/// All edges of these rows but those up from the first row.
 pub(crate) fn inside_and_down<'a>(shape: &Shape, rows: &'a [u8]) -> &'a [u8] {
     &rows[2 * plane(shape)..]
 }
@@ -67,7 +67,8 @@ pub(crate) fn row_bytes(shape: &Shape) -> usize {
     PLANES * plane(shape)
 }
 
-/// Bytes of a plane. Nodes of plane 1 reach one lane further in the edges between pairs, hence the block more.
+/// The bytes of a plane. It has a block more than its nodes need, because nodes of plane 1 reach one lane further in the
+/// edges between pairs.
 fn plane(shape: &Shape) -> usize {
     shape.plane() + BLOCK
 }
@@ -76,7 +77,7 @@ fn plane(shape: &Shape) -> usize {
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'a> {
     layout: &'a Layout,
-    /// Row that the values start with.
+    /// The row that the values start with.
     first: usize,
     values: &'a [u8],
 }
@@ -87,8 +88,8 @@ impl<'a> Rows<'a> {
         Self { layout, first, values }
     }
 
-    /// What the nodes of `plane` in row `y` received from `side`, `[label][lane]`; `None` where that row has no neighbours
-    /// there. Lanes without a neighbour hold anything.
+    /// The messages that the nodes of `plane` in row `y` received from `side`, `[label][lane]`. `None` if the row has no
+    /// neighbours on that side. Lanes without a neighbour hold arbitrary values.
     pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<&'a [u8]> {
         let (row, index, shift) = match (side, plane) {
             (Side::Up, _) => (y, plane, 0),
@@ -103,8 +104,8 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The edges of the nodes of `plane` in the first of the two rows that `rows` starts with: to the neighbours in the same
-/// pair of columns, the next pair, above and below, `[label][lane]`.
+/// The edges of the nodes of `plane` in the first row of `rows`, which also needs the row after it. In order: to the
+/// neighbour in the same pair of columns, in the next pair, above and below, each `[label][lane]`.
 pub(crate) fn slots<'a>(shape: &Shape, rows: &'a mut [u8], plane: usize) -> [&'a mut [u8]; 4] {
     let bytes = self::plane(shape);
     let (row, below) = rows.split_at_mut(PLANES * bytes);
@@ -115,7 +116,7 @@ pub(crate) fn slots<'a>(shape: &Shape, rows: &'a mut [u8], plane: usize) -> [&'a
     [same, &mut next[plane..], above, below]
 }
 
-/// Copies the edges of the nodes of `plane` in the first of the two rows.
+/// Copies the edges of the nodes of `plane` in the first row.
 pub(crate) fn copy(shape: &Shape, from: &[u8], to: &mut [u8], plane: usize) {
     let bytes = self::plane(shape);
     for index in [plane, 2, 3, PLANES + plane] {

@@ -1,7 +1,7 @@
-//! What a profile compares: a few bytes a pixel of each image.
+//! Features: the few bytes of each pixel that a profile compares.
 
 use bp_core::{
-    Error, Image, Model, Profile, Size, StereoPair,
+    Error, Image, Model, Node, Profile, Size, StereoPair,
     image::{APRON, grey},
     memory,
 };
@@ -10,23 +10,23 @@ use rayon::prelude::*;
 
 use crate::shape::{self, BLOCK, MIN_ROWS, every_second};
 
-/// Features of both images of a pair, by row, channel and column parity: `[height][channel][parity][lane]`.
+/// The features of both images of a pair, `[height][channel][parity][lane]`. The parity is that of the column.
 pub(crate) struct Features {
     profile: Profile,
     size: Size,
     lanes: usize,
     left: Vec<u8>,
-    /// With a block of padding on both sides of every row of lanes.
+    /// Every row of lanes has a block of padding on both sides.
     right: Vec<u8>,
-    /// 255 where the right image has a column, else 0: `[parity][lane]`, padded alike.
+    /// 255 where the right image has a column, else 0: `[parity][lane]`, with the same padding.
     inside: [Vec<u8>; 2],
-    /// Values of both images and of what lies around, see [`Image::grey_near`], `[height][plane][width]` with [`APRON`] more
-    /// rows and columns on every side; for the profiles that look at neighbours, see [`padded_planes`].
+    /// Values of both images and around them (see [`Image::grey_near`]), `[height][plane][width]` with [`APRON`] more rows
+    /// and columns on every side. Only profiles that look at neighbours need them; see [`padded_planes`].
     padded: [Vec<u8>; 2],
 }
 
 impl Features {
-    /// Room for pairs of `size`.
+    /// Allocates room for pairs of `size`.
     pub(crate) fn new(size: Size, model: &Model) -> Result<Self, Error> {
         let profile = model.profile();
         let lanes = shape::lanes(size);
@@ -48,27 +48,28 @@ impl Features {
         })
     }
 
-    /// Takes in another pair.
+    /// Loads a pair.
     pub(crate) fn load(&mut self, level: Level, pair: &StereoPair) {
         let Self { profile, size, lanes, left, right, padded, .. } = self;
         let [left_padded, right_padded] = padded;
-        let right = (right.as_mut_slice(), *lanes + 2 * BLOCK, BLOCK);
-        let views = [(pair.left(), left_padded, (left.as_mut_slice(), *lanes, 0)), (pair.right(), right_padded, right)];
-        for (image, padded, (out, lanes, offset)) in views {
+        let right = Rows { values: right, lanes: *lanes + 2 * BLOCK, offset: BLOCK };
+        let left = Rows { values: left, lanes: *lanes, offset: 0 };
+        for (image, padded, out) in [(pair.left(), left_padded, left), (pair.right(), right_padded, right)] {
             let rows = padded.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
             rows.for_each(|(index, row)| dispatch!(level, simd => pad_row(simd, *profile, image, index, row)));
-            let rows = out.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
-            let view = View { profile: *profile, image, padded };
-            rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows, (lanes, offset))));
+            let Rows { values, lanes, offset } = out;
+            let rows = values.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
+            let view = View { profile: *profile, image, padded, lanes, offset };
+            rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows)));
         }
     }
 
-    /// Features of the left pixels of a row, `[lane]`.
+    /// The features of a row of the left image, `[lane]`.
     pub(crate) fn left(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
         &self.left[((y * self.profile.channels() + channel) * 2 + parity) * self.lanes..][..self.lanes]
     }
 
-    /// Features of the right pixels of a row, from one block before lane 0 on.
+    /// The features of a row of the right image, from one block before lane 0 on.
     pub(crate) fn right(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
         let lanes = self.lanes + 2 * BLOCK;
         &self.right[((y * self.profile.channels() + channel) * 2 + parity) * lanes..][..lanes]
@@ -79,13 +80,13 @@ impl Features {
         &self.inside[parity]
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         [&self.left, &self.right].into_iter().chain(&self.inside).chain(&self.padded).map(memory::bytes).sum()
     }
 }
 
-/// Bytes that [`Features`] hold, predicted.
+/// The bytes that [`Features`] will hold.
 pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
     let (lanes, profile) = (shape::lanes(size), model.profile());
     let rows = 2 * profile.channels() * size.height;
@@ -96,7 +97,7 @@ fn padded_bytes(size: Size, profile: Profile) -> usize {
     padded_planes(profile) * (size.height + 2 * APRON) * (size.width + 2 * APRON)
 }
 
-/// Planes of values whose neighbours are looked at: one of grey values, or one of each colour channel.
+/// The number of planes of values that a profile looks for neighbours in: one of grey values, or one for each colour.
 fn padded_planes(profile: Profile) -> usize {
     match profile {
         Profile::Thesis | Profile::Mrf => 0,
@@ -125,31 +126,45 @@ fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row:
     after.fill(own[width - 1]);
 }
 
-/// Columns and rows of eight neighbours, counted from [`APRON`] before the pixel.
+/// The columns and rows of eight neighbours, counted from the pixel [`APRON`] columns and rows before.
 type Neighbours = [(usize, usize); 8];
 
-/// Those that a census code compares, in order.
+/// The neighbours that a census code compares, in order.
 const CENSUS: Neighbours = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
 
-/// Those that each byte of the larger one compares.
+/// The neighbours that each byte of the larger code compares.
 const CENSUS_5X5: [Neighbours; 3] = [
     [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (0, 1), (1, 1), (2, 1)],
     [(3, 1), (4, 1), (0, 2), (1, 2), (3, 2), (4, 2), (0, 3), (1, 3)],
     [(2, 3), (3, 3), (4, 3), (0, 4), (1, 4), (2, 4), (3, 4), (4, 4)],
 ];
 
-/// An image to be taken in.
+/// Rows of features to be written.
+struct Rows<'a> {
+    values: &'a mut [u8],
+    /// Lanes from one row of lanes to the next.
+    lanes: usize,
+    /// Where lane 0 lies in a row of lanes.
+    offset: usize,
+}
+
+/// An image whose features are computed.
 struct View<'a> {
     profile: Profile,
     image: &'a Image,
     /// See [`Features::padded`].
     padded: &'a [u8],
+    /// See [`Rows::lanes`].
+    lanes: usize,
+    /// See [`Rows::offset`].
+    offset: usize,
 }
 
 impl View<'_> {
-    /// Writes the features of a row; lane 0 lies `offset` entries after the start of each row of `lanes`.
+    /// Writes the features of row `y`.
     #[inline(always)]
-    fn fill<S: Simd>(&self, simd: S, y: usize, rows: &mut [u8], (lanes, offset): (usize, usize)) {
+    fn fill<S: Simd>(&self, simd: S, y: usize, rows: &mut [u8]) {
+        let (lanes, offset) = (self.lanes, self.offset);
         let width = self.image.size().width;
         let pixels = &self.image.pixels()[y * width..][..width];
         for (channel, out) in rows.chunks_exact_mut(2 * lanes).enumerate() {
@@ -166,40 +181,43 @@ impl View<'_> {
                         every_second(even, pixels, |pixel| pixel[channel]);
                         every_second(odd, &pixels[1..], |pixel| pixel[channel]);
                     }
-                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, 0, (x, y), out)),
-                    Profile::Census5x5 => deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], 0, (x, y), out)),
-                    Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, (x, y), out)),
-                    Profile::BirchfieldTomasi => deal(even, odd, |x, out| self.half_samples(channel, (x, y), out)),
-                    Profile::CensusRgb => deal(even, odd, |x, out| self.census(&CENSUS, channel, (x, y), out)),
+                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, 0, Node { x, y }, out)),
+                    Profile::Census5x5 => {
+                        deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], 0, Node { x, y }, out))
+                    }
+                    Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, Node { x, y }, out)),
+                    Profile::BirchfieldTomasi => {
+                        deal(even, odd, |x, out| self.half_samples(channel, Node { x, y }, out))
+                    }
+                    Profile::CensusRgb => deal(even, odd, |x, out| self.census(&CENSUS, channel, Node { x, y }, out)),
                 },
             );
         }
     }
 
-    /// Values of a plane around consecutive pixels from (x, y) on, so many columns and rows after the first of
-    /// [`Features::padded`] that lies [`APRON`] before.
+    /// Values of a plane near consecutive pixels from `at` on: those `dx - APRON` columns and `dy - APRON` rows away.
     #[inline(always)]
-    fn near(&self, plane: usize, (x, y): (usize, usize), (dx, dy): (usize, usize), columns: usize) -> &[u8] {
+    fn near(&self, plane: usize, at: Node, (dx, dy): (usize, usize), columns: usize) -> &[u8] {
         let row = self.image.size().width + 2 * APRON;
-        &self.padded[((y + dy) * padded_planes(self.profile) + plane) * row + x + dx..][..columns]
+        &self.padded[((at.y + dy) * padded_planes(self.profile) + plane) * row + at.x + dx..][..columns]
     }
 
-    /// A byte of the census codes of pixels from (x, y) on, see [`bp_core::census`], by the values of a plane.
+    /// Computes a byte of the census codes of pixels from `at` on, by the values of a plane; see [`bp_core::census`].
     #[inline(always)]
-    fn census(&self, neighbours: &Neighbours, plane: usize, at: (usize, usize), codes: &mut [u8]) {
+    fn census(&self, neighbours: &Neighbours, plane: usize, at: Node, codes: &mut [u8]) {
         let middle = self.near(plane, at, (APRON, APRON), codes.len());
         for &offset in neighbours {
             let neighbours = self.near(plane, at, offset, codes.len());
             for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
-                // Older bits leave at the top: what was there before is gone after eight.
+                // Eight shifts push out whatever was there before.
                 *code = *code << 1 | u8::from(neighbour > middle);
             }
         }
     }
 
-    /// What [`Profile::Gradient`] compares: the grey value, then the gradient.
+    /// The features of [`Profile::Gradient`]: the grey value, then the gradient.
     #[inline(always)]
-    fn gradient(&self, channel: usize, at: (usize, usize), out: &mut [u8]) {
+    fn gradient(&self, channel: usize, at: Node, out: &mut [u8]) {
         let [before, middle, after] = self.row_near(at, out.len());
         if channel == 0 {
             out.copy_from_slice(middle);
@@ -211,9 +229,9 @@ impl View<'_> {
         }
     }
 
-    /// What [`Profile::BirchfieldTomasi`] compares: the grey value, then the least and the greatest around.
+    /// The features of [`Profile::BirchfieldTomasi`]: the grey value, then the least and the greatest around it.
     #[inline(always)]
-    fn half_samples(&self, channel: usize, at: (usize, usize), out: &mut [u8]) {
+    fn half_samples(&self, channel: usize, at: Node, out: &mut [u8]) {
         let [before, middle, after] = self.row_near(at, out.len());
         for (((out, &before), &middle), &after) in out.iter_mut().zip(before).zip(middle).zip(after) {
             let (left, right) = (mean(before, middle), mean(middle, after));
@@ -225,9 +243,9 @@ impl View<'_> {
         }
     }
 
-    /// Grey values of the left neighbours of pixels from `at` on, of those, and of the right neighbours.
+    /// The grey values of pixels from `at` on: first of their left neighbours, then their own, then of the right ones.
     #[inline(always)]
-    fn row_near(&self, at: (usize, usize), columns: usize) -> [&[u8]; 3] {
+    fn row_near(&self, at: Node, columns: usize) -> [&[u8]; 3] {
         [APRON - 1, APRON, APRON + 1].map(|dx| self.near(0, at, (dx, APRON), columns))
     }
 }
@@ -238,8 +256,8 @@ fn mean(a: u8, b: u8) -> u8 {
     (u16::from(a) + u16::from(b)).div_ceil(2) as u8
 }
 
-/// Writes a row block by block: `values(x, out)` gives those of consecutive columns from x on, which are dealt to even and
-/// odd ones.
+/// Writes a row block by block. `values(x, out)` gives the values of consecutive columns from x on, which alternate
+/// between the even and the odd plane.
 #[inline(always)]
 fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {
     let mut block = [0; 2 * BLOCK];

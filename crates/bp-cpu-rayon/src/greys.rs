@@ -1,13 +1,13 @@
-//! The grey values of a grid, which tell its weak edges, see [`bp_core::Model::with_weak_edges`].
+//! The grey values of a grid. They tell which edges are weak; see [`bp_core::Model::with_weak_edges`].
 
 use bp_core::{Error, Image, Model, Plan, image::grey, memory};
 use fearless_simd::{Level, Select, Simd, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use crate::shape::{BLOCK, MIN_ROWS, Shape, every_second};
+use crate::shape::{BLOCK, Column, MIN_ROWS, Shape, every_second};
 
-/// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes; none where no edge is
-/// weak.
+/// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes. Empty if the model
+/// has no weak edges.
 #[derive(Debug)]
 pub(crate) struct Greys {
     shape: Shape,
@@ -16,13 +16,13 @@ pub(crate) struct Greys {
 }
 
 impl Greys {
-    /// Room for those of `grid`.
+    /// Allocates room for the grey values of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let values = memory::filled("grey values", bytes(plan, grid) as usize, 0)?;
         Ok(Self { shape: Shape::new(plan, grid), threshold: plan.model().weak_edges().unwrap_or(u8::MAX), values })
     }
 
-    /// Takes those of an image, as grid 0.
+    /// Loads the grey values of an image.
     pub(crate) fn load(&mut self, level: Level, image: &Image) {
         let (shape, width) = (self.shape, self.shape.size.width);
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
@@ -33,7 +33,7 @@ impl Greys {
         });
     }
 
-    /// A coarse node's grey value is the mean of its up to four children's.
+    /// Computes the grey values of a coarser grid: a node has the mean of its children, four at most.
     pub(crate) fn coarsen(&mut self, fine: &Self) {
         let shape = self.shape;
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
@@ -42,31 +42,31 @@ impl Greys {
             let rows = [Some(2 * y), Some(2 * y + 1).filter(|&y| y < fine.shape.size.height)];
             // Coarse column X has lane X of both fine planes as children.
             let children = rows.into_iter().flatten().flat_map(|y| [fine.lanes(0, y), fine.lanes(1, y)]);
-            for (column, plane, lane) in shape.columns() {
-                let children = children.clone().enumerate().filter(|&(i, _)| column < fine.shape.nodes(i % 2));
+            for Column { x, plane, lane } in shape.columns() {
+                let children = children.clone().enumerate().filter(|&(i, _)| x < fine.shape.nodes(i % 2));
                 let (sum, count) =
-                    children.fold((0, 0), |(sum, count), (_, lanes)| (sum + u16::from(lanes[column]), count + 1));
+                    children.fold((0, 0), |(sum, count), (_, lanes)| (sum + u16::from(lanes[x]), count + 1));
                 planes[plane][lane] = Model::coarse_grey(sum, count);
             }
         });
     }
 
-    /// The grey values around the nodes of `plane` in row `y`; `None` where no edge is weak.
+    /// The grey values around the nodes of `plane` in row `y`; `None` if the model has no weak edges.
     pub(crate) fn around(&self, plane: usize, y: usize) -> Option<Around<'_>> {
         if self.values.is_empty() {
             return None;
         }
-        // Where there is no row above or below, no message goes: any values will do.
+        // Without a row above or below, no message goes there, so any values will do.
         let (above, below) = (y.saturating_sub(1), (y + 1).min(self.shape.size.height - 1));
         let beside = self.row(1 - plane, y);
         let same = &beside[BLOCK..];
-        // Of even columns the left neighbour is in the pair before, of odd ones the right neighbour in the pair behind.
+        // An even column has its left neighbour in the pair before it, an odd one its right neighbour in the pair after it.
         let next = if plane == 0 { &beside[BLOCK - 1..] } else { &beside[BLOCK + 1..] };
         let neighbours = [same, next, self.lanes(plane, above), self.lanes(plane, below)];
         Some(Around { threshold: self.threshold, own: self.lanes(plane, y), neighbours })
     }
 
-    /// Those of `plane` in row `y` from lane 0 on.
+    /// The values of `plane` in row `y` from lane 0 on.
     fn lanes(&self, plane: usize, y: usize) -> &[u8] {
         &self.row(plane, y)[BLOCK..]
     }
@@ -76,19 +76,19 @@ impl Greys {
         &self.values[(2 * y + plane) * stride..][..stride]
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.values)
     }
 }
 
-/// Bytes that [`Greys`] hold, predicted.
+/// The bytes that [`Greys`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let shape = Shape::new(plan, grid);
     if plan.model().weak_edges().is_some() { (shape.size.height * 2 * stride(&shape)) as u64 } else { 0 }
 }
 
-/// From one row of lanes to the next.
+/// The distance from one row of lanes to the next.
 fn stride(shape: &Shape) -> usize {
     shape.lanes + 2 * BLOCK
 }
@@ -99,7 +99,7 @@ fn planes_mut<'a>(shape: &Shape, row: &'a mut [u8]) -> [&'a mut [u8]; 2] {
     [&mut even[BLOCK..][..shape.nodes(0)], &mut odd[BLOCK..][..shape.nodes(1)]]
 }
 
-/// The grey values of a row, dealt to even and odd columns.
+/// Writes the grey values of a row to even and odd columns.
 #[inline(always)]
 fn deal<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
     simd.vectorize(
@@ -111,7 +111,7 @@ fn deal<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
     );
 }
 
-/// The grey values of the nodes of a plane in a row, and of their neighbours by slot, `[lane]`.
+/// The grey values of the nodes of a plane in a row, and those of their neighbours by slot, each `[lane]`.
 #[derive(Clone, Copy)]
 pub(crate) struct Around<'a> {
     threshold: u8,
@@ -120,13 +120,13 @@ pub(crate) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// The same for a pass upwards, whose last two slots are exchanged.
+    /// The same for an upward pass, which exchanges the last two slots.
     pub(crate) fn upwards(mut self) -> Self {
         self.neighbours.swap(2, 3);
         self
     }
 
-    /// For a vector of nodes from a lane on, one of two values: the second where the edge of that slot is weak.
+    /// Chooses one of two values for each node of a vector from `lane` on: `weak` if the edge of this slot is weak.
     #[inline(always)]
     pub(crate) fn choose<S: Simd, V: SimdInt<S, Element = u8>>(
         &self,

@@ -8,16 +8,17 @@ use crate::{
     edges::{self, Edges},
     layout::Layout,
     pass::{Pass, Way},
+    shape::PlaneRow,
     update_messages::Sends,
     wavefront::{Part, Wavefront, fused_steps},
 };
 
-/// How many steps are run at a time on a grid.
+/// How many steps run at a time on a grid.
 pub(crate) fn steps_at_a_time(layout: &Layout) -> usize {
     fused_steps(layout.row() + edges::row_bytes(layout))
 }
 
-/// Runs steps of the plan's schedule.
+/// Runs steps of the plan's schedule on the two sets of messages of a grid.
 pub(crate) fn run(grid: &Pass<'_>, steps: Range<usize>, sets: &mut [Edges; 2]) {
     let last = grid.plan.settings().steps as usize - 1;
     let at_a_time = steps_at_a_time(grid.layout);
@@ -36,22 +37,21 @@ pub(crate) fn run(grid: &Pass<'_>, steps: Range<usize>, sets: &mut [Edges; 2]) {
     }
 }
 
-/// Runs steps of either schedule of half-steps; `sends_first` is the colour of the nodes that send in step 0, and
-/// `last` is the half-step that goes to the second set.
+/// Runs half-steps. In step 0 the nodes of colour `sends_first` send. The half-step `last` writes to the second set.
 fn half_steps(grid: &Pass<'_>, steps: Range<usize>, sends_first: usize, sets: [&mut [u8]; 2], last: Option<usize>) {
     let row_bytes = edges::row_bytes(grid.layout);
     let [set, other] = sets.map(|rows| Part { row_bytes: if rows.is_empty() { 0 } else { row_bytes }, rows });
     let step = |[rows, other]: [&mut [u8]; 2], y: usize, t: usize| {
         let t = steps.start + t;
-        let place = ((y + t + sends_first) % 2, y);
+        let at = PlaneRow { plane: (y + t + sends_first) % 2, y };
         if t == 0 && !grid.keeps_messages {
-            grid.refine(place, &Side::ALL, rows);
+            grid.refine(at, &Side::ALL, rows);
         }
         if last == Some(t) {
-            edges::copy(grid.layout, rows, other, place.0);
-            grid.send(Way::Down, place, Sends::All, other);
+            edges::copy(grid.layout, rows, other, at.plane);
+            grid.send(Way::Down, at, Sends::All, other);
         } else {
-            grid.send(Way::Down, place, Sends::All, rows);
+            grid.send(Way::Down, at, Sends::All, rows);
         }
     };
     Wavefront { height: grid.layout.size.height, steps: steps.len() }.run([set, other], &step);

@@ -9,22 +9,22 @@ use crate::{
     shape::{BLOCK, Shape},
 };
 
-/// Bytes that the [`Layout`] of a grid holds.
+/// The bytes that the [`Layout`] of a grid will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let Shape { lanes, size, .. } = Shape::new(plan, grid);
     (4 * (lanes + 2 * BLOCK) + 2 * lanes + size.height) as u64 + greys::bytes(plan, grid)
 }
 
-/// A shape and the edges between its nodes: which there are and, once a pair is taken in, which of these are weak.
+/// A shape and the edges between its nodes: which of them exist and, once a pair is loaded, which of them are weak.
 #[derive(Debug)]
 pub(crate) struct Layout {
     shape: Shape,
-    /// By plane: 255 where the neighbour in the same pair of columns exchanges messages, else 0; then the same for the
-    /// neighbour in the next pair. With a block of zeros before and after.
+    /// For each plane two masks: 255 where a node exchanges messages with its neighbour in the same pair of columns, else
+    /// 0; then the same for the neighbour in the next pair. A block of zeros precedes and follows each mask.
     masks: [[Vec<u8>; 2]; 2],
-    /// The mask of nodes none of which has a neighbour, and that of nodes which all have one.
+    /// The mask of nodes without neighbours, and the mask of nodes that all have one.
     none_and_all: [Vec<u8>; 2],
-    /// By row: whether it exchanges messages with the row above.
+    /// For each row, whether it exchanges messages with the row above.
     joined_above: Vec<bool>,
     pub(crate) greys: Greys,
 }
@@ -62,13 +62,13 @@ impl Layout {
         })
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let masks = self.masks.iter().flatten().chain(&self.none_and_all);
         masks.map(memory::bytes).sum::<u64>() + memory::bytes(&self.joined_above) + self.greys.bytes()
     }
 
-    /// Of `plane`: the masks of the neighbours in the same and in the next pair of columns, `[lane]`.
+    /// The masks of `plane` for neighbours in the same and in the next pair of columns, `[lane]`.
     pub(crate) fn masks(&self, plane: usize) -> [&[u8]; 2] {
         self.padded_masks(plane).map(|mask| &mask[BLOCK..BLOCK + self.lanes])
     }
@@ -78,17 +78,17 @@ impl Layout {
         self.masks[plane].each_ref().map(Vec::as_slice)
     }
 
-    /// The mask of nodes none of which has a neighbour, and that of nodes which all have one, `[lane]`.
+    /// The mask of nodes without neighbours, and the mask of nodes that all have one, `[lane]`.
     pub(crate) fn none_and_all(&self) -> [&[u8]; 2] {
         self.none_and_all.each_ref().map(Vec::as_slice)
     }
 
-    /// The grey values around the nodes of `plane` in row `y`; `None` where no edge is weak.
+    /// The grey values around the nodes of `plane` in row `y`; `None` if the model has no weak edges.
     pub(crate) fn around(&self, plane: usize, y: usize) -> Option<Around<'_>> {
         self.greys.around(plane, y)
     }
 
-    /// Whether row `y` exchanges messages with the row above; not so for the row below the last.
+    /// Whether row `y` exchanges messages with the row above. The row after the last one does not.
     pub(crate) fn joined_above(&self, y: usize) -> bool {
         self.joined_above.get(y).copied().unwrap_or(false)
     }

@@ -1,14 +1,19 @@
-//! The fast CPU backend: vectors of pixels, threads by rayon, messages updated in place and in cache. Its labels and
-//! messages are the scalar backend's to the bit, on every instruction set and with any number of threads.
+//! The fast CPU backend. It computes vectors of pixels, shares work among threads with rayon, and updates messages in
+//! place while they are in cache. Its labels and messages equal those of the scalar backend to the bit, on every
+//! instruction set and with any number of threads.
 //!
-//! Its devices are the instruction sets of this processor, the widest first. Work is shared by the threads of the rayon
-//! pool that it is called in; [`rayon::ThreadPool::install`] runs it in another than the global one. A sweep needs room
-//! for every thread, so that the pool in which a plan is prepared says how many can sweep at once, and the one in which
-//! memory is predicted for how many.
+//! Its devices are the instruction sets of this CPU, the widest first. Work runs on the current rayon pool; use
+//! [`rayon::ThreadPool::install`] to run it on a pool of your own. The schedule `sweep` needs memory for every thread:
+//! prepare a plan, and predict its memory, on the pool that solves it.
 //!
-//! `layout` says how values lie in memory, `edges` why one message an edge is enough, `wavefront` how several
-//! steps pass over the image at once, `sweep` how a band is swept by itself, `features` what is compared, `greys` which edges are weak.
-//! One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`.
+//! Where to start reading:
+//!
+//! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and which are weak.
+//! * `edges` explains why one message for each edge is enough.
+//! * Each kernel has a file of its own: `match_cost` (on `features`), `coarsen`, `refine`, `update_messages` and
+//!   `select_labels`. Each opens with the loop of its scalar twin.
+//! * `pass` is what a row does in a step. `half_steps` runs such passes over whole grids by `wavefront`; `sweep` runs them
+//!   over one band at a time, in `windows`.
 
 mod coarsen;
 mod costs;
@@ -32,11 +37,11 @@ use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver, memo
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-/// The backend.
+/// The fast CPU backend.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rayon;
 
-/// The instruction sets that this processor has, the widest first, and their names.
+/// The instruction sets of this CPU and their names, the widest first.
 fn levels() -> Vec<(Level, &'static str)> {
     let best = Level::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -85,7 +90,7 @@ impl Backend for Rayon {
     }
 }
 
-/// An instruction set.
+/// One instruction set.
 struct RayonDevice {
     level: Level,
 }

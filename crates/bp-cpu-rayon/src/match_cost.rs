@@ -1,4 +1,15 @@
 //! Data costs of the image.
+//!
+//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//!
+//! ```text
+//! for each pixel (x, y):
+//!     for each label d:   raw(d) = D(left(x, y), right(x - disparity(d), y)), or the out-of-range cost
+//!     least = min over d of raw(d)
+//!     for each label d:   cost(d) = min(raw(d) - least, clip)
+//! ```
+//!
+//! Here one lane of a vector is one pixel, so a label is a shift of the right image's lanes.
 
 use bp_core::{Plan, Profile, Schedule, Seed};
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
@@ -7,10 +18,10 @@ use crate::{
     costs::{self, Costs, Sums},
     features::Features,
     layout::Layout,
-    shape::{BLOCK, STRIP},
+    shape::{BLOCK, BlockStart, Column, STRIP, Strip},
 };
 
-/// What a pair's data costs are computed from, row by row.
+/// Everything that the data costs of a pair are computed from.
 pub(crate) struct Matching<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
@@ -47,10 +58,10 @@ pub(crate) fn match_cost(matching: &Matching<'_>, costs: &mut Costs) {
 }
 
 impl Matching<'_> {
-    /// Stores the costs of a row whose profile is narrow, and its unclipped ones too if asked.
+    /// Stores the costs of a row of a narrow profile. Also stores the unclipped costs if `sums` has room for them.
     pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
         let row = Row { matching: self, y };
-        // Neither taking off a node's least cost nor clipping changes a message; both only make room for sums in 8 bits.
+        // Normalising and clipping never change a message. They only keep sums within 8 bits, and here sums fit anyway.
         let model = self.plan.model();
         let fits = model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into();
         if fits && sums.is_none() {
@@ -61,7 +72,7 @@ impl Matching<'_> {
         self.fix(y, stored);
     }
 
-    /// The unclipped costs of a row whose profile is narrow.
+    /// Writes the unclipped costs of a row of a narrow profile.
     pub(crate) fn unclipped_row(&self, y: usize, raw: &mut [u8]) {
         let row = Row { matching: self, y };
         dispatch!(self.level, simd => row.unclipped(simd, raw));
@@ -75,20 +86,20 @@ impl Matching<'_> {
             self.layout,
             self.plan.clip(0),
             #[inline(always)]
-            |place, label| row.sum_of_differences(place, label),
+            |start, label| row.sum_of_differences(start, label),
             stored,
             sums,
         ));
         self.fix(y, stored);
     }
 
-    /// Fixes the costs of the nodes around a known match, see [`Seed`]. Sums need no fixing: an image with a cut has one
-    /// grid.
+    /// Sets the costs of the nodes around a known match; see [`Seed`]. It leaves the sums alone: a plan with a cut has one
+    /// grid, which needs none.
     fn fix(&self, y: usize, row: &mut [u8]) {
         let Some(seed) = self.seed else { return };
         let layout = self.layout;
         let dear = self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8;
-        for (_, plane, lane) in layout.columns().filter(|&(x, ..)| seed.touches(x, y)) {
+        for Column { plane, lane, .. } in layout.columns().filter(|column| seed.touches(column.x, y)) {
             for label in 0..layout.labels {
                 let near = (label as u16).abs_diff(seed.label) <= 1;
                 row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { dear };
@@ -97,14 +108,14 @@ impl Matching<'_> {
     }
 }
 
-/// A row to be matched.
+/// A row that is matched.
 struct Row<'a> {
     matching: &'a Matching<'a>,
     y: usize,
 }
 
 impl Row<'_> {
-    /// Stores the costs of both planes for the profiles of small costs.
+    /// Stores the costs of both planes, for profiles whose costs fit 8 bits.
     #[inline(always)]
     fn narrow<S: Simd>(&self, simd: S, stored: &mut [u8], mut keep: Option<&mut [u8]>) {
         simd.vectorize(
@@ -140,8 +151,8 @@ impl Row<'_> {
     }
 
     #[inline(always)]
-    fn costs<S: Simd>(&self, simd: S, plane: usize, strip: (usize, usize), raw: &mut [u8]) -> [u8; STRIP] {
-        // A closure, since a function that is handed over may be called where it should be inlined.
+    fn costs<S: Simd>(&self, simd: S, plane: usize, strip: Strip, raw: &mut [u8]) -> [u8; STRIP] {
+        // A closure, because the compiler may call a function that is passed by name instead of inlining it.
         macro_rules! compared_by {
             ($cost:expr) => {
                 self.strip(
@@ -160,35 +171,35 @@ impl Row<'_> {
             Profile::Gradient => compared_by!(gradient_difference),
             Profile::BirchfieldTomasi => compared_by!(sampling_insensitive_difference),
             Profile::CensusRgb => compared_by!(hamming_distance_of_24::<S, 18>),
-            // The costs of mrf are wide.
+            // `mrf` has costs above 8 bits and never gets here.
             Profile::Thesis | Profile::Mrf => compared_by!(truncated_difference),
         }
     }
 
-    /// Computes the costs of a strip of nodes, of which so many channels are compared, and returns the least of each.
+    /// Computes the costs of a strip of nodes by comparing so many channels. Returns the least cost of each node.
     #[inline(always)]
     fn strip<S: Simd, const CHANNELS: usize>(
         &self,
         simd: S,
         plane: usize,
-        (at, lanes): (usize, usize),
+        strip: Strip,
         raw: &mut [u8],
         cost: impl Fn([S::u8s; CHANNELS], [S::u8s; CHANNELS]) -> S::u8s,
     ) -> [u8; STRIP] {
         let Matching { features, layout, plan, .. } = self.matching;
         let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let left = channels::<CHANNELS>(|channel| &features.left(self.y, channel, plane)[at..at + lanes]);
-        let node = &features.inside(plane)[BLOCK + at..BLOCK + at + lanes];
+        let left = channels::<CHANNELS>(|channel| strip.of(features.left(self.y, channel, plane)));
+        let node = strip.of(&features.inside(plane)[BLOCK..]);
         let right = [0, 1].map(|parity| {
             let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
             (right, features.inside(parity))
         });
         let mut least = [u8::MAX; STRIP];
         for label in 0..layout.labels {
-            let raw = &mut raw[label * layout.lanes + at..][..lanes];
-            for lane in (0..lanes).step_by(S::u8s::LEN) {
+            let raw = &mut raw[label * layout.lanes + strip.first..][..strip.lanes];
+            for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
-                let (parity, start) = self.lanes(plane, at + lane, label);
+                let (parity, start) = self.lanes(BlockStart { plane, lane: strip.first + lane }, label);
                 let (right, inside) = &right[parity];
                 let cost = cost(left.map(|left| load(left, lane)), right.map(|right| load(right, start)));
                 let inside = load(inside, start);
@@ -200,18 +211,18 @@ impl Row<'_> {
         least
     }
 
-    /// Sum over the channels of the differences.
+    /// The sum of the differences over the colour channels.
     #[inline(always)]
-    fn sum_of_differences(&self, place: (usize, usize), label: usize) -> [u16; BLOCK] {
+    fn sum_of_differences(&self, start: BlockStart, label: usize) -> [u16; BLOCK] {
         let outside = self.matching.plan.model().profile().out_of_range_cost();
         let mut sum = [0; BLOCK];
         for channel in 0..3 {
-            let Block { left, right, .. } = self.block(place, label, channel);
+            let Block { left, right, .. } = self.block(start, label, channel);
             for i in 0..BLOCK {
                 sum[i] += u16::from(left[i].abs_diff(right[i]));
             }
         }
-        let Block { inside, node, .. } = self.block(place, label, 0);
+        let Block { inside, node, .. } = self.block(start, label, 0);
         std::array::from_fn(|i| match (inside[i], node[i]) {
             (_, 0) => 0,
             (0, _) => outside,
@@ -219,31 +230,33 @@ impl Row<'_> {
         })
     }
 
-    /// Which lanes of the right image the nodes of `plane` from lane `at` on match under a label: the parity of their
-    /// columns, and where they start in [`Features::right`].
+    /// The lanes of the right image that the nodes from `start` on match under a label: the parity of their columns, and
+    /// where they start in [`Features::right`].
     #[inline(always)]
-    fn lanes(&self, plane: usize, at: usize, label: usize) -> (usize, usize) {
+    fn lanes(&self, start: BlockStart, label: usize) -> (usize, usize) {
+        let BlockStart { plane, lane } = start;
         // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
         let shift = plane as i64 - i64::from(self.matching.plan.model().disparity(label as u16));
         let (parity, shift) = ((shift & 1) as usize, shift >> 1);
         let nodes = self.matching.layout.nodes(parity) as i64;
-        (parity, ((at as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
+        (parity, ((lane as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
     }
 
     /// The features that a block of nodes of a plane compares under a label.
     #[inline(always)]
-    fn block(&self, (plane, at): (usize, usize), label: usize, channel: usize) -> Block<'_> {
-        let (parity, start) = self.lanes(plane, at, label);
+    fn block(&self, at: BlockStart, label: usize, channel: usize) -> Block<'_> {
+        let BlockStart { plane, lane } = at;
+        let (parity, start) = self.lanes(at, label);
         Block {
-            left: block(self.matching.features.left(self.y, channel, plane), at),
+            left: block(self.matching.features.left(self.y, channel, plane), lane),
             right: block(self.matching.features.right(self.y, channel, parity), start),
             inside: block(self.matching.features.inside(parity), start),
-            node: block(self.matching.features.inside(plane), at + BLOCK),
+            node: block(self.matching.features.inside(plane), lane + BLOCK),
         }
     }
 }
 
-/// `lanes` of so many channels.
+/// Collects `lanes` of every channel.
 #[inline(always)]
 fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
     let mut all = [[].as_slice(); CHANNELS];
@@ -257,17 +270,17 @@ fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1])
     (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
 }
 
-/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: of 24 bits, `MOST` at most.
+/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: the distance of 24 bits, at most `MOST`.
 #[inline(always)]
 fn hamming_distance_of_24<S: Simd, const MOST: u8>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
     let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
-    // Added bit by bit first, to a sum and a carry that counts twice: that leaves two vectors of bits to count.
+    // A full adder per bit gives a sum and a carry that counts twice. That leaves two vectors of bits to count, not three.
     let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
     let twice = carry.count_ones();
     (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, MOST))
 }
 
-/// [`Profile::Thesis`], from a table.
+/// [`Profile::Thesis`], by a table.
 #[inline(always)]
 fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
     let table = |difference| (7 * difference + 5) / 10;
@@ -279,7 +292,8 @@ fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s;
 fn gradient_difference<S: Simd>(simd: S, left: [S::u8s; 2], right: [S::u8s; 2]) -> S::u8s {
     let (grey, gradient) = (difference::<S>(left[0], right[0]), difference::<S>(left[1], right[1]));
     let [four, five, fifteen] = [4, 5, 15].map(|most| S::u8s::splat(simd, most));
-    // A table has 16 entries, and a takes 21 values; but 15 more of it are 9 more of 3 a div 5.
+    // A table has 16 entries, but a takes 21 values. Beyond 15 a second look-up adds the rest: 3 (15 + b) div 5 is
+    // 9 + 3 b div 5.
     let table = |difference| 3 * difference / 5;
     let upper = grey.saturating_sub(fifteen).min(five);
     let greys = look_up(simd, table, grey.min(fifteen)) + look_up(simd, table, upper);
@@ -294,7 +308,7 @@ fn sampling_insensitive_difference<S: Simd>(simd: S, left: [S::u8s; 3], right: [
     outside + ((outside + S::u8s::splat(simd, 1)) >> 1)
 }
 
-/// How far a value lies outside the range around the other pixel's.
+/// How far a value lies outside the range around the other pixel.
 #[inline(always)]
 fn outside<S: Simd>([value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]) -> S::u8s {
     value.saturating_sub(greatest) | least.saturating_sub(value)
@@ -305,7 +319,7 @@ fn difference<S: Simd>(left: S::u8s, right: S::u8s) -> S::u8s {
     left.saturating_sub(right) | right.saturating_sub(left)
 }
 
-/// `table` of indices from 0 to 15.
+/// Looks indices from 0 to 15 up in `table`.
 #[inline(always)]
 fn look_up<S: Simd>(simd: S, table: impl Fn(u8) -> u8, indices: S::u8s) -> S::u8s {
     let table = u8x16::from_fn(simd, |index| table(index as u8));
@@ -317,7 +331,7 @@ struct Block<'a> {
     right: &'a [u8; BLOCK],
     /// 255 where the right image has a column, else 0.
     inside: &'a [u8; BLOCK],
-    /// 255 where the left one has.
+    /// 255 where the left image has one, else 0.
     node: &'a [u8; BLOCK],
 }
 

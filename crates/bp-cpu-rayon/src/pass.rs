@@ -1,4 +1,4 @@
-//! One pass over a row: what the nodes of a plane do in a step, whichever schedule runs.
+//! What the nodes of a plane in a row do in a step, under every schedule.
 
 use bp_core::{Plan, Side};
 use fearless_simd::Level;
@@ -8,41 +8,42 @@ use crate::{
     greys::Around,
     layout::Layout,
     refine::{Coarser, refine},
+    shape::PlaneRow,
     update_messages::{Nodes, Sends, update_messages},
 };
 
-/// Which way a pass over the rows goes.
+/// The direction of a pass over the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Way {
     Down,
     Up,
 }
 
-/// What updating the messages of a grid needs besides those.
+/// Everything that updating the messages of a grid needs besides the messages.
 pub(crate) struct Pass<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
     pub(crate) layout: &'a Layout,
-    /// Row that `costs` start with.
+    /// The row that `costs` start with.
     pub(crate) first: usize,
     pub(crate) costs: &'a [u8],
     pub(crate) coarser: Option<Coarser<'a>>,
-    /// Whether it starts with the messages that it holds in place of the coarser grid's.
+    /// Whether the grid starts with the messages that it holds instead of those of the coarser grid.
     pub(crate) keeps_messages: bool,
 }
 
 impl Pass<'_> {
-    /// Gives nodes of a plane in row `y`, with which `rows` start, their first messages.
-    pub(crate) fn refine(&self, (plane, y): (usize, usize), sides: &[Side], rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane);
-        refine(self.level, self.plan, self.layout, self.coarser, (plane, y), sides, &mut slots);
+    /// Writes the first messages of the nodes of a plane in a row. `rows` start with that row.
+    pub(crate) fn refine(&self, at: PlaneRow, sides: &[Side], rows: &mut [u8]) {
+        let mut slots = edges::slots(self.layout, rows, at.plane);
+        refine(self.level, self.plan, self.layout, self.coarser, at, sides, &mut slots);
     }
 
-    /// Lets nodes of a plane in row `y`, with which `rows` start, send in a pass that goes some way.
-    pub(crate) fn send(&self, way: Way, (plane, y): (usize, usize), sends: Sends, rows: &mut [u8]) {
-        let mut slots = edges::slots(self.layout, rows, plane);
-        self.drop_missing(y, &mut slots);
-        let mut nodes = self.nodes(plane, y);
+    /// Sends the messages of the nodes of a plane in a row, in a pass in this direction. `rows` start with that row.
+    pub(crate) fn send(&self, way: Way, at: PlaneRow, sends: Sends, rows: &mut [u8]) {
+        let mut slots = edges::slots(self.layout, rows, at.plane);
+        self.drop_missing(at.y, &mut slots);
+        let mut nodes = self.nodes(at);
         if way == Way::Up {
             slots.swap(2, 3);
             nodes.around = nodes.around.map(Around::upwards);
@@ -50,7 +51,7 @@ impl Pass<'_> {
         update_messages(self.level, sends, &nodes, slots);
     }
 
-    fn nodes(&self, plane: usize, y: usize) -> Nodes<'_> {
+    fn nodes(&self, PlaneRow { plane, y }: PlaneRow) -> Nodes<'_> {
         let (layout, model) = (self.layout, self.plan.model());
         Nodes {
             costs: &self.costs[(y - self.first) * layout.row() + plane * layout.plane()..][..layout.plane()],
@@ -62,7 +63,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Zeros in the slots of neighbours above and below that are not there. Of those at the sides, masks take care.
+    /// Sets the slots of missing neighbours above and below to zeros. Masks handle those at the sides.
     fn drop_missing(&self, y: usize, [_, _, up, down]: &mut [&mut [u8]; 4]) {
         for (row, slot) in [(y, up), (y + 1, down)] {
             if !self.layout.joined_above(row) {

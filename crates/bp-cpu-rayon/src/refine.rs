@@ -1,40 +1,53 @@
 //! First messages of a grid.
+//!
+//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//!
+//! ```text
+//! for each node (x, y) and side that it has a neighbour on:
+//!     message(x, y) from side = message(parent of (x, y)) from side, on the next coarser grid
+//! ```
+//!
+//! Two fine columns share a parent, so a vector of parents is interleaved with the parents of the next plane.
 
 use bp_core::{MessageStart, Plan, Schedule, Side};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use crate::{edges::Rows, layout::Layout, shape::BLOCK};
+use crate::{
+    edges::Rows,
+    layout::Layout,
+    shape::{BLOCK, PlaneRow},
+};
 
 /// The last messages of the next coarser grid.
 #[derive(Clone, Copy)]
 pub(crate) struct Coarser<'a> {
     /// Its layout.
     pub(crate) layout: &'a Layout,
-    /// What its nodes of either checkerboard colour received.
+    /// The messages that its nodes received, by checkerboard colour.
     pub(crate) received: [Rows<'a>; 2],
 }
 
-/// Gives the nodes of `plane` in row `y` of a grid the messages that they start with on `sides`; zeros where there is no
-/// coarser grid. A node does so just before it sends for the first time, so that all of it happens in cache.
+/// Writes the first messages from `sides` to the nodes of a plane in a row: zeros if there is no coarser grid. A caller
+/// does so just before these nodes send for the first time, while their row is in cache.
 pub(crate) fn refine(
     level: Level,
     plan: &Plan,
     layout: &Layout,
     coarser: Option<Coarser<'_>>,
-    (plane, y): (usize, usize),
+    at: PlaneRow,
     sides: &[Side],
     slots: &mut [&mut [u8]; 4],
 ) {
     for &side in sides {
-        let slot = &mut *slots[slot(side, plane)];
-        match coarser.and_then(|coarser| source(plan, coarser, (plane, y), side)) {
-            Some(source) => dispatch!(level, simd => expand(simd, layout, &source, plane, slot)),
+        let slot = &mut *slots[slot(side, at.plane)];
+        match coarser.and_then(|coarser| source(plan, coarser, at, side)) {
+            Some(source) => dispatch!(level, simd => expand(simd, layout, &source, at.plane, slot)),
             None => slot[..layout.plane()].fill(0),
         }
     }
 }
 
-/// Which slot of a node of `plane` leads to `side`.
+/// The slot in which a node of `plane` keeps its edge to `side`.
 pub(crate) fn slot(side: Side, plane: usize) -> usize {
     match (side, plane) {
         (Side::Right, 0) | (Side::Left, 1) => 0,
@@ -44,7 +57,7 @@ pub(crate) fn slot(side: Side, plane: usize) -> usize {
     }
 }
 
-/// Where fine nodes take their first messages from: those of lane i from lane i div 2 of `planes[i % 2]`.
+/// Where fine nodes take their first messages from: lane i takes them from lane i div 2 of `planes[i % 2]`.
 struct Source<'a> {
     lanes: usize,
     planes: [Parents<'a>; 2],
@@ -52,20 +65,21 @@ struct Source<'a> {
 
 /// The nodes of a coarse row and plane that messages are taken from.
 struct Parents<'a> {
-    /// What they received, `[label][lane]`.
+    /// Their messages, `[label][lane]`.
     values: &'a [u8],
     /// 255 where a lane has a neighbour that sends, else 0, from a block before the first lane on.
     mask: Option<&'a [u8]>,
-    /// By how many lanes further on messages are taken.
+    /// How many lanes further on the messages are taken.
     moved: isize,
 }
 
-/// Where the nodes of `plane` in row `y` take their first message from `side` from; nowhere where the coarse row of
-/// theirs does not exist, or has no neighbours there.
-fn source<'a>(plan: &Plan, coarser: Coarser<'a>, (plane, y): (usize, usize), side: Side) -> Option<Source<'a>> {
+/// Where the nodes of a plane in a row take their first messages from `side`. `None` if that coarse row does not exist
+/// or has no neighbours on that side.
+fn source<'a>(plan: &Plan, coarser: Coarser<'a>, at: PlaneRow, side: Side) -> Option<Source<'a>> {
+    let PlaneRow { plane, y } = at;
     let layout = coarser.layout;
     let by_sender = plan.settings().message_start == MessageStart::Sender;
-    // A sender's parent sends to the coarse row one further on, if that is not the receiver's own parent too.
+    // The sender's parent sends to the next coarse row, unless it is the receiver's parent too.
     let rows = match side {
         Side::Up if by_sender => y as isize % 2,
         Side::Down if by_sender => y as isize % 2 - 1,
@@ -82,8 +96,8 @@ fn source<'a>(plan: &Plan, coarser: Coarser<'a>, (plane, y): (usize, usize), sid
     Some(Source { lanes: layout.lanes, planes: [even?, odd?] })
 }
 
-/// For even and odd lanes of a fine plane, whose lane i has coarse column i as parent: the coarse plane that messages
-/// are taken from, and by how many lanes moved.
+/// For even and for odd lanes of a fine plane, whose lane i has coarse column i as parent: the coarse plane that messages
+/// are taken from, and by how many lanes they are moved.
 fn columns(side: Side, plane: usize, by_sender: bool) -> [(usize, isize); 2] {
     match (side, plane) {
         // A sender's parent sends to one column further on than the receiver's own.
@@ -93,8 +107,8 @@ fn columns(side: Side, plane: usize, by_sender: bool) -> [(usize, isize); 2] {
     }
 }
 
-/// The same after a sweep on coarse row `y`: only even nodes hold messages from left and right, so that in place of an
-/// odd one its neighbour on that side is asked. Nothing comes from above.
+/// The same for a swept grid. Only its even nodes hold messages from left and right, so an odd parent is replaced by its
+/// neighbour on that side. Nothing comes from above.
 fn swept(side: Side, y: usize) -> Option<[(usize, isize); 2]> {
     match (side, y % 2) {
         (Side::Up, _) => None,
@@ -106,7 +120,7 @@ fn swept(side: Side, y: usize) -> Option<[(usize, isize); 2]> {
     }
 }
 
-/// Writes first messages of the nodes of `plane`.
+/// Writes the first messages of the nodes of `plane`.
 #[inline(always)]
 fn expand<S: Simd>(simd: S, layout: &Layout, source: &Source<'_>, plane: usize, slot: &mut [u8]) {
     simd.vectorize(
@@ -133,7 +147,7 @@ impl Parents<'_> {
     fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> S::u8s {
         let values = match (from + lane).checked_add_signed(self.moved) {
             Some(from) => S::u8s::from_slice(simd, &self.values[from..from + S::u8s::LEN]),
-            // The lane before the first: the mask drops it.
+            // There is no lane before the first. The mask drops it.
             None => S::u8s::from_fn(simd, |i| if i == 0 { 0 } else { self.values[i - 1] }),
         };
         match self.mask {

@@ -1,4 +1,15 @@
-//! Labels: those of least belief, or in sequence, given the labels already decided.
+//! Label selection: by the lowest belief, or in sequence, given the labels already decided.
+//!
+//! What the kernel computes for every node, in the words of `bp-cpu-scalar`:
+//!
+//! ```text
+//! for each label d:
+//!     belief(d) = cost(d) + messages from the sides without a decided label (d)
+//!                         + smoothness(d, label decided there) for the other sides
+//! label = the smallest d of the lowest belief
+//! ```
+//!
+//! Here one lane of a vector is one node. It keeps the best belief and its label while all labels pass by.
 
 use std::array;
 
@@ -6,49 +17,62 @@ use bp_core::{MAX_TRUNCATION, Model, Node, Plan, Schedule, Side, Smoothness};
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use crate::{edges::Rows, greys::Around, layout::Layout, refine::slot, shape::STRIP};
+use crate::{
+    edges::Rows,
+    greys::Around,
+    layout::Layout,
+    refine::slot,
+    shape::{Column, PlaneRow, STRIP, Strip},
+};
 
-/// A distance of labels that costs the truncation whatever the slope is, unless that is 0.
+/// A distance of labels that costs the truncation for every slope but 0.
 const FAR: usize = MAX_TRUNCATION as usize + 1;
 
-/// Labels that are compared at a time: as many as let distances to decided labels, clamped to [`FAR`] beyond either end,
-/// stay within 8 bits.
+/// How many labels are compared at a time. Distances to decided labels, clamped to [`FAR`] beyond either end of such a
+/// chunk, stay within 8 bits.
 const CHUNK: usize = 256 - 2 * FAR;
 
-/// What labels are read off: rows of a grid from row `first` on.
+/// The costs and messages that labels are selected by, for rows from `first` on.
 pub(crate) struct Answer<'a> {
     pub(crate) level: Level,
     pub(crate) model: &'a Model,
     pub(crate) layout: &'a Layout,
     pub(crate) first: usize,
     pub(crate) stored: &'a [u8],
-    /// What nodes of either checkerboard colour received.
+    /// The messages that nodes received, by checkerboard colour.
     pub(crate) received: [Rows<'a>; 2],
 }
 
-/// Writes the smallest label of least belief of every node, `[height][width]`.
+/// Writes the label of the lowest belief of every node, `[height][width]`.
 pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
     labels.par_chunks_exact_mut(answer.layout.size.width).enumerate().for_each(|(y, row)| {
         for plane in 0..2 {
-            let received = Side::ALL.map(|side| answer.received((plane, y), side));
-            answer.decide((plane, y), received, |_, _| [], row);
+            let at = PlaneRow { plane, y };
+            let received = Side::ALL.map(|side| answer.received(at, side));
+            answer.decide(at, received, |_, _| [], row);
         }
     });
 }
 
-/// What the nodes of a plane received from a side, `[label][lane]`, and where there is a node that sent it, `[lane]`.
-type Received<'a> = (&'a [u8], &'a [u8]);
+/// The messages that the nodes of a plane received from a side.
+#[derive(Clone, Copy)]
+struct Received<'a> {
+    /// The messages, `[label][lane]`.
+    values: &'a [u8],
+    /// 255 where a neighbour sent one, else 0, `[lane]`.
+    mask: &'a [u8],
+}
 
 impl<'a> Answer<'a> {
-    fn costs(&self, plane: usize, y: usize) -> &'a [u8] {
+    fn costs(&self, PlaneRow { plane, y }: PlaneRow) -> &'a [u8] {
         &self.stored[(y - self.first) * self.layout.row() + plane * self.layout.plane()..][..self.layout.plane()]
     }
 
-    /// Copies out what the nodes of as many rows as `messages` has room for received from `side`.
+    /// Copies the messages received from `side` to `messages`, for as many rows as there is room for.
     pub(crate) fn read_messages(&self, plan: &Plan, side: Side, messages: &mut [u8]) {
         let one_an_edge = plan.settings().schedule == Schedule::Sweep;
         let nodes = (self.first..).flat_map(|y| self.layout.columns().map(move |column| (column, y)));
-        for (((x, plane, lane), y), out) in nodes.zip(messages.chunks_exact_mut(self.layout.labels)) {
+        for ((Column { x, plane, lane }, y), out) in nodes.zip(messages.chunks_exact_mut(self.layout.labels)) {
             let colour = (x + y) % 2;
             let went_away = one_an_edge && (side == Side::Up || side != Side::Down && colour == 1);
             let there = plan.neighbour(0, Node { x, y }, side).is_some() && !went_away;
@@ -59,67 +83,66 @@ impl<'a> Answer<'a> {
         }
     }
 
-    fn received(&self, (plane, y): (usize, usize), side: Side) -> Received<'a> {
+    fn received(&self, at: PlaneRow, side: Side) -> Received<'a> {
         let [none, _] = self.layout.none_and_all();
-        match self.received[(plane + y) % 2].towards(side, plane, y) {
-            Some(values) => (values, self.mask(plane, side)),
-            // Any values will do where none counts.
-            None => (self.costs(plane, y), none),
+        match self.received[at.colour()].towards(side, at.plane, at.y) {
+            Some(values) => Received { values, mask: self.mask(at.plane, side) },
+            // The mask drops these values.
+            None => Received { values: self.costs(at), mask: none },
         }
     }
 
-    /// Where the nodes of `plane` have a neighbour on `side`, `[lane]`; of up and down the rows know.
+    /// 255 where a node of `plane` has a neighbour on `side`, `[lane]`. For up and down it is 255 everywhere: a caller knows
+    /// whether there is such a row.
     fn mask(&self, plane: usize, side: Side) -> &'a [u8] {
         let [_, all] = self.layout.none_and_all();
         self.layout.masks(plane).get(slot(side, plane)).copied().unwrap_or(all)
     }
 
-    /// Decodes a band after sweeps, from its first row down, even nodes before odd ones.
+    /// Decides the labels of a band after its sweeps, row by row downwards, even nodes before odd ones.
     pub(crate) fn decode_band(&self, labels: &mut [u16]) {
         let mut above = None;
         for (row, y) in labels.chunks_exact_mut(self.layout.size.width).zip(self.first..) {
-            let (even, odd) = (y % 2, 1 - y % 2);
+            let (even, odd) = (PlaneRow { plane: y % 2, y }, PlaneRow { plane: 1 - y % 2, y });
             let above_row = above.filter(|_| self.layout.joined_above(y));
-            let up = |strip, column| Known {
-                slot: slot(Side::Up, even),
+            let up = |strip: Strip, column| Known {
+                slot: slot(Side::Up, even.plane),
                 labels: decided(above_row.unwrap_or_default(), column),
-                mask: part(self.layout.none_and_all()[usize::from(above_row.is_some())], strip),
+                mask: strip.of(self.layout.none_and_all()[usize::from(above_row.is_some())]),
             };
-            let [left, right, _, down] = Side::ALL.map(|side| self.received((even, y), side));
-            self.decide((even, y), [left, right, down], |(strip, column), _| [up(strip, column)], row);
-            let beside = |side, (strip, column): (_, isize), row: &[u16]| {
+            let [left, right, _, down] = Side::ALL.map(|side| self.received(even, side));
+            self.decide(even, [left, right, down], |strip, _| [up(strip, strip.column(even))], row);
+            let beside = |side, strip: Strip, row: &[u16]| {
                 let dx = if side == Side::Left { -1 } else { 1 };
                 Known {
-                    slot: slot(side, odd),
-                    labels: decided(row, column + dx),
-                    mask: part(self.mask(odd, side), strip),
+                    slot: slot(side, odd.plane),
+                    labels: decided(row, strip.column(odd) + dx),
+                    mask: strip.of(self.mask(odd.plane, side)),
                 }
             };
-            let down = self.received((odd, y), Side::Down);
-            let known = |(strip, column), row: &[u16]| {
-                let at = (strip, column);
-                [up(strip, column), beside(Side::Left, at, row), beside(Side::Right, at, row)]
+            let down = self.received(odd, Side::Down);
+            let known = |strip: Strip, row: &[u16]| {
+                [up(strip, strip.column(odd)), beside(Side::Left, strip, row), beside(Side::Right, strip, row)]
             };
-            self.decide((odd, y), [down], known, row);
+            self.decide(odd, [down], known, row);
             above = Some(&*row);
         }
     }
 
-    /// Decides the nodes of `plane` in row `y`: the smallest label that costs least with what was received from some
-    /// sides and with the labels already decided on others: `known` tells those for a strip of lanes and its first
-    /// column.
+    /// Decides the nodes of a plane in a row. Each takes the label that costs least, given the messages from some sides
+    /// and the labels already decided on the others; the smallest label wins a tie. `known` gives the decided labels
+    /// for a strip.
     fn decide<'b, const M: usize, const K: usize>(
         &self,
-        (plane, y): (usize, usize),
+        at: PlaneRow,
         received: [Received<'_>; M],
-        known: impl Fn(((usize, usize), isize), &[u16]) -> [Known<'b>; K],
+        known: impl Fn(Strip, &[u16]) -> [Known<'b>; K],
         row: &mut [u16],
     ) {
-        let nodes = Undecided { layout: self.layout, model: self.model, costs: self.costs(plane, y) };
-        let around = self.layout.around(plane, y).filter(|_| K > 0);
-        for strip in self.layout.strips(plane) {
-            let column = 2 * strip.0 + plane;
-            let known = known((strip, column as isize), row);
+        let nodes = Undecided { layout: self.layout, model: self.model, costs: self.costs(at) };
+        let around = self.layout.around(at.plane, at.y).filter(|_| K > 0);
+        for strip in self.layout.strips(at.plane) {
+            let known = known(strip, row);
             let labels = match around {
                 Some(around) => {
                     let edges = dispatch!(self.level, simd => nodes.edges(simd, strip, around, &known));
@@ -131,17 +154,12 @@ impl<'a> Answer<'a> {
                     dispatch!(self.level, simd => nodes.strip::<_, false, _, _>(simd, strip, &received, &known, &none))
                 }
             };
-            row.iter_mut().skip(column).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
+            row.iter_mut().skip(strip.column(at) as usize).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
         }
     }
 }
 
-/// The lanes of a strip.
-fn part(lanes: &[u8], (at, count): (usize, usize)) -> &[u8] {
-    &lanes[at..at + count]
-}
-
-/// Labels of every second column from `x` on; 0 outside.
+/// The labels of every second column from `x` on; 0 outside the image.
 fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
     let mut labels = [0; STRIP];
     let first = usize::from(x < 0);
@@ -150,7 +168,15 @@ fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
     labels
 }
 
-/// Decided labels of neighbours of a strip of nodes, and where there are any.
+/// A label to compare with the best so far.
+#[derive(Clone, Copy)]
+struct Candidate {
+    label: usize,
+    /// Its place in the chunk.
+    low: usize,
+}
+
+/// The decided labels of the neighbours of a strip of nodes, and where there are such neighbours.
 struct Known<'a> {
     slot: usize,
     labels: [u16; STRIP],
@@ -165,12 +191,12 @@ struct Undecided<'a> {
 }
 
 impl Undecided<'_> {
-    /// Step and truncation of the edges to decided labels, for a strip of nodes.
+    /// The step and the truncation of the edges to decided labels, for a strip of nodes.
     #[inline(always)]
     fn edges<S: Simd, const K: usize>(
         &self,
         simd: S,
-        (at, lanes): (usize, usize),
+        strip: Strip,
         around: Around<'_>,
         known: &[Known<'_>; K],
     ) -> [[[u8; STRIP]; 2]; K] {
@@ -184,9 +210,9 @@ impl Undecided<'_> {
                 );
                 known.each_ref().map(|known| {
                     let mut edges = [[0; STRIP]; 2];
-                    for lane in (0..lanes).step_by(S::u8s::LEN) {
+                    for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
                         for (edge, values) in edges.iter_mut().zip([step, truncation]) {
-                            let chosen: S::u8s = around.choose(simd, known.slot, at + lane, values);
+                            let chosen: S::u8s = around.choose(simd, known.slot, strip.first + lane, values);
                             chosen.store_slice(&mut edge[lane..lane + S::u8s::LEN]);
                         }
                     }
@@ -196,12 +222,12 @@ impl Undecided<'_> {
         )
     }
 
-    /// Decides a strip of nodes, chunk by chunk of labels, since what is compared has 8 bits.
+    /// Decides the labels of a strip of nodes, one chunk of labels at a time, so that distances fit 8 bits.
     #[inline(always)]
     fn strip<S: Simd, const WEAK: bool, const M: usize, const K: usize>(
         &self,
         simd: S,
-        strip: (usize, usize),
+        strip: Strip,
         received: &[Received<'_>; M],
         known: &[Known<'_>; K],
         edges: &[[&[u8]; 2]; K],
@@ -223,14 +249,14 @@ impl Undecided<'_> {
                         self.compare::<S, WEAK, M, K>(
                             simd,
                             strip,
-                            (label, label - from),
+                            Candidate { label, low: label - from },
                             received,
                             &near,
                             &mut best,
                             &mut index,
                         );
                     }
-                    for lane in 0..strip.1 {
+                    for lane in 0..strip.lanes {
                         if best[lane] < before[lane] {
                             labels[lane] = from as u16 + u16::from(index[lane]);
                         }
@@ -241,25 +267,26 @@ impl Undecided<'_> {
         )
     }
 
-    /// Compares the cost of a label, of which its place in the chunk is written down, with the best so far.
+    /// Compares the belief of a label with the best so far, and keeps the better one and its place in the chunk.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
     fn compare<S: Simd, const WEAK: bool, const M: usize, const K: usize>(
         &self,
         simd: S,
-        (at, lanes): (usize, usize),
-        (label, low): (usize, usize),
+        strip: Strip,
+        candidate: Candidate,
         received: &[Received<'_>; M],
         near: &[Near<'_>; K],
         best: &mut [u8; STRIP],
         index: &mut [u8; STRIP],
     ) {
-        let start = label * self.layout.lanes + at;
+        let Candidate { label, low } = candidate;
+        let (start, lanes) = (label * self.layout.lanes + strip.first, strip.lanes);
         let (usual, far) = (self.model.smoothness(), far(self.model, WEAK));
         let here = S::u8s::splat(simd, (low + FAR) as u8);
         let low = S::u8s::splat(simd, low as u8);
         let costs = &self.costs[start..start + lanes];
-        let received = received.map(|(values, mask)| (&values[start..start + lanes], &mask[at..at + lanes]));
+        let received = received.map(|from| (&from.values[start..start + lanes], strip.of(from.mask)));
         for lane in (0..lanes).step_by(S::u8s::LEN) {
             let range = lane..lane + S::u8s::LEN;
             let load = |values: &[u8]| S::u8s::from_slice(simd, &values[range.clone()]);
@@ -278,7 +305,7 @@ impl Undecided<'_> {
                 let smoothness = (distance.min(S::u8s::splat(simd, far)) * step).min(truncation);
                 sum += smoothness & load(near.mask);
             }
-            // What is added to the data cost is at most 4K.
+            // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
             let belief = load(costs).saturating_add(sum);
             let least = load(best);
             belief.simd_lt(least).select(low, load(index)).store_slice(&mut index[range.clone()]);
@@ -287,11 +314,11 @@ impl Undecided<'_> {
     }
 }
 
-/// Labels relative to a chunk of labels, clamped to where distances count, and where there are any.
+/// Decided labels relative to a chunk of labels, clamped to [`FAR`] beyond its ends.
 struct Near<'a> {
     labels: [u8; STRIP],
     mask: &'a [u8],
-    /// Step and truncation of the edges to them, where some are weak.
+    /// The step and the truncation of the edges to them, if there are weak edges.
     edges: [&'a [u8]; 2],
 }
 
@@ -304,8 +331,8 @@ fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
     relative
 }
 
-/// The least distance of labels that costs the truncation over every edge. Times the step it fits 8 bits: s div 2 is at
-/// least a third of s, or 0.
+/// The least distance of labels that costs the truncation on every edge. Its product with the step fits 8 bits, because
+/// s div 2 is at least a third of s, or 0.
 fn far(model: &Model, weak: bool) -> u8 {
     let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
     let usual = model.smoothness();

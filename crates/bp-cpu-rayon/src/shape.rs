@@ -2,13 +2,13 @@
 
 use bp_core::{Plan, Size};
 
-/// Every row of lanes is a whole number of blocks; no vector is longer.
+/// Every row of lanes is a whole number of blocks. No vector is longer than a block.
 pub(crate) const BLOCK: usize = 64;
 
-/// Lanes whose running minima stay in the first cache while all their labels pass by.
+/// The most lanes of a strip: their running minima stay in the L1 cache while all labels pass by.
 pub(crate) const STRIP: usize = 8 * BLOCK;
 
-/// Fewest rows that are worth handing to another thread.
+/// The fewest rows that are worth handing to another thread.
 pub(crate) const MIN_ROWS: usize = 32;
 
 /// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
@@ -20,7 +20,7 @@ pub(crate) struct Shape {
     pub(crate) size: Size,
     /// Number of labels.
     pub(crate) labels: usize,
-    /// Lanes from one label to the next: those of a plane, and padding.
+    /// The lanes from one label to the next: those of a plane, and padding.
     pub(crate) lanes: usize,
 }
 
@@ -46,26 +46,77 @@ impl Shape {
         2 * self.plane()
     }
 
-    /// The lanes of a plane in strips: where each starts, and how many lanes it has, whole blocks.
-    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+    /// The lanes of a plane in strips of whole blocks.
+    pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = Strip> + use<> {
         let lanes = self.nodes(plane).next_multiple_of(BLOCK);
-        (0..lanes).step_by(STRIP).map(move |at| (at, STRIP.min(lanes - at)))
+        (0..lanes).step_by(STRIP).map(move |first| Strip { first, lanes: STRIP.min(lanes - first) })
     }
 
-    /// The nodes of a row: column, plane and lane.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-        (0..self.size.width).map(|x| (x, x % 2, x / 2))
+    /// The nodes of a row.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = Column> + use<> {
+        (0..self.size.width).map(|x| Column { x, plane: x % 2, lane: x / 2 })
     }
 }
 
-/// Lanes of a plane, padded to whole blocks; where labels would lie a multiple of 256 bytes apart, they would share few
-/// of a cache's sets, so there is one block more.
+/// Some consecutive lanes of a plane.
+#[derive(Clone, Copy)]
+pub(crate) struct Strip {
+    pub(crate) first: usize,
+    /// How many lanes there are; at most [`STRIP`].
+    pub(crate) lanes: usize,
+}
+
+impl Strip {
+    /// The column of its first lane, in a row of this plane.
+    pub(crate) fn column(self, at: PlaneRow) -> isize {
+        (2 * self.first + at.plane) as isize
+    }
+
+    /// The values of the strip.
+    #[inline(always)]
+    pub(crate) fn of(self, values: &[u8]) -> &[u8] {
+        &values[self.first..self.first + self.lanes]
+    }
+}
+
+/// A column, and where it lies.
+#[derive(Clone, Copy)]
+pub(crate) struct Column {
+    pub(crate) x: usize,
+    pub(crate) plane: usize,
+    pub(crate) lane: usize,
+}
+
+/// The nodes of one plane in one row.
+#[derive(Clone, Copy)]
+pub(crate) struct PlaneRow {
+    pub(crate) plane: usize,
+    pub(crate) y: usize,
+}
+
+impl PlaneRow {
+    /// The checkerboard colour of these nodes.
+    pub(crate) fn colour(self) -> usize {
+        (self.plane + self.y) % 2
+    }
+}
+
+/// A block of nodes in a row.
+#[derive(Clone, Copy)]
+pub(crate) struct BlockStart {
+    pub(crate) plane: usize,
+    /// Its first lane.
+    pub(crate) lane: usize,
+}
+
+/// The lanes of a plane, padded to whole blocks. If labels would lie a multiple of 256 bytes apart, one block is added:
+/// they would share too few sets of the cache.
 pub(crate) fn lanes(size: Size) -> usize {
     let blocks = size.width.div_ceil(2).div_ceil(BLOCK);
     BLOCK * if blocks.is_multiple_of(4) { blocks + 1 } else { blocks }
 }
 
-/// Writes a value of every second pixel: those of one plane, where `pixels` start with its first.
+/// Writes a value of every second pixel from the first on: of the pixels of one plane.
 #[inline(always)]
 pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));

@@ -1,4 +1,4 @@
-//! The buffers of one plan, and the kernels applied to them.
+//! The buffers of one plan, and the kernels that run on them.
 
 use std::ops::Range;
 
@@ -28,21 +28,22 @@ pub(crate) struct RayonSolver {
     layouts: Vec<Layout>,
     features: Features,
     costs: Vec<Costs>,
-    /// Messages of even grids and, where the plan has several grids, of odd ones: only a grid and its next coarser one
-    /// are needed at a time.
+    /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at a time.
     messages: [Messages; 2],
     windows: Windows,
     /// Whether grid 0 starts with the messages that it holds.
     keeps_messages: bool,
     seed: Option<Seed>,
-    /// Labels of a swept image, decided while its messages are in cache.
+    /// The labels of a swept image. They are decided while its messages are in cache.
     decided: Vec<u16>,
 }
 
-/// The messages of one grid: as many sets of one an edge as the schedule needs. A grid is bipartite, so that a
-/// synchronous run is two runs of half-steps that do not touch: one where even nodes send first, one where odd ones do.
-/// `checkerboard` is the first of them; its last half-step alone goes to the second set, so that what its senders
-/// received is not lost. A sweep keeps one message an edge by definition.
+/// The messages of one grid. A set has one message for each edge, and a schedule needs one or two sets.
+///
+/// A grid is bipartite. So a synchronous run is two runs of half-steps that never touch: in one the even nodes send first,
+/// in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is the first run alone; only its last
+/// half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps one message
+/// for each edge by definition.
 struct Messages {
     sets: [Edges; 2],
 }
@@ -53,7 +54,7 @@ impl Messages {
     }
 }
 
-/// Sets of messages that are kept of a grid: of a swept image none.
+/// The number of sets of messages that are kept of a grid. A swept image keeps none.
 fn sets(plan: &Plan, grid: usize) -> usize {
     match plan.settings().schedule {
         Schedule::Sweep => usize::from(grid > 0),
@@ -61,12 +62,12 @@ fn sets(plan: &Plan, grid: usize) -> usize {
     }
 }
 
-/// The two grids whose messages need the most room: the finest of even and of odd index that keep any.
+/// The two grids whose messages need the most room: the finest grids of even and of odd index that keep any.
 fn largest(plan: &Plan) -> [usize; 2] {
     if sets(plan, 0) == 0 { [2, 1] } else { [0, 1] }
 }
 
-/// Bytes that a solver will allocate.
+/// The bytes that a solver will allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
@@ -134,12 +135,12 @@ impl RayonSolver {
     }
 }
 
-/// What the nodes of either checkerboard colour of a grid received last.
+/// The last messages that the nodes of a grid received, by checkerboard colour.
 fn received<'a>(plan: &Plan, layout: &'a Layout, messages: &'a Messages) -> [Rows<'a>; 2] {
     received_in(plan).map(|set| messages.sets[set].rows(layout))
 }
 
-/// The set of messages that holds it.
+/// The sets that hold these messages.
 fn received_in(plan: &Plan) -> [usize; 2] {
     let steps = plan.settings().steps as usize;
     [0, 1].map(|colour| match plan.settings().schedule {
@@ -176,13 +177,13 @@ impl Solver for RayonSolver {
         Ok(())
     }
 
-    /// Nothing yet: nodes take over first messages when they first send, see [`crate::refine`].
+    /// Does nothing: nodes read their first messages just before they first send; see [`crate::refine`].
     fn refine(&mut self, _grid: usize) -> Result<(), Error> {
         self.keeps_messages = false;
         Ok(())
     }
 
-    /// Even nodes send first, in the first set: that is to be the one with what they received last.
+    /// Even nodes send first, in the first set. So the set with the messages they received last has to become the first.
     fn keep_messages(&mut self) -> Result<(), Error> {
         let [of_even, _] = received_in(&self.plan);
         self.messages[0].sets.rotate_left(of_even);
@@ -192,7 +193,7 @@ impl Solver for RayonSolver {
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
-            // All loops of a band are one piece of work.
+            // All loops of a band run together, at the last step.
             if steps.end == self.plan.settings().steps {
                 self.sweep(grid);
             }
@@ -231,8 +232,8 @@ impl Solver for RayonSolver {
         }
     }
 
-    /// Refining is part of updating: the first step on a grid reads the coarser grid's messages in place of its own, which
-    /// over all grids leaves out one step's messages of the finest.
+    /// Refining is part of updating: the first step on a grid reads the coarser grid's messages instead of its own. Over all
+    /// grids that saves the messages of one step on the finest grid.
     fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         let [match_cost, coarsen, _, update_messages, select_labels] = self.plan.moved_bytes()?;
         Some([match_cost, coarsen, 0, update_messages - self.plan.updates_per_step(0), select_labels])

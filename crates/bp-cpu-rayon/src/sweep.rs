@@ -1,4 +1,4 @@
-//! [`bp_core::Schedule::Sweep`]: every band of rows by itself, in cache.
+//! [`bp_core::Schedule::Sweep`]: sweeps every band of rows by itself, in cache.
 
 use bp_core::{BAND_ROWS, Plan, Side};
 use fearless_simd::Level;
@@ -11,6 +11,7 @@ use crate::{
     pass::{Pass, Way},
     refine::Coarser,
     select_labels::Answer,
+    shape::PlaneRow,
     update_messages::Sends,
     windows::{Window, Windows},
 };
@@ -19,7 +20,7 @@ use crate::{
 pub(crate) enum CostSource<'a> {
     /// They are stored.
     Stored(&'a [u8]),
-    /// They are computed, as often as needed: that takes less time than to fetch them from memory.
+    /// They are computed whenever they are needed. That takes less time than reading them from memory.
     Computed(Matching<'a>),
 }
 
@@ -51,7 +52,7 @@ impl Bands<'_> {
         });
     }
 
-    /// Sweeps all bands again to tell what every node received from `side`, `[height][width][labels]`.
+    /// Sweeps all bands again and copies the messages received from `side`, `[height][width][labels]`.
     pub(crate) fn read_messages(&self, side: Side, messages: &mut [u8]) {
         let bands = messages.par_chunks_mut(BAND_ROWS * self.layout.size.width * self.layout.labels);
         bands.enumerate().for_each(|(index, messages)| {
@@ -66,7 +67,7 @@ impl Bands<'_> {
         Answer { level, model, layout, first, stored, received: [rows, rows] }
     }
 
-    /// Sweeps a band as often as the plan says, then calls `then` with its costs and edges, row by row.
+    /// Sweeps a band as often as the plan says, then calls `then` with its costs and edges.
     fn sweep<R>(&self, index: usize, then: impl FnOnce(&[u8], &[u8]) -> R) -> R {
         let (first, row) = (index * BAND_ROWS, self.layout.row());
         let end = (first + BAND_ROWS).min(self.layout.size.height);
@@ -99,7 +100,7 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// One loop. Nothing comes from above the band; from below come the first messages.
+    /// Runs one loop. No message comes from above the band. Those from below are the first messages.
     fn sweep(&self, first_loop: bool, rows: &mut [u8]) {
         let row_bytes = edges::row_bytes(self.pass.layout);
         for plane in 0..2 {
@@ -113,27 +114,34 @@ impl Band<'_> {
         }
     }
 
-    /// Even nodes send to both sides and down, then odd ones down; the last row sends nothing down.
+    /// Even nodes send left, right and down; then odd nodes send down. The last row sends nothing down.
     fn forward(&self, y: usize, first_loop: bool, rows: &mut [u8]) {
-        let (even, odd, last) = (y % 2, 1 - y % 2, y == self.last);
+        let (even, odd) = planes(y);
+        let last = y == self.last;
         if first_loop {
-            self.pass.refine((even, y), &[Side::Left, Side::Right, Side::Down], rows);
+            self.pass.refine(even, &[Side::Left, Side::Right, Side::Down], rows);
             if last {
-                self.pass.refine((odd, y), &[Side::Down], rows);
+                self.pass.refine(odd, &[Side::Down], rows);
             }
         }
-        self.pass.send(Way::Down, (even, y), if last { Sends::Sides } else { Sends::SidesAndOn }, rows);
+        self.pass.send(Way::Down, even, if last { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !last {
-            self.pass.send(Way::Down, (odd, y), Sends::On, rows);
+            self.pass.send(Way::Down, odd, Sends::On, rows);
         }
     }
 
-    /// Odd nodes send to both sides and up, then even ones up; the first row sends nothing up.
+    /// Odd nodes send left, right and up; then even nodes send up. The first row sends nothing up.
     fn backward(&self, y: usize, rows: &mut [u8]) {
-        let (even, odd, first) = (y % 2, 1 - y % 2, y == self.first);
-        self.pass.send(Way::Up, (odd, y), if first { Sends::Sides } else { Sends::SidesAndOn }, rows);
+        let (even, odd) = planes(y);
+        let first = y == self.first;
+        self.pass.send(Way::Up, odd, if first { Sends::Sides } else { Sends::SidesAndOn }, rows);
         if !first {
-            self.pass.send(Way::Up, (even, y), Sends::On, rows);
+            self.pass.send(Way::Up, even, Sends::On, rows);
         }
     }
+}
+
+/// The even and the odd nodes of row y.
+fn planes(y: usize) -> (PlaneRow, PlaneRow) {
+    (PlaneRow { plane: y % 2, y }, PlaneRow { plane: 1 - y % 2, y })
 }

@@ -1,28 +1,43 @@
 //! Message passing: the kernel that sends the messages of one plane of nodes in one row.
+//!
+//! What it computes for every node, in the words of `bp-cpu-scalar`:
+//!
+//! ```text
+//! for each side `to` that the node sends to:
+//!     for each label d:   h(d) = cost(d) + messages received from the other three sides (d)
+//!     least = min over d of h(d)
+//!     envelope = 255
+//!     for d upwards:      envelope = min(envelope + step, h(d));  h(d) = envelope
+//!     for d downwards:    envelope = min(envelope + step, h(d));  h(d) = min(envelope - least, truncation)
+//!     the message is h
+//! ```
+//!
+//! Here one lane of a vector is one node, and all sides are computed together: [`pass_up`] runs the upward loop and
+//! [`pass_down`] the downward one. An edge has one slot. It holds the message received until `pass_up` overwrites it.
 
 use bp_core::Smoothness;
 use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
 use crate::greys::Around;
 
-/// Which messages a node sends. Those it does not send stay what they are.
+/// Which messages a node sends. The others keep their values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sends {
     /// All four.
     All,
-    /// Those to both sides.
+    /// Those to the left and right.
     Sides,
-    /// Those to both sides and the one on, the way that a pass goes.
+    /// Those to the left and right, and the one onward in the direction of the pass.
     SidesAndOn,
-    /// The one on.
+    /// Only the one onward.
     On,
 }
 
-/// What nodes send from.
+/// The nodes of one plane in one row, with everything that their messages depend on.
 pub(crate) struct Nodes<'a> {
     /// Data costs `[label][lane]`.
     pub(crate) costs: &'a [u8],
-    /// Masks of the first two slots, see [`crate::layout::Layout::masks`].
+    /// The masks of the first two slots; see [`crate::layout::Layout::masks`].
     pub(crate) masks: [&'a [u8]; 2],
     /// Number of nodes.
     pub(crate) nodes: usize,
@@ -30,7 +45,7 @@ pub(crate) struct Nodes<'a> {
     pub(crate) lanes: usize,
     /// The smoothness cost of edges that are not weak.
     pub(crate) smoothness: Smoothness,
-    /// What tells which are; `None` where none is.
+    /// The grey values that tell which edges are weak; `None` if no edge is.
     pub(crate) around: Option<Around<'a>>,
 }
 
@@ -39,7 +54,8 @@ impl Nodes<'_> {
         self.costs.len() / self.lanes
     }
 
-    /// A value of the smoothness cost over the edges of `W` vectors of nodes, by slot. Where none is weak, it is one vector.
+    /// A value of the smoothness cost for the edges of `W` vectors of nodes, by slot. Without weak edges, every edge has
+    /// the same value.
     #[inline(always)]
     fn of_edges<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
         &self,
@@ -60,8 +76,8 @@ impl Nodes<'_> {
     }
 }
 
-/// Sends messages, in place: each takes the place of the one that came over the same edge. The last slot is the one on;
-/// for a pass upwards the last two are exchanged.
+/// Sends messages in place: each overwrites the message that came over the same edge. The last slot is the one onward,
+/// so a caller that passes upwards exchanges the last two slots.
 pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     if nodes.around.is_some() {
         send::<true>(level, sends, nodes, slots)
@@ -79,7 +95,7 @@ fn send<const WEAK: bool>(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: 
     }
 }
 
-/// Two vectors at a time as long as there are nodes for them, then one, then narrow ones.
+/// Runs over a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
 #[inline(always)]
 fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
     simd: S,
@@ -87,7 +103,7 @@ fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: b
     slots: [&mut [u8]; 4],
 ) {
     let [same, next, up, down] = slots;
-    // One length for all, known before the loops, spares a check at every access.
+    // Slices of one known length let the compiler drop the bounds checks in the loops.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
@@ -105,8 +121,9 @@ fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: b
     }
 }
 
-/// `W` vectors of nodes. A pass up the labels adds what was received and starts the lower envelope, a pass down
-/// finishes it (Felzenszwalb and Huttenlocher 2006); between the two, the envelope waits where the message will be.
+/// Sends the messages of `W` vectors of nodes. A pass up the labels adds the received messages and starts the lower
+/// envelope; a pass down finishes it (Felzenszwalb and Huttenlocher 2006). Between the two passes, the slots hold the
+/// envelope.
 #[inline(always)]
 fn vectors<S, V, const W: usize, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
     simd: S,
@@ -122,7 +139,7 @@ fn vectors<S, V, const W: usize, const WEAK: bool, const SIDES: bool, const UP: 
     pass_down::<S, V, W, WEAK>(simd, nodes, sent, slots, at, least);
 }
 
-/// Writes the envelopes from below to the slots and returns the least entry of each side's h.
+/// Writes the upward envelopes to the slots and returns the least entry of each side's h.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
 fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
@@ -164,7 +181,7 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: boo
     least
 }
 
-/// Turns the envelopes from below into messages.
+/// Turns the upward envelopes into messages.
 #[inline(always)]
 fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
@@ -180,7 +197,8 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: b
     let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
         start -= nodes.lanes;
-        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, where a load waits for a store.
+        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, and a load would wait for a store
+        // at such a distance.
         for w in 0..W {
             let from = start + w * V::LEN;
             for side in 0..4 {
@@ -202,8 +220,8 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: b
     }
 }
 
-/// For each side, the data cost plus what was received from the other three. A sum of two messages is at most 2K, so
-/// only what the data cost adds may saturate.
+/// Computes h for each side: the data cost plus the messages received from the other three sides. The sum of two
+/// messages is at most 2K, so only additions to the data cost can saturate.
 #[inline(always)]
 fn gather<S: Simd, V: SimdInt<S, Element = u8>>(
     simd: S,

@@ -1,35 +1,47 @@
-//! The order in which several steps pass over the rows of a grid while those stay in cache, on several threads.
+//! Several steps in one pass over the rows of a grid, so that rows stay in cache, on several threads.
+//!
+//! Run one after another, steps would read all rows from memory again and again:
+//!
+//! ```text
+//! for t in 0..steps:  for y in 0..height:  step(y, t)
+//! ```
+//!
+//! Step t may run on row y as soon as step t - 1 has run on rows y - 1, y and y + 1. So each step follows the one before
+//! it, one row behind, and a row is used by all steps while it is in cache:
+//!
+//! ```text
+//! for front in 0..height + steps:  for t in 0..steps:  step(front - t, t)
+//! ```
 
 use std::ops::Range;
 
-/// Bytes of rows that one thread keeps in reach: more steps at a time need more rows.
+/// Bytes of rows that one thread keeps in cache. More steps at a time need more rows.
 const REACH: usize = 6 << 20;
 
-/// Most steps at a time; more than that save nothing.
+/// The most steps at a time. More save nothing.
 const MOST_STEPS: usize = 16;
 
-/// How many steps to run at a time over rows of so many bytes: each step holds one row more.
+/// How many steps to run at a time over rows of so many bytes. Each step needs one row more in cache.
 pub(crate) fn fused_steps(row_bytes: usize) -> usize {
     (REACH / row_bytes.max(1)).clamp(1, MOST_STEPS)
 }
 
-/// The rows of a grid, for steps that read and write row y and the one after it, and that need both neighbours of row y
-/// to have made the step before.
+/// Steps over the rows of a grid. A step on row y reads and writes rows y and y + 1, and needs the step before it to be
+/// done on both neighbours of row y.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wavefront {
-    /// Number of rows.
+    /// The number of rows.
     pub(crate) height: usize,
-    /// How many steps.
+    /// The number of steps.
     pub(crate) steps: usize,
 }
 
 impl Wavefront {
-    /// Calls `step(rows, y, t)` for every row y and step t, with the rows of each buffer from row y on. Buffers hold one
-    /// row more than the grid has.
+    /// Calls `step(rows, y, t)` for every row y and step t, with the rows of each buffer from row y on. Buffers have one
+    /// row more than the grid.
     ///
-    /// Rows are split into slabs. First each slab makes those steps that need no other slab: a row less at each gap
-    /// with every step. Then the gaps between slabs are filled. What is computed does not depend on how many slabs there
-    /// are.
+    /// Threads work on slabs of rows. At first each slab runs the steps that need no other slab: with every step, one row
+    /// less at each border. Then the gaps between slabs are filled. The result does not depend on the number of slabs.
     pub(crate) fn run<const N: usize>(
         self,
         buffers: [Part<'_>; N],
@@ -54,14 +66,14 @@ impl Wavefront {
         });
     }
 
-    /// Rows of a slab: enough for the gaps at two gaps, else as few as give each thread two slabs.
+    /// The rows of a slab: two slabs for each thread, but enough rows for the gaps at both borders.
     fn slab(self) -> usize {
         let threads = rayon::current_num_threads();
         let slabs = if threads == 1 { 1 } else { 2 * threads };
         self.height.div_ceil(slabs).max(2 * self.steps)
     }
 
-    /// Makes the steps on `range(t)` of the rows: step t follows step t - 1 one row behind. `rows` start at row `first`.
+    /// Runs step t on the rows `range(t)`, one row behind step t - 1. `rows` start at row `first`.
     fn skewed<const N: usize>(
         self,
         mut rows: [Part<'_>; N],
@@ -79,11 +91,11 @@ impl Wavefront {
     }
 }
 
-/// Some rows of a buffer.
+/// Consecutive rows of a buffer.
 pub(crate) struct Part<'a> {
     /// The rows.
     pub(crate) rows: &'a mut [u8],
-    /// Bytes of one.
+    /// The bytes of one row.
     pub(crate) row_bytes: usize,
 }
 
@@ -96,7 +108,7 @@ impl<'a> Part<'a> {
         &mut self.rows[row * self.row_bytes..]
     }
 
-    /// The first `rows` rows, and the others.
+    /// Splits off the first `rows` rows.
     fn split_at(self, rows: usize) -> (Self, Self) {
         let (first, second) = self.rows.split_at_mut((rows * self.row_bytes).min(self.rows.len()));
         let row_bytes = self.row_bytes;
@@ -104,7 +116,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Calls `f(rows, index)` for every slab of `slab` rows, on several threads; the last one has all rows that are left.
+/// Calls `f(rows, index)` for every slab of `slab` rows, on several threads. The last slab has all rows that are left.
 pub(crate) fn each_slab<const N: usize>(
     buffers: [Part<'_>; N],
     slabs: Range<usize>,

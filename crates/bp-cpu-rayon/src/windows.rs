@@ -6,28 +6,27 @@ use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
 
 use crate::{edges, match_cost::is_stored, shape::Shape};
 
-/// What one thread needs to sweep a band: room for its costs and messages, which are used up there. Those of the image
-/// are never stored as a whole.
+/// The memory in which one thread sweeps a band: its costs and messages. Those of the whole image are never stored.
 pub(crate) struct Window {
-    /// Costs of the rows of a band, where those of the grid are not stored.
+    /// The costs of a band, if those of the grid are not stored.
     pub(crate) costs: Vec<u8>,
-    /// The edges up from the first row, and those inside and down from all.
+    /// The edges up from the first row, and those inside and down from all rows.
     pub(crate) edges: Vec<u8>,
 }
 
-/// Windows for the threads that may sweep at once.
+/// A window for every thread that may sweep at the same time.
 pub(crate) struct Windows {
     windows: Vec<Mutex<Window>>,
 }
 
-/// How many windows are held: one for each thread of the pool, but no more than there are bands, and none where nothing
-/// is swept.
+/// The number of windows: one for each thread of the pool, but no more than there are bands, and none under other
+/// schedules.
 fn windows(plan: &Plan) -> usize {
     let bands = plan.image_size().height.div_ceil(BAND_ROWS);
     if plan.settings().schedule == Schedule::Sweep { rayon::current_num_threads().min(bands) } else { 0 }
 }
 
-/// Bytes of costs and of edges of a window.
+/// The bytes of a window's costs and of its edges.
 fn window_bytes(plan: &Plan) -> [usize; 2] {
     let shape = Shape::new(plan, 0);
     let rows = BAND_ROWS.min(shape.size.height);
@@ -35,14 +34,14 @@ fn window_bytes(plan: &Plan) -> [usize; 2] {
     [costs, (rows + 1).saturating_mul(edges::row_bytes(&shape))]
 }
 
-/// Bytes that [`Windows`] hold, predicted.
+/// The bytes that [`Windows`] will hold.
 pub(crate) fn bytes(plan: &Plan) -> u64 {
     let [costs, edges] = window_bytes(plan).map(|bytes| bytes as u64);
     (windows(plan) as u64).saturating_mul(costs.saturating_add(edges))
 }
 
 impl Windows {
-    /// Room for the threads of the pool that this is called in.
+    /// Allocates windows for the threads of the current pool.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
         let [costs, edges] = window_bytes(plan);
         let window = |_| {
@@ -52,17 +51,17 @@ impl Windows {
         Ok(Self { windows: (0..windows(plan)).map(window).collect::<Result<_, Error>>()? })
     }
 
-    /// Works in a free window. Only in a larger pool than the plan was prepared in can there be none, and a thread waits.
+    /// Calls `work` with a free window. A thread waits for one only in a larger pool than the one of [`Windows::new`].
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
         let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
         let (before, after) = self.windows.split_at(own);
         let free = after.iter().chain(before).find_map(|window| window.try_lock().ok());
-        // A window holds nothing that outlives a band, so that a panic in another band did it no harm.
+        // A window holds nothing that outlives a band, so a panic in another band did it no harm.
         let mut window = free.unwrap_or_else(|| self.windows[own].lock().unwrap_or_else(PoisonError::into_inner));
         work(&mut window)
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let bytes = |window: &Mutex<Window>| {
             let window = window.lock().unwrap_or_else(PoisonError::into_inner);

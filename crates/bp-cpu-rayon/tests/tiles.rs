@@ -30,7 +30,7 @@ fn differing(a: &[u16], b: &[u16]) -> f64 {
     100.0 * a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len() as f64
 }
 
-fn swept(grids: usize, steps: u32) -> Settings {
+fn swept(grids: u32, steps: u32) -> Settings {
     let (schedule, message_start) = (Schedule::Sweep, MessageStart::Receiver);
     Settings { grids, steps, schedule, message_start, cut: None, coarse_clip: true }
 }

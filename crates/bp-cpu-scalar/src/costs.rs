@@ -4,8 +4,8 @@ use bp_core::{Error, Plan, memory};
 
 use crate::sums::{self, Sums};
 
-/// Data costs `[node][label]`, each node's least one taken off, clipped at [`Plan::clip`]; beside them the unclipped
-/// ones, where the next coarser grid is summed from those.
+/// Data costs `[node][label]`, normalised by each node's least cost and clipped at [`Plan::clip`]. Beside them it keeps the
+/// unclipped costs, if the next coarser grid sums those.
 pub(crate) struct Costs {
     labels: usize,
     clip: u64,
@@ -14,7 +14,7 @@ pub(crate) struct Costs {
 }
 
 impl Costs {
-    /// Room for the costs of `grid`.
+    /// Allocates room for the costs of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         Ok(Self {
             labels: plan.model().labels(),
@@ -41,7 +41,7 @@ impl Costs {
         }
     }
 
-    /// Adds the unclipped costs of one node to `costs`; without sums, the stored ones never were clipped.
+    /// Adds the unclipped costs of one node to `costs`. Without sums, the stored costs were never clipped.
     pub(crate) fn add_unclipped(&self, node: usize, costs: &mut [u64]) {
         match &self.sums {
             Some(sums) => sums.add_to(node, costs),
@@ -49,7 +49,7 @@ impl Costs {
         }
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.stored) + self.sums.as_ref().map_or(0, Sums::bytes)
     }
@@ -61,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// What is stored decides all labels and messages, so they do not change either.
+    /// The stored costs decide all labels and messages, so those do not change either.
     #[test]
     fn a_constant_added_to_a_nodes_costs_changes_nothing() {
         let size = Size { width: 2, height: 1 };

@@ -13,7 +13,7 @@ use crate::{
 ///
 /// A neighbour that already has a label adds its smoothness cost; any other adds its message.
 pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], sums: &mut [u8]) {
-    let size = grid.size();
+    let size = grid.size;
     for (y, parity) in (0..size.height).flat_map(|y| [(y, Parity::Even), (y, Parity::Odd)]) {
         for node in row_nodes(size, y, parity) {
             let index = size.index(node);

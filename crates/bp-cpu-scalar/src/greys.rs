@@ -1,8 +1,8 @@
-//! The grey values of one grid, which tell its weak edges.
+//! The grey values of one grid. They tell which edges are weak.
 
 use bp_core::{Error, Image, Model, Plan, Size, Smoothness, memory};
 
-/// Grey values `[node]`; none where no edge is weak.
+/// Grey values `[node]`; empty if the model has no weak edges.
 pub(crate) struct Greys {
     model: Model,
     size: Size,
@@ -10,20 +10,20 @@ pub(crate) struct Greys {
 }
 
 impl Greys {
-    /// Room for the grey values of `grid`.
+    /// Allocates room for the grey values of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let values = memory::filled("grey values", plan.grey_bytes(grid) as usize, 0)?;
         Ok(Self { model: *plan.model(), size: plan.size(grid), values })
     }
 
-    /// Takes those of an image, as grid 0.
+    /// Loads the grey values of an image.
     pub(crate) fn load(&mut self, image: &Image) {
         for (node, value) in self.values.iter_mut().enumerate() {
             *value = image.grey(node % self.size.width, node / self.size.width);
         }
     }
 
-    /// A coarse node's grey value is the mean of its up to four children's.
+    /// Computes the grey values of a coarser grid: a node has the mean of its children, four at most.
     pub(crate) fn coarsen(&mut self, fine: &Self) {
         for (node, value) in self.values.iter_mut().enumerate() {
             let (x, y) = (2 * (node % self.size.width), 2 * (node / self.size.width));
@@ -46,7 +46,7 @@ impl Greys {
         }
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.values)
     }

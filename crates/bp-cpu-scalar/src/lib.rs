@@ -1,8 +1,8 @@
-//! The reference backend: one thread, the label loop innermost, written to be read.
+//! The reference backend: one thread, textbook loops with the label loop innermost, written to be read.
 //!
-//! It is the baseline that all tables compare with, and its labels and messages are what every other backend must give
-//! to the bit. One file a kernel: `match_cost`, `coarsen`, `refine`, `update_messages`, `select_labels`. What the
-//! schedule `sweep` does differently stands beside them in `sweep` and `decode`.
+//! It is the baseline of all speed tables. Every other backend must compute the same labels and messages, to the bit.
+//! Each kernel has a file of its own: `match_cost`, `coarsen`, `refine`, `update_messages` and `select_labels`. The files
+//! `sweep` and `decode` hold the parts that differ under the schedule `sweep`. `grid` computes a message.
 
 mod beliefs;
 mod coarsen;
@@ -22,7 +22,7 @@ mod update_messages;
 
 use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver, memory};
 
-/// The backend, and its one device.
+/// The reference backend, which is its own only device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Scalar;
 
@@ -51,7 +51,7 @@ impl Device for Scalar {
         Ok(Box::new(solver::ScalarSolver::new(plan)?))
     }
 
-    /// Messages have a slot for each direction here, also under `sweep`, where an edge holds only one of the two.
+    /// Every edge has a slot for each direction, even under `sweep`, where it holds only one message at a time.
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         let sweep = plan.settings().schedule == Schedule::Sweep;
         let messages = plan.buffers().into_iter().filter(|buffer| sweep && buffer.name == "messages");

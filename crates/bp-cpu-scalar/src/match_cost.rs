@@ -4,7 +4,7 @@ use bp_core::{DataCost, Size};
 
 use crate::costs::Costs;
 
-/// Computes the costs of grid 0. `scratch` holds one node's labels.
+/// Computes the costs of grid 0. `scratch` has room for one node's labels.
 pub(crate) fn match_cost(data_cost: &DataCost, size: Size, costs: &mut Costs, scratch: &mut [u64]) {
     for node in 0..size.pixels() {
         let (x, y) = (node % size.width, node / size.width);

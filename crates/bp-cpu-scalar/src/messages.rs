@@ -1,23 +1,24 @@
-//! The messages of one grid, and room for the next loop's.
+//! The messages of one grid, and room for those of the next loop.
 
 use bp_core::{Error, Plan, Schedule, Side, memory};
 
-/// Adds a message to one node's sums, a value a label.
+/// Adds a message to the sums of one node, label by label.
+#[inline(always)]
 pub(crate) fn add(message: &[u8], sums: &mut [u8]) {
     sums.iter_mut().zip(message).for_each(|(sum, &message)| *sum = sum.saturating_add(message));
 }
 
-/// What every node last received from each side: `[side][node][label]`, sides in the order of [`Side::ALL`]. The slots
-/// of neighbours that are not there stay 0, and so do those of messages used up under the schedule `sweep`.
+/// The last message that every node received from each side: `[side][node][label]`, sides in the order of [`Side::ALL`].
+/// The slots of missing neighbours are always 0, and so are those of messages that the schedule `sweep` used up.
 pub(crate) struct Messages {
     labels: usize,
     received: [Vec<u8>; 4],
-    /// Where a synchronous loop writes, so that it reads the loop before only; empty under other schedules.
+    /// Where a synchronous loop writes, because it must read only the loop before; empty under other schedules.
     next: [Vec<u8>; 4],
 }
 
 impl Messages {
-    /// Room for `grid` and for every second grid above it.
+    /// Allocates room for `grid` and for every second grid above it.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let volume = || memory::filled("messages", plan.volume(grid), 0);
         let sync = plan.settings().schedule == Schedule::Sync;
@@ -29,7 +30,7 @@ impl Messages {
         })
     }
 
-    /// Sets all messages of a grid of so many nodes to 0.
+    /// Sets all messages of a grid with this many nodes to 0.
     pub(crate) fn clear(&mut self, nodes: usize) {
         let len = nodes * self.labels;
         self.received.iter_mut().chain(&mut self.next).for_each(|volume| {
@@ -37,22 +38,22 @@ impl Messages {
         });
     }
 
-    /// What `node` received from `side`, a value a label.
+    /// The message that `node` received from `side`, one value for each label.
     pub(crate) fn received(&self, node: usize, side: Side) -> &[u8] {
         &self.received[side as usize][node * self.labels..][..self.labels]
     }
 
-    /// What all nodes received from `side`, `[node][label]`.
+    /// The messages that all nodes received from `side`, `[node][label]`.
     pub(crate) fn all_received(&self, side: Side) -> &[u8] {
         &self.received[side as usize]
     }
 
-    /// The slot of what `node` receives from `side`.
+    /// The slot of the message that `node` receives from `side`.
     pub(crate) fn received_mut(&mut self, node: usize, side: Side) -> &mut [u8] {
         &mut self.received[side as usize][node * self.labels..][..self.labels]
     }
 
-    /// The slot of what `node` will receive from `side` in the next loop.
+    /// The slot of the message that `node` receives from `side` in the next loop.
     pub(crate) fn next_mut(&mut self, node: usize, side: Side) -> &mut [u8] {
         &mut self.next[side as usize][node * self.labels..][..self.labels]
     }
@@ -62,7 +63,7 @@ impl Messages {
         std::mem::swap(&mut self.received, &mut self.next);
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         self.received.iter().chain(&self.next).map(memory::bytes).sum()
     }

@@ -19,7 +19,7 @@ pub(crate) fn refine(plan: &Plan, grid: usize, coarse: &Messages, fine: &mut Mes
 }
 
 /// The coarse node whose message from `side` a fine node starts with: its own parent, or the node that its sender's
-/// parent sends to. `None` where the fine node starts with zeros.
+/// parent sends to. `None` if the fine node starts with zeros.
 fn coarse_receiver(plan: &Plan, grid: usize, node: Node, side: Side) -> Option<Node> {
     let sender = plan.neighbour(grid, node, side)?;
     match plan.settings().message_start {

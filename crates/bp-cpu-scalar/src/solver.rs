@@ -1,4 +1,4 @@
-//! The buffers of one plan, and the kernels applied to them.
+//! The buffers of one plan, and the kernels that run on them.
 
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ pub(crate) struct ScalarSolver {
     data_cost: DataCost,
     costs: Vec<Costs>,
     greys: Vec<Greys>,
-    /// Messages of even grids and, where the plan has several grids, of odd ones: only a grid and its next coarser one
-    /// are needed at a time.
+    /// The messages of even grids and, if the plan has several grids, of odd ones: only a grid and the next coarser one are
+    /// needed at a time.
     messages: Vec<Messages>,
     scratch: Vec<u64>,
     h: Vec<u8>,
@@ -64,7 +64,7 @@ impl Solver for ScalarSolver {
         Ok(())
     }
 
-    /// They are where they were.
+    /// Does nothing: the messages are still there.
     fn keep_messages(&mut self) -> Result<(), Error> {
         Ok(())
     }
@@ -72,14 +72,16 @@ impl Solver for ScalarSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];
-            let grid = Grid { plan: &self.plan, index: grid, costs: &self.costs[grid], greys: &self.greys[grid] };
+            let size = self.plan.size(grid);
+            let grid = Grid { plan: &self.plan, index: grid, size, costs: &self.costs[grid], greys: &self.greys[grid] };
             update_messages(&grid, step, messages, &mut self.h);
         }
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        let grid = Grid { plan: &self.plan, index: 0, costs: &self.costs[0], greys: &self.greys[0] };
+        let size = self.plan.image_size();
+        let grid = Grid { plan: &self.plan, index: 0, size, costs: &self.costs[0], greys: &self.greys[0] };
         select_labels(&grid, &self.messages[0], labels, &mut self.h);
         Ok(())
     }

@@ -11,7 +11,7 @@ pub(crate) enum Sums {
 }
 
 impl Sums {
-    /// Room for the costs of `grid`.
+    /// Allocates room for the costs of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let (what, len) = ("data cost sums", plan.volume(grid));
         Ok(match plan.sum_bytes(grid) {
@@ -44,7 +44,7 @@ impl Sums {
         }
     }
 
-    /// Bytes held.
+    /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         match self {
             Self::U8(sums) => memory::bytes(sums),

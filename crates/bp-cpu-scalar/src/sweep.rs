@@ -10,7 +10,7 @@ use crate::{
 
 /// Runs one loop on a grid; see [`bp_core::Schedule::Sweep`]. `h` has room for one message.
 pub(crate) fn sweep(grid: &Grid<'_>, messages: &mut Messages, h: &mut [u8]) {
-    let height = grid.size().height;
+    let height = grid.size.height;
     let mut sweep = Sweep { grid, messages, h };
     for first in (0..height).step_by(BAND_ROWS) {
         sweep.band(first, (first + BAND_ROWS).min(height) - 1);
@@ -41,12 +41,13 @@ impl Sweep<'_> {
 
     /// Sends from the even or the odd nodes of row y to these sides.
     fn send_from(&mut self, y: usize, parity: Parity, sides: &[Side]) {
-        let size = self.grid.size();
+        let size = self.grid.size;
         for node in row_nodes(size, y, parity) {
             for &to in sides {
                 let Some(receiver) = self.grid.neighbour(node, to) else { continue };
-                self.grid.message(self.messages, node, to, receiver, self.h);
-                self.messages.received_mut(size.index(receiver), to.opposite()).copy_from_slice(self.h);
+                self.grid.gather(self.messages, node, to, self.h);
+                let slot = self.messages.received_mut(size.index(receiver), to.opposite());
+                self.grid.send(node, receiver, self.h, slot);
             }
             // Not earlier: a message received from one side is part of those sent to the others.
             for &to in sides {

@@ -11,7 +11,7 @@ use bp_cpu_scalar::Scalar;
 use bp_testkit::{Answer, Case, Oracle, compare, noise_pair, solve};
 use proptest::prelude::*;
 
-fn plan_settings(grids: usize, steps: u32, schedule: Schedule) -> Settings {
+fn plan_settings(grids: u32, steps: u32, schedule: Schedule) -> Settings {
     Settings { grids, steps, schedule, message_start: MessageStart::Receiver, cut: None, coarse_clip: false }
 }
 
@@ -43,7 +43,7 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
     let schedule = prop::sample::select(Schedule::ALL.to_vec());
     let start = prop::sample::select(MessageStart::ALL.to_vec());
     let cut = prop::option::of((0..size.width, 0..size.height, any::<bool>()));
-    (1..5_usize, 1..6_u32, schedule, start, cut, any::<bool>()).prop_map(
+    (1..5_u32, 1..6_u32, schedule, start, cut, any::<bool>()).prop_map(
         |(grids, steps, schedule, start, cut, coarse_clip)| {
             let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
             let grids = if cut.is_some() { 1 } else { grids };
@@ -157,7 +157,7 @@ proptest! {
     /// After a loop of sweeps every edge holds one message, up or towards its even end.
     #[test]
     fn a_sweep_leaves_one_message_an_edge(
-        width in 1..9_usize, height in 1..70_usize, grids in 1..4_usize, seed in any::<u32>(), model in any_model(2..9),
+        width in 1..9_usize, height in 1..70_usize, grids in 1..4_u32, seed in any::<u32>(), model in any_model(2..9),
     ) {
         let pair = noise_pair(width, height, seed.into());
         let [left, right, up, _] = answer(&pair, model, plan_settings(grids, 1, Schedule::Sweep)).messages;

@@ -1,18 +1,18 @@
-//! What goes up to a device and what comes down: pairs, labels and messages in their layouts there.
+//! Uploads and downloads: pairs, labels and messages in the layout of the device.
 
 use bp_core::{Error, Node, Plan, Schedule, Seed, Side, Size, StereoPair, image::APRON};
 
 use crate::{Program, Queue, layout::colour};
 
-/// Bytes of one image in the upload buffer, [`APRON`] rows above and below included, up to the next vector.
+/// The bytes of one image in the upload buffer, with [`APRON`] rows above and below, rounded up to whole vectors.
 pub(crate) fn image_bytes(size: Size) -> u64 {
     (3 * size.width as u64 * (size.height + 2 * APRON) as u64).next_multiple_of(16)
 }
 
-/// Bytes of the seed behind both images: x, y, label and whether there is one.
+/// The bytes of the seed after both images: x, y, label, and whether there is a seed.
 pub(crate) const SEED_BYTES: u64 = 16;
 
-/// Bytes of all labels: two for each node of a row of both colours, up to whole words.
+/// The bytes of all labels: two for each node of both colours of a row, rounded up to whole words.
 pub(crate) fn label_bytes(size: Size) -> u64 {
     2 * size.height as u64 * size.width.div_ceil(8) as u64 * 8
 }
@@ -43,7 +43,7 @@ pub(crate) fn read_labels(size: Size, download: &[u8], labels: &mut [u16]) {
     }
 }
 
-/// Copies out what every node last received from `side`, see [`bp_core::Solver::read_messages`].
+/// Copies the last message that every node received from `side`; see [`bp_core::Solver::read_messages`].
 pub(crate) fn read_messages(
     plan: &Plan,
     program: &Program,
@@ -71,7 +71,7 @@ pub(crate) fn read_messages(
     Ok(())
 }
 
-/// Whether the node's edge on `side` holds the message to it: under [`Schedule::Sweep`] an edge holds one of the two.
+/// Whether the node's edge on `side` holds the message to it. Under [`Schedule::Sweep`] an edge holds only one of two.
 fn is_held(plan: &Plan, node: Node, side: Side) -> bool {
     plan.settings().schedule != Schedule::Sweep
         || match side {

@@ -4,20 +4,20 @@ use std::{fs, io::Write as _, path::PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// Length of a SHA-256 sum.
+/// The length of a SHA-256 sum.
 const SUM_BYTES: usize = 32;
 
-/// More than any pipelines take: another file would only take time and memory.
+/// No pipelines are larger. A larger file is not ours, and reading it would only cost time and memory.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// The folder, where the system has one for such things: a driver that keeps no cache of its own makes the first
-/// start after a reboot slow without it.
+/// The folder, if the system has a cache folder. Without it, the first start after a reboot is slow on drivers that keep no
+/// cache of their own.
 #[must_use]
 pub fn folder() -> Option<PathBuf> {
     Some(dirs::cache_dir()?.join("belief-propagation-stereo"))
 }
 
-/// What was stored under this key, if it is still whole: a driver may not survive reading anything else.
+/// Loads the data stored under this key, if it is intact. Broken data could crash the driver.
 #[must_use]
 pub fn load(key: &str) -> Option<Vec<u8>> {
     let path = folder()?.join(key);
@@ -28,7 +28,7 @@ pub fn load(key: &str) -> Option<Vec<u8>> {
     (Sha256::digest(data).as_slice() == sum).then(|| data.to_vec())
 }
 
-/// Stores `data` under this key, whole or not at all. A cache that cannot be written is not missed.
+/// Stores `data` under this key, completely or not at all. It ignores failures, because nothing depends on the cache.
 pub fn store(key: &str, data: &[u8]) {
     let Some(folder) = folder() else { return };
     let write = || -> std::io::Result<()> {

@@ -1,12 +1,12 @@
-//! A tiny problem with a known answer.
+//! A self-test: a tiny problem with a known answer.
 
 use bp_core::{Device, Driver, Error, Image, MessageStart, Model, Plan, Profile, Schedule, Settings, StereoPair};
 
-/// Solves the pair of [`bp_core::worked_example`] on two grids, and compares with the labels told there: a device that
-/// answers otherwise is not to be trusted with anything larger.
+/// Solves the pair of [`bp_core::worked_example`] on two grids and compares the labels with those given there. A device that
+/// fails this test cannot be trusted with anything larger.
 ///
 /// # Errors
-/// What went wrong.
+/// The reason in words.
 pub fn check(device: &dyn Device) -> Result<(), String> {
     let labels = solve(device).map_err(|error| format!("a tiny problem failed: {error}"))?;
     let expected = [0, 1, 1, 0, 1, 1];

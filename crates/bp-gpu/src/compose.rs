@@ -15,19 +15,19 @@ use recorder::Recorder;
 
 use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout};
 
-/// How many full dispatches a submission holds: few enough for watchdogs, for progress to be told and stopping to be quick,
-/// enough for handing over to take no time in comparison.
+/// The number of full dispatches in a submission: few enough for watchdogs, progress and quick stopping, but enough that
+/// submitting takes no time in comparison.
 const DISPATCHES_PER_SUBMISSION: u64 = 8;
 
-/// Most marks that are kept.
+/// The most marks of a solve.
 const MOST_MARKS: usize = 4096;
 
 impl Program {
     /// The program of a plan.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where a device of these limits cannot run it, [`Error::OutOfMemory`] where its buffers
-    /// need more memory than there is.
+    /// [`Error::Unsupported`] if a device with these limits cannot run it, [`Error::OutOfMemory`] if its buffers need more
+    /// memory than there is.
     pub fn new(plan: &Plan, limits: &Limits) -> Result<Self, Error> {
         let program = compose(plan, limits)?;
         match limits.memory_bytes {
@@ -38,8 +38,8 @@ impl Program {
         }
     }
 
-    /// Bytes that a matcher of this plan takes on a device of these limits, its labels on the host included; those of
-    /// the plan itself where the device cannot run it.
+    /// The bytes that a driver of this plan takes on a device with these limits, including its labels on the host. If the
+    /// device cannot run the plan, the bytes of the plan itself.
     #[must_use]
     pub fn planned_bytes(plan: &Plan, limits: &Limits) -> u64 {
         let labels = 2 * plan.image_size().pixels() as u64;
@@ -47,7 +47,7 @@ impl Program {
     }
 }
 
-/// The program of a plan, whatever memory it needs.
+/// Composes the program of a plan, however much memory it needs.
 fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
     check_sums(plan, limits)?;
     let grids = layout::grids(plan, limits)?;
@@ -65,7 +65,7 @@ fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
     Ok(composer.program())
 }
 
-/// Refuses data cost sums that 32 bits may not hold.
+/// Fails if sums of data costs may exceed 32 bits.
 fn check_sums(plan: &Plan, limits: &Limits) -> Result<(), Error> {
     let model = plan.model();
     let of_image = u64::from(model.profile().max_cost()).saturating_mul(plan.image_size().pixels() as u64);
@@ -77,7 +77,7 @@ fn check_sums(plan: &Plan, limits: &Limits) -> Result<(), Error> {
     Err(Error::Unsupported { device: limits.device.clone(), reason })
 }
 
-/// Refuses buffers that are too large or too many, and rows of more workgroups than a dispatch may have.
+/// Fails if buffers are too large or too many, or if a row needs more workgroups than a dispatch may have.
 fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), Error> {
     let unsupported = |reason| Err(Error::Unsupported { device: limits.device.clone(), reason });
     if limits.bindings < Kernel::most_bindings() {
@@ -89,7 +89,7 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
         let most = limits.workgroups as usize * WORKGROUP as usize;
         return unsupported(format!("a row has {width} pixels and it computes at most {most} at a time"));
     }
-    // Kernels are not given what the host reads and writes.
+    // Kernels never bind the buffers that the host reads and writes.
     let most = |buffer: &Buffer| match buffer.memory {
         Memory::Device => limits.binding_bytes.min(limits.buffer_bytes),
         Memory::Upload | Memory::Download => limits.buffer_bytes,
@@ -135,7 +135,7 @@ impl Composer<'_> {
         }
     }
 
-    /// After how many steps they repeat.
+    /// The number of steps after which their commands repeat.
     fn periods(&self) -> u32 {
         if self.plan.settings().schedule == Schedule::Sweep { 1 } else { 2 }
     }
@@ -149,22 +149,22 @@ impl Composer<'_> {
         bytes
     }
 
-    /// A mark before the first stage, and one behind every call of a kernel that the driver makes.
+    /// One mark before the first stage, and one after every kernel call of the driver.
     fn marks(&self, submission_entries: u64) -> usize {
         let steps = fused_steps(self.plan, submission_entries);
         let updates = self.plan.settings().steps.div_ceil(steps) as usize;
-        // Beyond this device times are not worth their queries.
+        // More device times are not worth their queries.
         (2 + self.plan.grids().saturating_mul(2 + updates)).min(MOST_MARKS)
     }
 
-    /// Buffers of what was sent last on grid 0.
+    /// The buffers of the last messages on grid 0.
     fn last_sent(&self) -> Vec<[[usize; 2]; 4]> {
         let set = self.set(self.plan.settings().steps);
         self.buffers.strips[0].iter().map(|strip| strip.sent[set]).collect()
     }
 }
 
-/// How many steps make up a submission on grid 0.
+/// How many steps on grid 0 fill a submission.
 pub(crate) fn fused_steps(plan: &Plan, submission_entries: u64) -> u32 {
     let steps = submission_entries / plan.updates_per_step(0).max(1);
     u32::try_from(steps).unwrap_or(u32::MAX).max(1)

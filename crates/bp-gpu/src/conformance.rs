@@ -1,7 +1,7 @@
-//! What the tests of both GPU backends share: the suite of [`bp_testkit`] on devices whose limits were lowered, so
-//! that small plans are cut up like large ones, and what else a device has to keep to.
+//! The tests that GPU backends share. They run the suite of [`bp_testkit`], also on devices with lowered limits, so that small
+//! plans are split like large ones, and check further rules for devices.
 //!
-//! `open` opens the backend's first device with changed limits; it gives `None` where there is none, see [`opened`].
+//! `open` opens the first device of the backend with changed limits, or gives `None` if there is none; see [`opened`].
 
 use std::{env, thread, time::Duration};
 
@@ -10,10 +10,10 @@ use bp_testkit::{Case, Difference, compare, compare_at_random, conform, noise_pa
 
 use crate::Limits;
 
-/// The device, or `None` with a line that says why; with `BP_REQUIRE_GPU` in the environment there has to be one.
+/// The device, or `None` after printing why there is none.
 ///
 /// # Panics
-/// Where there has to be one and is none.
+/// If there is no device although `BP_REQUIRE_GPU` is set in the environment.
 #[must_use]
 pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>> {
     match device {
@@ -26,13 +26,13 @@ pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>>
     }
 }
 
-/// The whole suite, and random cases.
+/// Runs the whole suite, and random cases.
 ///
 /// # Errors
 /// The first difference from the reference.
 ///
 /// # Panics
-/// Where the device refuses a plan.
+/// If the device refuses a plan.
 pub fn conforms(
     reference: &dyn Device,
     open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
@@ -43,14 +43,14 @@ pub fn conforms(
     Ok(())
 }
 
-/// Every algorithm under every schedule, on an image of several bands that is cut into strips, with dispatches of a few
-/// rows and submissions of a few dispatches; then random cases, each with buffers as small as it can do with.
+/// Runs every algorithm under every schedule on an image of several bands, with several strips, dispatches of a few rows and
+/// submissions of a few dispatches. Then runs random cases, each with the smallest buffers that suffice.
 ///
 /// # Errors
 /// The first difference from the reference.
 ///
 /// # Panics
-/// Where the device refuses many plans.
+/// If the device refuses many plans.
 pub fn conforms_cut_up(
     reference: &dyn Device,
     open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
@@ -80,13 +80,13 @@ fn banded_cases() -> Vec<Case> {
     plans.filter_map(plan).map(|plan| Case { pair: pair.clone(), plan }).collect()
 }
 
-/// Solvers share a device's queue and its kernels.
+/// Runs several plans at the same time. They share the device's queue and its kernels.
 ///
 /// # Errors
 /// The first difference from the reference.
 ///
 /// # Panics
-/// Where a thread of the device panics.
+/// If a thread of the device panics.
 pub fn runs_plans_at_once(
     reference: &dyn Device,
     open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
@@ -100,10 +100,10 @@ pub fn runs_plans_at_once(
     })
 }
 
-/// What a device cannot run is refused when it is prepared or opened, as the kind of error that it is.
+/// Checks that plans and devices beyond the limits fail with the right kind of error, when they are prepared or opened.
 ///
 /// # Panics
-/// Where it is not.
+/// If they do not.
 pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Error>) {
     let Some(plan) = banded_cases().pop().map(|case| case.plan) else { return };
     let prepare = |change: &dyn Fn(&mut Limits)| {
@@ -117,10 +117,10 @@ pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Er
     assert!(matches!(few, Some(Error::Unavailable { .. })), "{few:?}");
 }
 
-/// By a device's own clock, the stages of a solve fill most of the time that the host waits, and no more.
+/// Checks device times: the stages of a solve fill most of the time that the host waits, and no more.
 ///
 /// # Panics
-/// Where they do not.
+/// If they do not.
 pub fn tells_times(open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>) {
     let Some(device) = open(&|_| ()) else { return };
     let pair = noise_pair(150, 100, 3);

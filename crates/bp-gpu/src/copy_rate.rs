@@ -1,4 +1,4 @@
-//! How fast a device copies its own memory: the measure of its kernels.
+//! Measures how fast a device copies its own memory: an upper bound for its kernels.
 
 use std::time::{Duration, Instant};
 
@@ -6,12 +6,12 @@ use bp_core::Error;
 
 use crate::{Buffer, Command, Limits, Memory, Program, Queue, Segment};
 
-/// Bytes copied at a time where buffers may be so large: more than any cache holds.
+/// The bytes of a copy, if buffers may be so large: more than any cache holds.
 const BYTES: u64 = 256 << 20;
-/// Copies of which the median is taken, after one that is not timed.
+/// The number of copies of which the median is taken, after one that warms up.
 const COPIES: usize = 9;
 
-/// Bytes a second, read and written ones together; `prepare` makes a program ready on the device.
+/// Measures how many bytes a second a device reads and writes, together. `prepare` prepares a program on the device.
 ///
 /// # Errors
 /// Those of the device.
@@ -31,7 +31,7 @@ pub fn copy_rate(
     Ok(2.0 * bytes as f64 / times[COPIES / 2].as_secs_f64().max(f64::MIN_POSITIVE))
 }
 
-/// Time of a copy by the device's clock, or the host's where it has none.
+/// The time of a copy by the device's clock, or by the host's if it has none.
 fn time(queue: &mut dyn Queue) -> Result<Duration, Error> {
     queue.begin(&mut |_| ())?;
     let start = Instant::now();

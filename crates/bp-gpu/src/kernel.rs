@@ -1,8 +1,8 @@
-//! The kernels: one WGSL file each.
+//! The kernels. Each has a WGSL file of its own.
 
 use std::fmt;
 
-/// Invocations of a workgroup; the WGSL files say the same.
+/// The invocations of a workgroup. The WGSL files contain the same number.
 pub const WORKGROUP: u32 = 64;
 
 /// What a kernel does with a buffer.
@@ -19,13 +19,13 @@ use Access::{Read, Write};
 /// A kernel, named like its file and its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
-    /// What the profile compares, of every pixel of one image; part of the stage `match_cost`.
+    /// The features of every pixel of one image, which the profile compares; part of the stage `match_cost`.
     Features,
-    /// Grey values of the left image, where there are weak edges; part of the stage `match_cost`.
+    /// Grey values of the left image, if the model has weak edges; part of the stage `match_cost`.
     Greys,
     /// Data costs of the image.
     MatchCost,
-    /// Grey values of a coarser grid, where there are weak edges; part of the stage `coarsen`.
+    /// Grey values of a coarser grid, if the model has weak edges; part of the stage `coarsen`.
     CoarsenGreys,
     /// Data costs of a coarser grid.
     Coarsen,
@@ -65,7 +65,7 @@ impl Kernel {
         }
     }
 
-    /// The whole WGSL text: what all kernels share, what some do, then the kernel's own.
+    /// The complete WGSL text: the part that all kernels share, the parts that some share, then the kernel's own.
     #[must_use]
     pub fn source(self) -> String {
         let own = match self {
@@ -87,8 +87,8 @@ impl Kernel {
         [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
     }
 
-    /// What it does with the storage buffers bound to group 0 from binding 1 on, in order. Binding 0 is one block of
-    /// the parameters, at a dynamic offset, which it reads.
+    /// How it accesses the storage buffers of group 0, from binding 1 on. Binding 0 is a block of the parameters at a dynamic
+    /// offset, which it reads.
     #[must_use]
     pub fn bindings(self) -> &'static [Access] {
         match self {
@@ -101,19 +101,19 @@ impl Kernel {
         }
     }
 
-    /// Most storage buffers that any kernel binds, the parameters included.
+    /// The most storage buffers that a kernel binds, including the parameters.
     #[must_use]
     pub fn most_bindings() -> u32 {
         Self::ALL.iter().map(|kernel| 1 + kernel.bindings().len() as u32).max().unwrap_or(0)
     }
 }
 
-/// What is compiled as one: a kernel and the values of its pipeline-overridable constants.
+/// A kernel with the values of its pipeline-overridable constants. It is compiled as one unit.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Pipeline {
     /// The kernel.
     pub kernel: Kernel,
-    /// Name and value of each constant that its WGSL text declares with `override`.
+    /// The name and value of each constant that its WGSL text declares with `override`.
     pub constants: Vec<(&'static str, u32)>,
 }
 

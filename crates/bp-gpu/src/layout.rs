@@ -1,4 +1,4 @@
-//! Where the values of a plan lie in memory.
+//! How the values of a plan lie in memory.
 
 use std::ops::Range;
 
@@ -6,14 +6,14 @@ use bp_core::{BAND_ROWS, Error, Node, Plan, Schedule, Size};
 
 use crate::Limits;
 
-/// Nodes of one colour whose bytes share a word.
+/// The number of nodes of one colour whose bytes share a word.
 const WORD_NODES: usize = 4;
-/// Labels that share a vector.
+/// The number of labels that share a vector.
 const QUAD_LABELS: usize = 4;
-/// Bytes of a vector: four labels at four nodes.
+/// The bytes of a vector: four labels at four nodes.
 const VECTOR_BYTES: u64 = 16;
 
-/// Rows of a grid whose planes are buffers of their own, so that no buffer is larger than a device allows.
+/// Rows of a grid with buffers of their own, so that no buffer is larger than a device allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Strip {
     /// First row.
@@ -30,7 +30,7 @@ pub(crate) struct Grid {
     pub(crate) words: usize,
     /// Quads of labels.
     pub(crate) quads: usize,
-    /// Bytes of a sum kept for the coarser grid: 0 where none are kept, 2 or 4.
+    /// The bytes of a sum kept for the coarser grid: 2, 4, or 0 if none are kept.
     pub(crate) sum_bytes: usize,
     pub(crate) strips: Vec<Strip>,
 }
@@ -49,7 +49,7 @@ impl Grid {
         (self.quads as u64).saturating_mul(self.words as u64).saturating_mul(VECTOR_BYTES)
     }
 
-    /// Bytes of a strip's plane, one row above and one below included.
+    /// The bytes of a strip's plane, including one row above and one below.
     pub(crate) fn plane_bytes(&self, strip: Strip) -> u64 {
         self.row_bytes().saturating_mul(strip.rows as u64 + 2)
     }
@@ -59,7 +59,7 @@ impl Grid {
         self.plane_bytes(strip).saturating_mul(self.sum_bytes as u64)
     }
 
-    /// Bytes of the grey values of all nodes: a byte for each node of a row of both colours, up to whole words.
+    /// The bytes of all grey values: one for each node of both colours of a row, rounded up to whole words.
     pub(crate) fn grey_bytes(&self) -> u64 {
         2 * (self.words * WORD_NODES) as u64 * self.size.height as u64
     }
@@ -80,7 +80,7 @@ impl Grid {
         self.strips.iter().rposition(|strip| strip.first <= y).unwrap_or(0)
     }
 
-    /// Where in a strip's plane the byte of a node's label lies; the node's colour says in which plane.
+    /// The position of a label's byte of a node in a plane of a strip. The node's colour selects the plane.
     pub(crate) fn byte(&self, strip: Strip, node: Node, label: usize) -> usize {
         let Node { x, y } = node;
         let node = x / 2;
@@ -94,11 +94,11 @@ pub(crate) fn colour(node: Node) -> usize {
     usize::from(!node.is_even())
 }
 
-/// The grids of a plan, cut into strips where a buffer would be too large: those of a grid begin where two rows of the
-/// next finer one's begin, or, under [`Schedule::Sweep`], also where a band begins.
+/// The grids of a plan. Grids whose buffers would be too large are cut into strips. A strip begins at an even row of the
+/// next finer grid's strip; under [`Schedule::Sweep`] it begins with a band, too.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where the fewest rows of a strip are too large.
+/// [`Error::Unsupported`] if the fewest rows of a strip are too large.
 pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
     let mut grids: Vec<_> = (0..plan.grids()).map(|grid| Grid::new(plan, grid)).collect();
     let bytes = limits.binding_bytes.min(limits.buffer_bytes);
@@ -117,7 +117,7 @@ pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
     Ok(grids)
 }
 
-/// Rows of grid 0 in a strip, when the grids `cut` are to be cut.
+/// The rows of grid 0 in a strip, if the grids `cut` are cut.
 fn strip_rows(plan: &Plan, grids: &[Grid], cut: Range<usize>, bytes: u64) -> usize {
     let sweep = plan.settings().schedule == Schedule::Sweep;
     let unit = if sweep { BAND_ROWS } else { 2 } << (cut.end - 1);

@@ -1,7 +1,7 @@
-//! What both GPU backends do with a plan.
+//! What the GPU backends share: it turns a plan into a [`Program`] of buffers, pipelines and commands.
 //!
-//! Both GPU backends run the same [`Program`]: buffers, pipelines and commands in terms that any API has. A backend
-//! only allocates, compiles, records and submits, which is what [`Queue`] asks for; [`GpuSolver`] does the rest.
+//! A program uses terms that every GPU API has. A backend implements [`Queue`]: it allocates, compiles, records and submits.
+//! [`GpuSolver`] does the rest. The WGSL text of the kernels is in `bp-shaders`.
 
 mod answer;
 pub mod cache;

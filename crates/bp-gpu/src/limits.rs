@@ -1,4 +1,4 @@
-//! What a device allows.
+//! The limits of a device.
 
 use bp_core::DeviceKind;
 
@@ -7,22 +7,22 @@ use bp_core::DeviceKind;
 pub struct Limits {
     /// Name of the device, for error messages.
     pub device: String,
-    /// Most bytes of a buffer that a kernel can be given.
+    /// The most bytes of a buffer that a kernel can bind.
     pub binding_bytes: u64,
-    /// Most bytes of a buffer.
+    /// The most bytes of a buffer.
     pub buffer_bytes: u64,
-    /// Most storage buffers that a kernel can be given.
+    /// The most storage buffers that a kernel can bind.
     pub bindings: u32,
-    /// Most workgroups of a dispatch.
+    /// The most workgroups of a dispatch.
     pub workgroups: u32,
-    /// Bytes of memory that buffers may take, where that is known.
+    /// The bytes that all buffers may take, if known.
     pub memory_bytes: Option<u64>,
-    /// Message entries after which a dispatch is split, so that none keeps the device busy for long.
+    /// The message entries after which a dispatch is split, so that none keeps the device busy for long.
     pub dispatch_entries: u64,
 }
 
 impl Limits {
-    /// Those of a device that allows nearly anything: to look at programs where there is none.
+    /// The limits of an imaginary device that allows nearly everything, for looking at programs without a device.
     #[must_use]
     pub fn roomy() -> Self {
         Self {
@@ -36,9 +36,9 @@ impl Limits {
         }
     }
 
-    /// How many message entries a device of this kind is sure to compute within 0.2 s: the slowest move some 10 GB/s, and
-    /// an entry moves four bytes or less; a software rasteriser takes about a nanosecond an entry on two cores, ten
-    /// on a slow one.
+    /// How many message entries a device of this kind computes within 0.2 s at the very least. The slowest GPUs move 10 GB/s,
+    /// and an entry moves four bytes or less. A software rasteriser takes about 1 ns for an entry on two cores, and 10 ns
+    /// on a slow core.
     #[must_use]
     pub fn dispatch_entries(kind: DeviceKind) -> u64 {
         match kind {

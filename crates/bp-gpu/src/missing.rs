@@ -1,8 +1,8 @@
-//! What to tell somebody whose machine lacks what Vulkan needs.
+//! Messages for machines that lack something Vulkan needs.
 
 use std::env;
 
-/// No library to call.
+/// The loader is missing.
 #[must_use]
 pub fn loader() -> String {
     "there is no Vulkan loader, the library libvulkan.so.1: install libvulkan1 (Debian, Ubuntu), vulkan-loader (Fedora) or \
@@ -10,7 +10,7 @@ pub fn loader() -> String {
         .to_owned()
 }
 
-/// No driver that the library finds.
+/// The loader finds no driver.
 #[must_use]
 pub fn driver() -> String {
     let name = |name| Some((name, env::var_os(name).filter(|files| !files.is_empty())?));
@@ -22,7 +22,7 @@ pub fn driver() -> String {
     format!("the Vulkan loader finds no driver: {name} lets it look for \"{}\" only", files.display())
 }
 
-/// A device that is not among the `count` that there are.
+/// A device index is not among the `count` devices.
 #[must_use]
 pub fn device(count: usize) -> String {
     let are = if count == 1 { "is 1 device" } else { &format!("are {count} devices") };

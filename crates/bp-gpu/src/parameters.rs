@@ -2,10 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Declares the struct and, beside it, the names of its fields in order, which a test holds against the WGSL struct.
+/// Declares the struct, and a list of its fields that a test compares with the WGSL struct.
 macro_rules! parameters {
     ($($(#[$doc:meta])* $field:ident: $type:ty,)*) => {
-        /// What a dispatch is told, see the WGSL struct of the same name in `shared.wgsl`.
+        /// The parameters of a dispatch. `shared.wgsl` has a struct of the same name.
         #[repr(C)]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
         pub struct Parameters {
@@ -13,7 +13,7 @@ macro_rules! parameters {
         }
 
         impl Parameters {
-            /// Names and offsets in bytes of the fields, in order.
+            /// The names and byte offsets of the fields, in order.
             pub const FIELDS: &[(&str, usize)] =
                 &[$((stringify!($field), std::mem::offset_of!(Parameters, $field)),)*];
         }
@@ -47,17 +47,17 @@ parameters! {
     truncation: u32,
     /// The least of both.
     step: u32,
-    /// What data costs are clipped at.
+    /// The value at which data costs are clipped.
     clip: u32,
     /// Disparity of label 0.
     min_disparity: i32,
     /// Data cost of the labels that fill the last quad.
     padding_cost: u32,
-    /// First column behind the cut, or 0.
+    /// First column right of the cut, or 0.
     cut_x: u32,
-    /// First row behind the cut, or 0.
+    /// First row below the cut, or 0.
     cut_y: u32,
-    /// Sides to send to, a bit each.
+    /// The sides to send to, one bit each.
     sends: u32,
     /// The one side whose messages are refined.
     side: u32,

@@ -1,4 +1,4 @@
-//! What a device does for a plan: buffers, pipelines, and the commands of every stage, in terms that any API has.
+//! The program of a plan: buffers, pipelines, and the commands of every stage, in terms that every GPU API has.
 
 use std::ops::Range;
 
@@ -6,39 +6,39 @@ use bp_core::Side;
 
 use crate::{Kernel, Parameters, Pipeline, layout::Grid};
 
-/// Where a buffer lies and what reaches it besides kernels.
+/// Where a buffer lies, and who accesses it besides kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// On the device, cleared once when it is made; copied from and to.
+    /// On the device. It is cleared once, when it is made, and copied from and to.
     Device,
-    /// Written by the host before every solve, copied from.
+    /// The host writes it before every solve. It is copied from.
     Upload,
-    /// Copied to, read by the host after every solve.
+    /// It is copied to. The host reads it after every solve.
     Download,
 }
 
 /// A buffer of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buffer {
-    /// What it holds.
+    /// The name of its contents.
     pub name: &'static str,
     /// Its size in bytes, a multiple of 256, so that buffers side by side leave no gaps.
     pub bytes: u64,
-    /// Where it lies.
+    /// The memory it lies in.
     pub memory: Memory,
 }
 
-/// The buffers that a kernel is given from binding 1 on, as indices into [`Program::buffers`]. None of them is both read and
-/// written under two bindings.
+/// The buffers that a kernel binds from binding 1 on, as indices into [`Program::buffers`]. No buffer is bound both to be
+/// read and to be written.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BindGroup {
-    /// The kernel, whose [`Kernel::bindings`] say what it does with them.
+    /// The kernel. Its [`Kernel::bindings`] say how it accesses them.
     pub kernel: Kernel,
     /// The buffers.
     pub buffers: Vec<usize>,
 }
 
-/// Something that a device does. Commands between two barriers do not depend on each other.
+/// A command. Commands between two barriers do not depend on each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Runs a kernel.
@@ -47,7 +47,7 @@ pub enum Command {
         pipeline: usize,
         /// Index into [`Program::bind_groups`].
         bind_group: usize,
-        /// Where in the parameters its block begins, in bytes.
+        /// The offset of its block of parameters, in bytes.
         parameters: u32,
         /// Number of workgroups, all in one dimension.
         workgroups: u32,
@@ -70,27 +70,27 @@ pub enum Command {
         /// Its index.
         buffer: usize,
     },
-    /// What comes after sees what came before: kernels and copies alike.
+    /// Commands after the barrier see what commands before it wrote, kernels and copies alike.
     Barrier,
 }
 
-/// Commands that are recorded together. What one segment wrote, the next one sees, as if a [`Command::Barrier`] lay between
-/// them.
+/// Commands that are recorded together. Each segment sees what the segments before it wrote, as if a [`Command::Barrier`] were
+/// between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// The commands.
     pub commands: Vec<Command>,
-    /// Message entries that it computes, or as many as its work is worth.
+    /// The message entries that it computes, or an equivalent for other work.
     pub(crate) entries: u64,
-    /// Bytes that it has to read and write at least, but for what segments of the same part count.
+    /// The bytes that it has to read and write at least, without those counted by other segments of its part.
     pub(crate) moved_bytes: u64,
 }
 
-/// All that a device does for a plan.
+/// Everything that a device does for a plan.
 #[derive(Clone, Debug)]
 pub struct Program {
-    /// The buffers. The first holds the parameters, its contents are [`Program::parameters`]; the second is the one of
-    /// [`Memory::Upload`], the third the one of [`Memory::Download`]; all others are [`Memory::Device`].
+    /// The buffers. The first holds [`Program::parameters`]. The second is the one of [`Memory::Upload`], the third the one of
+    /// [`Memory::Download`]. All others are [`Memory::Device`].
     pub buffers: Vec<Buffer>,
     /// The parameters of all dispatches: blocks of [`Program::PARAMETER_BYTES`], each at a multiple of 256 bytes.
     pub parameters: Vec<u8>,
@@ -100,21 +100,21 @@ pub struct Program {
     pub bind_groups: Vec<BindGroup>,
     /// The segments.
     pub segments: Vec<Segment>,
-    /// Most marks of a solve.
+    /// The most marks of a solve.
     pub marks: usize,
-    /// After how many steps on a grid they repeat.
+    /// The number of steps on a grid after which their segments repeat.
     pub(crate) periods: u32,
     /// The segments of each [`Part`], by [`Program::segments_of`].
     pub(crate) parts: Vec<Range<usize>>,
-    /// Most message entries of a submission; no segment has more, unless one row has.
+    /// The most message entries of a submission. No segment has more, unless a single row has.
     pub(crate) submission_entries: u64,
-    /// Where values lie.
+    /// The layout of each grid.
     pub(crate) grids: Vec<Grid>,
     /// Indices of the buffers of grid 0's last messages, `[strip][side][colour]`.
     pub(crate) last_sent: Vec<[[usize; 2]; 4]>,
 }
 
-/// A part of a program: what one call of the driver asks for, or one step of it.
+/// A part of a program: the work of one kernel call of the driver, or of one step of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     MatchCost,
@@ -156,7 +156,7 @@ impl Program {
         self.parts[index].clone()
     }
 
-    /// Indices of the buffers of what the nodes of colour 0 and 1 in a strip of grid 0 sent last.
+    /// The indices of the buffers with the last messages that nodes of colour 0 and 1 in a strip of grid 0 sent.
     pub(crate) fn last_sent(&self, strip: usize, side: Side) -> [usize; 2] {
         self.last_sent[strip][side as usize]
     }

@@ -1,4 +1,4 @@
-//! A prepared plan on a device of any API.
+//! The solver of all GPU backends.
 
 use std::{ops::Range, time::Duration};
 
@@ -6,22 +6,21 @@ use bp_core::{Error, Plan, Schedule, Seed, Settings, Side, Solver, Stage, Stereo
 
 use crate::{Program, Queue, answer, compose, program::Part};
 
-/// Runs the program of a plan on a queue, segment after segment, and hands over what has gathered whenever that is
-/// enough work.
+/// Runs the program of a plan on a queue. It appends segments and submits them whenever they are enough work.
 pub struct GpuSolver {
     plan: Plan,
     program: Program,
     queue: Box<dyn Queue>,
     /// The stage of the segments between each mark and the next.
     stages: Vec<Stage>,
-    /// Message entries appended and not submitted.
+    /// The message entries that are appended but not submitted.
     pending: u64,
     times: Option<[Duration; Stage::ALL.len()]>,
     moved_bytes: [u64; Stage::ALL.len()],
 }
 
 impl GpuSolver {
-    /// A solver that runs `program`, which was made for `plan` and is ready on `queue`.
+    /// Makes a solver that runs `program`. It was made for `plan` and prepared on `queue`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -39,7 +38,7 @@ impl GpuSolver {
         })
     }
 
-    /// Appends parts of one stage, and a mark behind them; what has gathered is handed over before it gets too much.
+    /// Appends parts of one stage, then a mark. It submits before the appended work gets too large.
     fn run(&mut self, stage: Stage, parts: impl Iterator<Item = Part>) -> Result<(), Error> {
         for index in parts.flat_map(|part| self.program.segments_of(part)) {
             let segment = &self.program.segments[index];
@@ -77,8 +76,8 @@ impl Solver for GpuSolver {
         self.run(Stage::Refine, [Part::Refine(grid)].into_iter())
     }
 
-    /// They are where they were, and the first step reads them there, except that of an odd number of synchronous loops
-    /// the last one writes what the next first one would write too.
+    /// The messages are still where the first step reads them. After an odd number of synchronous loops they are not: the
+    /// last loop wrote to the buffers that the first loop would write to.
     fn keep_messages(&mut self) -> Result<(), Error> {
         let Settings { schedule, steps, .. } = *self.plan.settings();
         if schedule == Schedule::Sync && steps % 2 == 1 {

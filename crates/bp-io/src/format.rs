@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use crate::Error;
+use crate::{Error, write::is_stream};
 
 /// How a map is stored, by the file's ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,7 @@ impl MapFormat {
             Some("png") => Ok(Self::Png16),
             Some("tif" | "tiff") => Ok(Self::Tiff),
             Some("npy") => Ok(Self::Npy),
+            None if is_stream(path) => Ok(Self::Pfm),
             _ => Err(Error::request(path, &format!("a map ends in {}", Self::ENDINGS))),
         }
     }

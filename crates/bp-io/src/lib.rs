@@ -45,4 +45,4 @@ pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};
 pub use ply::write_points;
 pub use raster::Raster;
 pub use sidecar::{Origin, remove_sidecar, sidecar_of, write_picture_sidecar, write_sidecar};
-pub use write::{Files, check_distinct, check_new, create_folder, resolved};
+pub use write::{Files, check_distinct, check_new, create_folder, is_stream, resolved};

@@ -51,6 +51,9 @@ impl Files {
         path: &Path,
         write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
     ) -> Result<(), Error> {
+        if is_stream(path) {
+            return stream(path, write);
+        }
         // A link stays; what it points to is replaced.
         let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
         self.filled_beside(path, write)?.persist(path).map_err(|failed| Error::writing(path, &failed.error))?;
@@ -92,8 +95,8 @@ impl Files {
         if path.is_dir() {
             return Err(Error::writing(path, &"it is a folder"));
         }
-        if path.exists() && !path.is_file() {
-            return Err(Error::writing(path, &"something is there that is no file"));
+        if is_stream(path) {
+            return Ok(());
         }
         self.temporary_beside(path).map(drop)
     }
@@ -127,6 +130,20 @@ impl Files {
         let failed = |error: std::io::Error| Error::writing(path, &error.kind());
         builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
     }
+}
+
+/// Whether something is at `path` that is neither a file nor a folder, such as `/dev/null` or a pipe: it is written to in
+/// place.
+#[must_use]
+pub fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
+}
+
+fn stream<E: Display>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), Error> {
+    let failed = |error: &dyn Display| Error::writing(path, error);
+    let mut file = BufWriter::new(fs::OpenOptions::new().write(true).open(path).map_err(|e| failed(&e))?);
+    write(&mut file).map_err(|e| failed(&e))?;
+    file.flush().map_err(|e| failed(&e))
 }
 
 /// Fails where writing `output` would overwrite `other`; `what` says so in words.

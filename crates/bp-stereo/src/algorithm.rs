@@ -3,7 +3,7 @@
 use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, description::Derived};
+use crate::Error;
 
 /// What is run. The first is ours, the others are those of Doan Van Tuan's PhD thesis (2019).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,7 +13,7 @@ pub enum Algorithm {
     Sweep {
         /// Number of grids; none for five, or fewer where the image is small.
         #[serde(default)]
-        grids: Option<usize>,
+        grids: Option<u32>,
         /// Loops on each grid.
         #[serde(default = "one")]
         loops: u32,
@@ -105,7 +105,7 @@ impl Default for Loops {
 #[serde(default, deny_unknown_fields)]
 pub struct Hierarchy {
     /// Number of grids; none for the thesis's floor(log2 m), m being the width. Loops must then count on each grid.
-    pub grids: Option<usize>,
+    pub grids: Option<u32>,
     /// By which side finer grids take over messages.
     pub message_start: MessageStart,
     /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].
@@ -116,6 +116,15 @@ impl Default for Hierarchy {
     fn default() -> Self {
         Self { grids: None, message_start: MessageStart::Receiver, coarse_clip: false }
     }
+}
+
+/// What an algorithm derived its loops from, where it did.
+#[derive(Default)]
+pub(crate) struct Derived {
+    /// Loops asked for.
+    pub(crate) k: Option<u32>,
+    /// What they were divided by.
+    pub(crate) z: Option<u32>,
 }
 
 /// What the thesis's Z divides loops by where nothing else is said.

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use job::Job;
 pub use record::PairTimes;
-use run::Run;
+use run::{Run, Warned};
 use serde::{Deserialize, Serialize};
 pub use shard::Shard;
 pub use summary::{Failed, Summary};
@@ -101,7 +101,8 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
     due.iter().try_for_each(|job| job.check(making))?;
-    let failures = match_due(&Run { options, making, settings_sha256: &settings_sha256, watch }, &due)?;
+    let failures =
+        match_due(&Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() }, &due)?;
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
     summary.write(&making.files, &summary_path(&options.output, shard))?;
     Ok(summary)

@@ -173,6 +173,13 @@ pub struct Errors {
 }
 
 impl Stages {
+    /// From the stages in their order.
+    #[must_use]
+    pub fn new(ms: [f64; 5]) -> Self {
+        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] = ms;
+        Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms }
+    }
+
     /// The stages in their order.
     #[must_use]
     pub fn in_order(&self) -> [f64; 5] {
@@ -202,24 +209,11 @@ impl From<&bp_core::DeviceInfo> for Device {
     }
 }
 
-/// What an algorithm derived its loops from, where it did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Derived {
-    /// Loops asked for.
-    pub k: Option<u32>,
-    /// What they were divided by.
-    pub z: Option<u32>,
-}
-
 impl Settings {
-    /// Describes a plan before it runs; `device` tells how many bytes it will take there.
+    /// Describes a plan before it runs. `device` says how many bytes it will allocate for it. `k` and `z` are for the caller
+    /// to fill in: a plan does not know which numbers its loops came from.
     #[must_use]
-    pub fn new(
-        plan: &bp_core::Plan,
-        device: Option<&dyn bp_core::Device>,
-        algorithm: bp_core::Algorithm,
-        derived: Derived,
-    ) -> Self {
+    pub fn new(plan: &bp_core::Plan, device: Option<&dyn bp_core::Device>, algorithm: bp_core::Algorithm) -> Self {
         let (model, settings) = (plan.model(), plan.settings());
         Self {
             profile: model.profile().name().to_owned(),
@@ -229,9 +223,9 @@ impl Settings {
             truncation: model.truncation(),
             edge_threshold: model.weak_edges(),
             algorithm: algorithm.name().to_owned(),
-            k: derived.k,
-            z: derived.z,
-            grids: settings.grids,
+            k: None,
+            z: None,
+            grids: settings.grids as usize,
             steps_per_grid: settings.steps,
             schedule: settings.schedule.name().to_owned(),
             message_start: settings.message_start.name().to_owned(),
@@ -247,21 +241,22 @@ impl Settings {
 impl Finish {
     /// What a map goes through; `None` where that is nothing.
     #[must_use]
-    pub fn of(finish: bp_core::maps::Finish) -> Option<Self> {
-        let bp_core::maps::Finish { check, speckles, fill, median, subpixel } = finish;
-        (finish != bp_core::maps::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
+    pub fn of(finish: bp_core::finish::Finish) -> Option<Self> {
+        let bp_core::finish::Finish { check, speckles, fill, median, subpixel } = finish;
+        (finish != bp_core::finish::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
     }
 }
 
-/// All clocks of a solve.
+/// The stages of a solve by all clocks.
 #[must_use]
 pub fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
-    let clocked = |clock, stages: [Duration; 5]| {
-        let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] =
-            stages.map(|time| 1000.0 * time.as_secs_f64());
-        let stages = Stages { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms };
-        Clocked { clock, stages }
-    };
+    let clocked = |clock, stages: [Duration; 5]| Clocked { clock, stages: Stages::new(stages.map(milliseconds)) };
     let device = times.device.map(|stages| clocked(Clock::Device, stages));
     std::iter::once(clocked(Clock::Wall, times.wall)).chain(device).collect()
+}
+
+/// A time in milliseconds.
+#[must_use]
+pub fn milliseconds(time: Duration) -> f64 {
+    1000.0 * time.as_secs_f64()
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bp_core::{
     DisparityMap, StereoPair, Times,
-    maps::{self, Finish},
+    finish::{self, Finish},
 };
 
 use crate::{Error, Options};
@@ -29,7 +29,7 @@ impl AnswerTimes {
 /// A finished map.
 pub(crate) struct Finished {
     pub(crate) map: DisparityMap,
-    /// See [`maps::confidence`]; 0 where the check or the speckle filter made the disparity unknown. None unless asked for.
+    /// See [`finish::confidence`]; 0 where the check or the speckle filter made the disparity unknown. None unless asked for.
     pub(crate) confidence: Option<Vec<f32>>,
     pub(crate) times: AnswerTimes,
 }
@@ -51,7 +51,7 @@ pub(crate) fn finished(
     let right = options.needs_right().then(|| matched(&pair.mirrored())).transpose()?.map(DisparityMap::mirrored);
     let left = matched(pair)?;
     let trust = right.as_ref().filter(|_| options.confidence);
-    let mut confidence = trust.map(|right| maps::confidence(&left, right)).transpose()?;
+    let mut confidence = trust.map(|right| finish::confidence(&left, right)).transpose()?;
     let finish: Finish = options.finish();
     let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
     let judged = judge.apply(left, right.as_ref())?;

@@ -2,7 +2,7 @@
 
 use bp_core::{
     Profile,
-    maps::{Finish, MEDIANS},
+    finish::{Finish, MEDIANS},
 };
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bp_core::{Calibration, DisparityMap, Image, Plan, Size, depth_map, points};
 use bp_io::{
     Files, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
-    remove_sidecar, sidecar_of, write_picture_sidecar, write_points, write_sidecar,
+    is_stream, remove_sidecar, sidecar_of, write_picture_sidecar, write_points, write_sidecar,
 };
 
 use crate::{Error, Watch, description};
@@ -54,6 +54,11 @@ pub struct Content<'a> {
 }
 
 impl Making {
+    /// Whether a sidecar is written beside this file.
+    fn has_sidecar(&self, path: &Path) -> bool {
+        !self.no_sidecar && !is_stream(path)
+    }
+
     /// The geometry of images of some size, where an option gives one.
     fn calibration(&self, size: Size) -> Result<Option<Calibration>, Error> {
         Ok(self.geometry.as_ref().map(|geometry| geometry.of(size)).transpose()?)
@@ -135,7 +140,8 @@ impl Outputs {
     /// All files that are written.
     #[must_use]
     pub fn paths(&self, making: &Making) -> Vec<PathBuf> {
-        let sidecars = self.maps().chain(self.picture.as_deref()).filter(|_| !making.no_sidecar).map(sidecar_of);
+        let sidecars =
+            self.maps().chain(self.picture.as_deref()).filter(|path| making.has_sidecar(path)).map(sidecar_of);
         let files = [&self.map, &self.picture, &self.depth, &self.points, &self.confidence].into_iter().flatten();
         files.cloned().chain(sidecars).collect()
     }
@@ -173,7 +179,7 @@ impl Writer<'_> {
         }
         let files = &self.making.files;
         raster.write(files, path)?;
-        if !self.making.no_sidecar {
+        if self.making.has_sidecar(path) {
             write_sidecar(files, path, raster, &self.origin(calibration))?;
         }
         Ok(())
@@ -183,7 +189,7 @@ impl Writer<'_> {
         remove_sidecar(path)?;
         let Making { picture, files, .. } = self.making;
         picture.write(files, path, self.content.map)?;
-        if !self.making.no_sidecar {
+        if self.making.has_sidecar(path) {
             let raster = Raster::disparities(self.content.map);
             write_picture_sidecar(files, path, &raster, picture.colours, &self.origin(None))?;
         }

@@ -5,7 +5,7 @@ use bp_core::{
     survey::{DisparityRange, SeenDisparities, Survey},
 };
 
-use crate::{Error, Labels, Options, description, devices::Opened};
+use crate::{Error, Labels, Options, algorithm::Derived, description, devices::Opened};
 
 /// The plan for images of this size with these labels.
 pub(crate) fn plan(options: &Options, size: Size, range: DisparityRange) -> Result<Plan, Error> {
@@ -50,11 +50,13 @@ fn first(seen: SeenDisparities, hold: &dyn Fn(i32) -> bool) -> i32 {
 /// Describes a tiled plan.
 pub(crate) fn described(options: &Options, tiling: &Tiling, opened: &Opened) -> Result<description::Settings, Error> {
     let (plan, device) = (tiling.plan(), opened.device.as_ref());
-    let derived = options.algorithm.derived(plan.model().labels());
+    let Derived { k, z } = options.algorithm.derived(plan.model().labels());
     Ok(description::Settings {
+        k,
+        z,
         message_updates: tiling.message_updates(),
         planned_bytes: tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?,
         finish: description::Finish::of(options.finish()),
-        ..description::Settings::new(plan, Some(device), options.algorithm.kind(), derived)
+        ..description::Settings::new(plan, Some(device), options.algorithm.kind())
     })
 }

@@ -107,6 +107,20 @@ fn unused(plan: &Plan) -> Option<Unused> {
 }
 
 impl Warning {
+    /// What pairs with this warning have in common, as the end of a sentence that begins with "3 more pairs".
+    #[must_use]
+    pub fn of_many(&self) -> &'static str {
+        match self {
+            Self::Identical => "show the same image twice",
+            Self::Unlike => "hardly match",
+            Self::NoLabelsFound => "match too little to find labels",
+            Self::Exchanged => "look exchanged",
+            Self::Rows(_) => "have rows that do not correspond",
+            Self::Beyond(_) => "have disparities beyond the labels",
+            Self::Unused(_) => "have labels that match nowhere",
+        }
+    }
+
     /// The warning about a pair of this name, in a sentence.
     #[must_use]
     pub fn about(&self, pair: &str) -> String {

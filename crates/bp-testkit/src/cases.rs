@@ -1,11 +1,12 @@
-//! What backends are compared on.
+//! The cases that backends are compared on.
 
 use bp_core::{Algorithm, Cut, MessageStart, Model, Profile, Schedule, Settings, Size, StereoPair};
 
 use crate::{Case, noise_pair};
 
-/// Every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and many labels,
-/// with the smoothness that strains 8 bits most and with weak edges; strips of a higher image with aprons of every kind.
+/// All cases. They cover every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and
+/// many labels, with weak edges, and with the smoothness that strains 8 bits most; then strips of a higher image with
+/// every kind of apron.
 pub fn cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
     let small = sizes.into_iter().flat_map(|size| [1, 2, 3, 16].map(|labels| (size, labels)));
@@ -28,7 +29,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
     whole.chain(strips())
 }
 
-/// Strips of one pair with no, one or more known rows above and below, of each profile.
+/// Strips of one pair with no, one or several known rows above and below, for each profile.
 fn strips() -> impl Iterator<Item = Case> {
     let pair = noise_pair(19, 9, 8);
     let rows = [0..1, 0..7, 1..8, 2..9, 4..5];
@@ -75,8 +76,8 @@ fn settings(size: Size) -> Vec<Settings> {
     all
 }
 
-/// What sets the schedule `sweep` apart: one and two loops, on one grid and several, clipped and not, and cuts on a
-/// seam and beside it.
+/// Settings for the schedule `sweep`: one and two loops, one grid and several, clipped and not, cuts on a seam and beside
+/// it.
 fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
     let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
     let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });

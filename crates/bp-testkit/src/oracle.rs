@@ -9,8 +9,8 @@ use std::ops::Range;
 use bp_core::{DataCost, Device, Error, MessageStart, Node, Plan, Schedule, Seed, Side, Solver, StereoPair};
 use state::{Grid, State};
 
-/// A device that computes in `i64`, takes O(L^2) time for a message and neither normalises nor clips data costs, except
-/// those that [`Settings::coarse_clip`](bp_core::Settings::coarse_clip) says to.
+/// A device that computes in `i64` and takes O(L^2) time for a message. It neither normalises nor clips data costs, except
+/// under [`Settings::coarse_clip`](bp_core::Settings::coarse_clip).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Oracle;
 
@@ -21,8 +21,8 @@ impl Device for Oracle {
 }
 
 impl State {
-    /// One step that reads only messages of before it. Under `checkerboard` that is the same as in place, since the
-    /// nodes that send receive nothing in that half-step.
+    /// Runs one step that reads only messages from before it. Under `checkerboard` that equals an update in place, because
+    /// the nodes that send receive nothing in that half-step.
     fn step(&mut self, grid: usize, step: u32) {
         let before = self.grids[grid].received.clone();
         for node in self.plan.size(grid).nodes() {
@@ -128,7 +128,7 @@ impl Solver for State {
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         let all = self.grids[0].received.iter().flat_map(|received| &received[side as usize]);
         for (out, &message) in messages.iter_mut().zip(all) {
-            // Out of range would be a counterexample to the proof: show it as a value no message has.
+            // A value out of range would disprove `bp_core::exactness`. Show it as a value that no message has.
             *out = u8::try_from(message).unwrap_or(u8::MAX);
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Plans that nobody thought of.
+//! Random cases, for plans that nobody thought of.
 
 use fastrand::Rng;
 
@@ -6,12 +6,12 @@ use bp_core::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile
 
 use crate::{Case, noise_pair};
 
-/// Most data costs of a case, unless one row has more: a tenth of a second for the reference.
+/// The most data costs of a case, unless one row has more. The reference takes 0.1 s for them.
 const VOLUME: usize = 60_000;
 
-/// A case drawn at random, the same for the same seed as long as `fastrand` draws the same. Sizes lie around one and
-/// several vectors, blocks, strips and bands; there are fewer rows where there are many labels. Half of the pairs have
-/// an apron, half of the models weak edges.
+/// A random case. The same seed gives the same case as long as `fastrand` does not change. Sizes lie around one and several
+/// vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, and half of the
+/// models have weak edges.
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
@@ -61,10 +61,10 @@ fn settings(random: &mut Rng, width: usize, height: usize) -> Settings {
     let grids = match random.u8(..10) {
         0 => 13,
         1 => MAX_GRIDS,
-        _ => random.usize(1..6),
+        _ => random.usize(1..6) as u32,
     };
     let start = one_of(random, &MessageStart::ALL);
-    // A sweep has no other message start, and what more than three of them do, three do.
+    // A sweep has no other message start, and three sweeps show as much as more would.
     let sweep = schedule == Schedule::Sweep;
     Settings {
         grids: if is_cut { 1 } else { grids },

@@ -1,9 +1,9 @@
-//! Six made-up stereo scenes with exact ground truth, the same to the bit on every machine.
+//! Six synthetic stereo scenes with exact ground truth. Every machine renders the same bits.
 //!
-//! They stand in for six Middlebury scenes where those are not at hand: alike in size, range of disparity, content and
-//! difficulty, but not their images. Every scene is a list of surfaces over the left image; each surface knows which
-//! pixels it covers, its disparity there as a continuous function, and its texture. Both views look at the same
-//! surfaces, so the truth is exact to single precision, for hidden pixels too.
+//! They replace six Middlebury scenes that need a download. They resemble those in size, range of disparity, content and
+//! difficulty, but show other things. A scene is a list of surfaces over the left image. Each surface knows which pixels it
+//! covers, its disparity there as a continuous function, and its texture. Both views show the same surfaces, so the truth
+//! is exact to single precision, even for occluded pixels.
 
 mod render;
 mod scenes;
@@ -17,10 +17,10 @@ use bp_core::{DisparityMap, Image, Size, StereoPair};
 use render::{Exposure, World};
 use surface::View;
 
-/// What the scenes show, in the order of [`scene`]'s index.
+/// The names of the scenes, by the index of [`scene`].
 pub const NAMES: [&str; 6] = ["doll", "leaves", "cloth", "pots", "bowling", "books"];
 
-/// Width and height of the scenes in pixels at full size, in the order of [`NAMES`].
+/// The width and height of the scenes in pixels at full size, in the order of [`NAMES`].
 pub const SIZES: [[usize; 2]; 6] = [[620, 555], [641, 555], [626, 555], [656, 555], [665, 555], [695, 555]];
 
 /// No true disparity of either view exceeds this many pixels at full size.
@@ -33,18 +33,18 @@ pub struct Scene {
     pub name: &'static str,
     /// The two views: different noise and a slightly different exposure.
     pub pair: StereoPair,
-    /// True disparity of each left pixel `[height][width]`, in pixels of this scene's size; known everywhere.
+    /// The true disparity of each left pixel, in pixels of this scene's size. It is known everywhere.
     pub truth_left: DisparityMap,
-    /// True disparity of each right pixel `[height][width]`, in pixels of this scene's size; known everywhere.
+    /// The true disparity of each right pixel, in pixels of this scene's size. It is known everywhere.
     pub truth_right: DisparityMap,
-    /// Whether the right camera also sees what a left pixel shows, `[height][width]`.
+    /// Whether a left pixel is non-occluded: the right camera sees the same point. `[height][width]`.
     pub visible: Vec<bool>,
 }
 
 /// The scene `NAMES[index]` with both sides and all disparities divided by `divisor`, sides rounded up.
 ///
 /// # Panics
-/// Where `index` is not below 6 or `divisor` is 0.
+/// If `index` is not below 6 or `divisor` is 0.
 #[must_use]
 pub fn scene(index: usize, divisor: usize) -> Scene {
     let size = reduced(SIZES[index], divisor);
@@ -91,7 +91,7 @@ fn visible(world: &World, size: Size, divisor: usize) -> Vec<bool> {
     per_pixel(size, divisor, |x, y| world.is_shared(x, y, &columns))
 }
 
-/// The exposures of both views: as unlike as those of two shots with one camera. Averaging pixels averages noise.
+/// The exposures of both views. They differ as much as two shots with one camera. Shrinking an image averages its noise.
 fn exposures(index: usize, divisor: usize) -> [Exposure; 2] {
     let (gain, offset) = [(1.02, -1.0), (0.98, 1.5), (1.03, 0.5), (0.985, 0.5), (1.01, 0.5), (0.985, -1.0)][index];
     let (noise, seed) = (1.6 / divisor as f64, 2 * index as u32);

@@ -14,13 +14,13 @@ use crate::memory;
 pub(crate) struct Adapter {
     /// Its handle, valid as long as the instance.
     pub(crate) raw: vk::PhysicalDevice,
-    /// What users are told of it.
+    /// Its description for users.
     pub(crate) info: DeviceInfo,
-    /// What its driver says of it.
+    /// Its properties, as its driver reports them.
     pub(crate) properties: vk::PhysicalDeviceProperties,
 }
 
-/// How large things may be, in bytes.
+/// The size limits of a device, in bytes.
 #[derive(Clone, Copy)]
 pub(crate) struct MostBytes {
     /// One allocation.
@@ -30,7 +30,7 @@ pub(crate) struct MostBytes {
 }
 
 impl Adapter {
-    /// Reads what a driver says of a device of this instance.
+    /// Describes a device of this instance.
     pub(crate) fn of(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Self {
         // SAFETY: the device is one of this instance's.
         let properties = unsafe { instance.get_physical_device_properties(raw) };
@@ -54,7 +54,7 @@ impl Adapter {
         Self { raw, info, properties }
     }
 
-    /// How large a device, which has Vulkan 1.2, allows things to be.
+    /// The size limits of a device that has Vulkan 1.2.
     pub(crate) fn most_bytes(&self, instance: &ash::Instance) -> MostBytes {
         let mut allocation = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut buffer = vk::PhysicalDeviceMaintenance4Properties::default();
@@ -74,7 +74,7 @@ impl Adapter {
         }
     }
 
-    /// Bytes of a heap that are still free for this process, where its driver tells.
+    /// The bytes of a heap that are still free for this process, if its driver reports them.
     pub(crate) fn free_bytes(&self, instance: &ash::Instance, heap: usize) -> Option<u64> {
         if !has_extension(instance, self.raw, ext::memory_budget::NAME) {
             return None;
@@ -87,7 +87,7 @@ impl Adapter {
     }
 }
 
-/// What devices tell since Vulkan 1.2.
+/// The driver and the UUID of a device that has Vulkan 1.2.
 fn driver_and_uuid(instance: &ash::Instance, raw: vk::PhysicalDevice) -> (Option<String>, Option<String>) {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut id = vk::PhysicalDeviceIDProperties::default();
@@ -123,7 +123,7 @@ fn text<E>(text: Result<&CStr, E>) -> String {
     text.map_or_else(|_| String::new(), |text| text.to_string_lossy().into_owned())
 }
 
-/// A version as Vulkan packs it.
+/// Formats a version that Vulkan packed into a number.
 pub(crate) fn version_text(version: u32) -> String {
     let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
     format!("{major}.{minor}.{}", vk::api_version_patch(version))

@@ -12,7 +12,7 @@ use crate::{gpu::Gpu, memory::memory_type, object::Owned};
 /// Buffers, by their index in the program.
 pub(crate) struct Buffers {
     buffers: Vec<Placed>,
-    /// What the buffers lie in; freed after they are destroyed.
+    /// The memory of the buffers. It is freed after they are destroyed.
     blocks: Vec<Owned<vk::DeviceMemory>>,
     bytes: u64,
 }
@@ -22,7 +22,7 @@ struct Placed {
     raw: Owned<vk::Buffer>,
     memory: Memory,
     bytes: u64,
-    /// Where the host sees it, if it does.
+    /// The host's address of it, if it is mapped.
     mapped: Option<NonNull<u8>>,
 }
 
@@ -30,7 +30,7 @@ struct Placed {
 unsafe impl Send for Placed {}
 
 impl Buffers {
-    /// Makes buffers; those that the host sees are zeros, so that no page is first touched while a solve is timed.
+    /// Makes buffers. Those mapped to the host are set to zeros, so that no page is first touched while a solve is timed.
     pub(crate) fn new(gpu: &Arc<Gpu>, wanted: &[Buffer]) -> Result<Self, Error> {
         let buffers = wanted.iter().map(|buffer| create(gpu, buffer)).collect::<Result<_, _>>()?;
         let mut buffers = Self { buffers, blocks: Vec::new(), bytes: 0 };
@@ -64,7 +64,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// Shows a block to the host, for as long as it exists.
+    /// Maps a block to the host for as long as it exists.
     fn map(
         &mut self,
         gpu: &Gpu,
@@ -103,7 +103,7 @@ impl Buffers {
         (0..self.buffers.len()).filter(move |&i| self.buffers[i].memory == memory)
     }
 
-    /// What the host sees of a buffer: nothing of one on the device.
+    /// The contents of a buffer that is mapped to the host; empty for others.
     ///
     /// # Safety
     /// No work that writes the buffer is under way.
@@ -114,7 +114,7 @@ impl Buffers {
         mapped.map_or(&[], |start| unsafe { slice::from_raw_parts(start.as_ptr(), *bytes as usize) })
     }
 
-    /// The same, to be written.
+    /// The same, for writing.
     ///
     /// # Safety
     /// No work that uses the buffer is under way.
@@ -124,7 +124,7 @@ impl Buffers {
         mapped.map_or(&mut [], |start| unsafe { slice::from_raw_parts_mut(start.as_ptr(), *bytes as usize) })
     }
 
-    /// Bytes allocated, the gaps between buffers included.
+    /// The bytes allocated, including the gaps between buffers.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -158,13 +158,13 @@ fn allocate(gpu: &Arc<Gpu>, memory: Memory, block: &Block) -> Result<Owned<vk::D
 #[derive(Debug, PartialEq, Eq)]
 struct Block {
     bytes: u64,
-    /// The types of memory that all members may lie in, a bit each.
+    /// The types of memory that suit all members, one bit each.
     types: u32,
-    /// Which buffers lie in it, and where.
+    /// Its buffers, by index and offset.
     members: Vec<(usize, u64)>,
 }
 
-/// Lays buffers one after another into blocks of at most so many bytes.
+/// Places buffers one after another in blocks of at most this many bytes.
 fn blocks(needs: &[vk::MemoryRequirements], most: u64) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     for (member, need) in needs.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Command buffers and what is recorded into them.
+//! Command buffers, and recording commands into them.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use bp_gpu::{Command, Memory, Program};
 
 use crate::{gpu::Gpu, object::Owned, resources::Resources};
 
-/// Most bytes that a command itself can carry to a buffer.
+/// The most bytes that a command itself can write to a buffer.
 const CARRIED_BYTES: usize = 65_536;
 
 /// Command buffers.
@@ -36,7 +36,7 @@ impl Commands {
         Ok(self.gpu.checked("making a command buffer", made)?[0])
     }
 
-    /// Records anew into a command buffer of this pool that is not at work; it may then be submitted again and again.
+    /// Records a command buffer of this pool again, while the device does not use it. It may then be submitted many times.
     pub(crate) fn record(
         &mut self,
         commands: vk::CommandBuffer,
@@ -53,15 +53,15 @@ impl Commands {
     }
 }
 
-/// A command buffer that is being recorded. All of its functions rely on that, and on what they name living until
-/// the commands are done for the last time: who owns the command buffers owns the resources, too.
+/// A command buffer that is being recorded. Its functions rely on this, and on the resources they name: those have to exist
+/// until the commands have run for the last time. The owner of the command buffers also owns the resources.
 pub(crate) struct Recorder<'a> {
     gpu: &'a Gpu,
     commands: vk::CommandBuffer,
 }
 
 impl Recorder<'_> {
-    /// Records a segment: it sees what was done before it, and the host sees what it copies out.
+    /// Records a segment. It sees all earlier writes, and the host sees its copies.
     pub(crate) fn segment(&self, resources: &Resources, commands: &[Command]) {
         self.barrier();
         for command in commands {
@@ -117,7 +117,7 @@ impl Recorder<'_> {
         unsafe { self.gpu.raw().cmd_fill_buffer(self.commands, buffer, 0, vk::WHOLE_SIZE, 0) }
     }
 
-    /// Clears all buffers on the device but the parameters, which are written; what comes after sees it.
+    /// Clears all buffers on the device and writes the parameters. Later commands see both.
     pub(crate) fn start(&self, resources: &Resources, parameters: &[u8]) {
         self.barrier();
         for buffer in resources.buffers.of(Memory::Device).filter(|&buffer| buffer != Program::PARAMETERS) {
@@ -131,7 +131,7 @@ impl Recorder<'_> {
         self.barrier();
     }
 
-    /// Lets kernels and copies that come after see what came before, in this command buffer and in earlier ones.
+    /// Lets later kernels and copies see all earlier writes, in this command buffer and in those before it.
     pub(crate) fn barrier(&self) {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
@@ -139,7 +139,7 @@ impl Recorder<'_> {
         self.dependency((stages, written), (stages, used));
     }
 
-    /// Lets the host see what was copied, once it has waited.
+    /// Lets the host see copied data after it has waited.
     pub(crate) fn show_host(&self) {
         let copied = (vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         self.dependency(copied, (vk::PipelineStageFlags::HOST, vk::AccessFlags::HOST_READ));
@@ -156,7 +156,7 @@ impl Recorder<'_> {
         unsafe { self.gpu.raw().cmd_pipeline_barrier(self.commands, before.0, after.0, none, &barrier, &[], &[]) }
     }
 
-    /// Notes the time when all that came before is done.
+    /// Writes a timestamp when everything before it is done.
     pub(crate) fn timestamp(&self, queries: vk::QueryPool, query: u32) {
         let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
         // SAFETY: the pool has the query, and the queue keeps time.

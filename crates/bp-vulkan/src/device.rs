@@ -7,7 +7,7 @@ use bp_gpu::{GpuSolver, Limits, Program};
 
 use crate::{adapter::Adapter, gpu::Gpu, instance::Instance, limits, pipelines::Pipelines, queue::VulkanQueue};
 
-/// A device, ready to prepare plans. Those share the kernels that it has compiled.
+/// A device, ready to prepare plans. All plans share its compiled kernels.
 pub(crate) struct VulkanDevice {
     gpu: Arc<Gpu>,
     pipelines: Mutex<Pipelines>,
@@ -15,7 +15,7 @@ pub(crate) struct VulkanDevice {
 }
 
 impl VulkanDevice {
-    /// Opens a device; else the reason why that cannot be.
+    /// Opens a device. The error is the reason in words.
     pub(crate) fn open(instance: Instance, adapter: Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
         let gpu = Arc::new(Gpu::open(instance, adapter)?);
         let pipelines = Pipelines::new(&gpu).map_err(|error| error.to_string())?;
@@ -24,7 +24,7 @@ impl VulkanDevice {
         Ok(Self { gpu, pipelines: Mutex::new(pipelines), limits })
     }
 
-    /// What it allows, with no more memory than is free now.
+    /// Its limits, with no more memory than is free now.
     fn limits(&self) -> Limits {
         let bytes = [self.limits.memory_bytes, limits::free_bytes(&self.gpu)];
         Limits { memory_bytes: bytes.into_iter().flatten().min(), ..self.limits.clone() }

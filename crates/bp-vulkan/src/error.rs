@@ -1,4 +1,4 @@
-//! What Vulkan answers, as errors that say who can mend it.
+//! Results of Vulkan calls, turned into errors that say who can fix them.
 
 use ash::vk;
 use bp_core::Error;
@@ -23,7 +23,7 @@ pub(crate) fn not_allocated(device: &str, what: &'static str, bytes: u64, result
     failed(device, what, result)
 }
 
-/// Whether less would do: memory, addresses to map it to, or allocations are used up.
+/// Whether something is used up: memory, addresses to map it to, or allocations. A smaller plan may run.
 fn is_out_of_memory(result: vk::Result) -> bool {
     [
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,

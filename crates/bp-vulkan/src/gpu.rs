@@ -22,15 +22,15 @@ use crate::{
 pub(crate) struct Gpu {
     raw: ash::Device,
     queue: Mutex<vk::Queue>,
-    /// Which family the queue is of.
+    /// The family of the queue.
     pub(crate) family: u32,
-    /// How many bits of its timestamps count; none where it keeps no time.
+    /// The number of valid bits in its timestamps; 0 if it has no clock.
     pub(crate) timestamp_bits: u32,
-    /// What it was opened from.
+    /// The adapter that it was opened from.
     pub(crate) adapter: Adapter,
-    /// The kinds of memory it has.
+    /// Its types of memory.
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
-    /// Most bytes of an allocation and of a buffer.
+    /// The most bytes of an allocation and of a buffer.
     pub(crate) most_bytes: MostBytes,
     /// Destroyed after the device, or never.
     instance: ManuallyDrop<Instance>,
@@ -38,7 +38,7 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// Opens a device; else the reason why that cannot be.
+    /// Opens a device. The error is the reason in words.
     pub(crate) fn open(instance: Instance, adapter: Adapter) -> Result<Self, String> {
         if adapter.properties.api_version < vk::API_VERSION_1_2 {
             let (name, api) = (&adapter.info.name, adapter.info.api.as_deref().unwrap_or_default());
@@ -68,7 +68,7 @@ impl Gpu {
         &self.raw
     }
 
-    /// The connection that it was opened through.
+    /// The instance that it belongs to.
     pub(crate) fn instance(&self) -> &Instance {
         &self.instance
     }
@@ -78,7 +78,7 @@ impl Gpu {
         &self.adapter.info.name
     }
 
-    /// Hands work to the queue, which all solvers of the device share.
+    /// Submits work to the queue, which all solvers of the device share.
     pub(crate) fn submit(&self, work: &vk::SubmitInfo<'_>) -> Result<(), Error> {
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: the lock keeps others from the queue; who calls keeps what the work uses until it is done.
@@ -86,7 +86,7 @@ impl Gpu {
         self.checked("submitting work", submitted)
     }
 
-    /// Turns what a call answered into an error, and gives up a device that cannot be relied on any more.
+    /// Turns the result of a call into an error, and abandons the device if it was lost.
     pub(crate) fn checked<T>(&self, doing: &'static str, answer: VkResult<T>) -> Result<T, Error> {
         answer.map_err(|result| {
             self.abandon_if_lost(result);
@@ -108,7 +108,7 @@ impl Gpu {
         }
     }
 
-    /// Gives the device up: nothing of it is destroyed from now on.
+    /// Abandons the device: from now on nothing of it is destroyed.
     pub(crate) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
     }
@@ -118,7 +118,7 @@ impl Gpu {
         self.abandoned.load(Ordering::Acquire)
     }
 
-    /// Refuses a device that was given up.
+    /// Fails if the device was abandoned.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if self.is_abandoned() {
             let reason = "it failed earlier; open it anew".to_owned();
@@ -154,8 +154,8 @@ fn make(instance: &Instance, adapter: &Adapter, family: u32) -> Result<ash::Devi
     raw.map_err(|error| format!("{} cannot be opened: {error}", adapter.info.name))
 }
 
-/// The queue family to compute on: one that keeps time, and rather one that draws nothing. Such a queue does not
-/// make a desktop wait, and drivers give its work more time before they call it hung.
+/// The queue family to compute on: preferably one with a clock, and then one without graphics. Work on such a queue does not
+/// block the desktop, and drivers allow it more time before they report a hang.
 fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     let computes = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
     let draws = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);

@@ -11,12 +11,12 @@ use crate::{adapter::Adapter, loader::entry, validation};
 /// A connection to the drivers.
 pub(crate) struct Instance {
     raw: ash::Instance,
-    /// Hears what the validation layer complains of.
+    /// Receives the messages of the validation layer.
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
 }
 
 impl Instance {
-    /// Connects to the drivers; else the reason why that cannot be.
+    /// Connects to the drivers. The error is the reason in words.
     pub(crate) fn new() -> Result<Self, String> {
         let entry = entry()?;
         // SAFETY: the loader allows the call at any time.
@@ -40,7 +40,7 @@ impl Instance {
         &self.raw
     }
 
-    /// The devices there are, those expected to be fastest first, else as their drivers sort them.
+    /// Lists the devices, the probably fastest kind first, and within a kind in the order of their drivers.
     pub(crate) fn adapters(&self) -> Result<Vec<Adapter>, String> {
         // SAFETY: the instance is alive.
         let devices = unsafe { self.raw.enumerate_physical_devices() };

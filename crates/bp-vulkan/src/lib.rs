@@ -1,8 +1,11 @@
-//! GPU backend through Vulkan, by raw ash: allocates, compiles, records and submits what `bp_gpu` asks for.
+//! The GPU backend through Vulkan, with raw ash. It allocates, compiles, records and submits the programs of `bp_gpu`.
 //!
-//! `instance` lists devices and `device` opens them. A prepared program is a `queue` of work over its `resources`:
-//! `buffers`, bind groups and `pipelines`, which naga translates in `spirv`. `commands` records, `timeline` submits
-//! and waits, `timer` reads the device's clock. Everything that Vulkan makes is an `object` with one owner.
+//! * `loader` finds the Vulkan library, `instance` connects to the drivers, and `adapter` describes their devices.
+//! * `gpu` is an open device with its queue, and `device` prepares plans on it. `limits` and `memory` say what it allows.
+//! * A prepared program is a `queue` of work over its `resources`: `buffers`, bind groups and `pipelines`, which naga
+//!   translates in `spirv`.
+//! * `commands` records, `timeline` submits and waits, and `timer` reads the device's clock.
+//! * Every Vulkan handle is an `object` with one owner.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod adapter;
@@ -35,8 +38,8 @@ use instance::Instance;
 pub struct Vulkan;
 
 impl Vulkan {
-    /// Opens a device by its index in [`Backend::devices`], with changed limits: a test may lower them, so that small
-    /// plans are cut up like large ones.
+    /// Opens a device by its index in [`Backend::devices`], with changed limits. Tests lower them, so that small plans are
+    /// split like large ones.
     ///
     /// # Errors
     /// [`Error::Unavailable`] with the reason.

@@ -1,4 +1,4 @@
-//! What a device allows.
+//! The limits of a device.
 
 use bp_gpu::Limits;
 
@@ -23,7 +23,7 @@ pub(crate) fn of(gpu: &Gpu) -> Limits {
     }
 }
 
-/// Bytes of memory on the device that are free now, where its driver tells.
+/// The bytes of device memory that are free now, if its driver reports them.
 pub(crate) fn free_bytes(gpu: &Gpu) -> Option<u64> {
     gpu.adapter.free_bytes(gpu.instance().raw(), device_heap(&gpu.memory)?)
 }

@@ -1,16 +1,16 @@
-//! Which memory of a device is taken for what.
+//! The choice of memory for buffers.
 
 use ash::vk;
 use bp_gpu::Memory;
 
-/// The heap that [`Memory::Device`] is taken from.
+/// The heap of [`Memory::Device`].
 pub(crate) fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<usize> {
     let kind = memory_type(memory, Memory::Device, u32::MAX)?;
     Some(memory.memory_types[kind as usize].heap_index as usize)
 }
 
-/// The type of memory for such buffers among those allowed: the first, since drivers list the fastest first, with
-/// all that is wished for, else with what is needed.
+/// The type of memory for such buffers, among those allowed. It is the first one with all desired properties, else the first
+/// with the required ones. Drivers list the fastest types first.
 pub(crate) fn memory_type(
     properties: &vk::PhysicalDeviceMemoryProperties,
     memory: Memory,

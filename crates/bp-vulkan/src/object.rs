@@ -1,4 +1,4 @@
-//! Vulkan objects that are destroyed with their owners, so that an error anywhere leaves nothing behind.
+//! Vulkan objects with an owner. Dropping the owner destroys the object, so errors leak nothing.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::gpu::Gpu;
 
-/// An object of a device, which it keeps open.
+/// An object of a device. It keeps the device open.
 pub(crate) struct Owned<T: Destroy> {
     /// Its handle.
     pub(crate) raw: T,
@@ -15,7 +15,7 @@ pub(crate) struct Owned<T: Destroy> {
 }
 
 impl<T: Destroy> Owned<T> {
-    /// Takes over an object that was just made by this device.
+    /// Takes ownership of an object that this device just made.
     pub(crate) fn new(gpu: &Arc<Gpu>, raw: T) -> Self {
         Self { raw, gpu: Arc::clone(gpu) }
     }

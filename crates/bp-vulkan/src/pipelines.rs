@@ -1,4 +1,4 @@
-//! Compiled kernels, kept as long as their device, and between runs where the driver can take them back.
+//! Compiled kernels. They are kept as long as their device, and between runs if the driver supports that.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::{
@@ -17,11 +17,11 @@ use bp_gpu::{Kernel, Pipeline, cache};
 
 use crate::{gpu::Gpu, object::Owned, spirv};
 
-/// What a kernel is given: the shape of its bind groups.
+/// The layout of a kernel's bind groups.
 pub(crate) struct Layout {
-    /// Of the one set of buffers.
+    /// The layout of its only descriptor set.
     pub(crate) set: Owned<vk::DescriptorSetLayout>,
-    /// Of all that is bound.
+    /// The layout of the pipeline.
     pub(crate) pipeline: Owned<vk::PipelineLayout>,
 }
 
@@ -29,18 +29,18 @@ pub(crate) struct Layout {
 pub(crate) struct Compiled {
     /// The pipeline.
     pub(crate) raw: Owned<vk::Pipeline>,
-    /// What it is given.
+    /// The layout of its bind groups.
     pub(crate) layout: Arc<Layout>,
     warm: AtomicBool,
 }
 
 impl Compiled {
-    /// Whether it has run: some drivers compile a kernel only then.
+    /// Whether it has run. Some drivers compile a kernel at its first run.
     pub(crate) fn is_warm(&self) -> bool {
         self.warm.load(Ordering::Relaxed)
     }
 
-    /// Notes that it has run.
+    /// Records that it has run.
     pub(crate) fn set_warm(&self) {
         self.warm.store(true, Ordering::Relaxed);
     }
@@ -50,14 +50,14 @@ impl Compiled {
 pub(crate) struct Pipelines {
     gpu: Arc<Gpu>,
     cache: Owned<vk::PipelineCache>,
-    /// What an earlier run, or this one, stored of the cache.
+    /// The cache as it was last stored, by this run or an earlier one.
     stored: Vec<u8>,
     layouts: HashMap<Kernel, Arc<Layout>>,
     compiled: HashMap<Pipeline, Arc<Compiled>>,
 }
 
 impl Pipelines {
-    /// None yet, but what the driver stored in an earlier run.
+    /// Starts without kernels, but with the cache stored by an earlier run.
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
         let stored = cache::load(&cache_key(gpu)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&stored);
@@ -67,7 +67,7 @@ impl Pipelines {
         Ok(Self { gpu: Arc::clone(gpu), cache, stored, layouts: HashMap::new(), compiled: HashMap::new() })
     }
 
-    /// These kernels, and how long compiling those took that had not been.
+    /// Gets these kernels, and the time spent on compiling the missing ones.
     pub(crate) fn get(&mut self, wanted: &[Pipeline]) -> Result<(Vec<Arc<Compiled>>, Duration), Error> {
         let start = Instant::now();
         let before = self.compiled.len();
@@ -97,7 +97,7 @@ impl Pipelines {
         Ok(layout)
     }
 
-    /// Stores what the driver wants to keep for the next run, unless it is stored already.
+    /// Stores the driver's cache for the next run, unless it is unchanged.
     pub(crate) fn store(&mut self) {
         // SAFETY: the cache is alive, and whoever compiles has it alone.
         let data = unsafe { self.gpu.raw().get_pipeline_cache_data(self.cache.raw) }.unwrap_or_default();
@@ -108,7 +108,7 @@ impl Pipelines {
     }
 }
 
-/// Names the driver and the device for which stored pipelines are good.
+/// The key of stored pipelines: it names the driver and the device that can load them.
 fn cache_key(gpu: &Gpu) -> String {
     let vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, pipeline_cache_uuid, .. } =
         gpu.adapter.properties;

@@ -1,4 +1,4 @@
-//! A program on a device: prepared once, run again and again.
+//! A program prepared on a device.
 #![expect(unsafe_code, reason = "what the host sees of buffers is shared with the device")]
 
 use std::{
@@ -22,13 +22,13 @@ use crate::{
 
 /// A prepared program.
 pub(crate) struct VulkanQueue {
-    /// First, so that it is dropped first, which waits for work that uses all the others.
+    /// The first field, because it is dropped first: that waits for work that uses all the others.
     timeline: Timeline,
-    /// For every segment, what runs it.
+    /// The command buffer of every segment.
     segments: Vec<vk::CommandBuffer>,
-    /// Recorded and run at once, for what is done rarely.
+    /// A command buffer for rare work, which is recorded and run at once.
     scratch: vk::CommandBuffer,
-    /// Appended and not submitted.
+    /// Command buffers that are appended but not submitted.
     pending: Vec<vk::CommandBuffer>,
     /// Work up to the last [`Queue::submit`].
     last_submit: u64,
@@ -77,7 +77,7 @@ impl VulkanQueue {
         self.run(|recorder, resources| recorder.start(resources, &program.parameters))
     }
 
-    /// Runs one workgroup of every pipeline that has never run; tells whether there was any.
+    /// Runs one workgroup of every pipeline that has never run. Returns whether there was one.
     fn warm_up(&mut self, program: &Program) -> Result<bool, Error> {
         let before = Instant::now();
         let mut any = false;
@@ -97,7 +97,7 @@ impl VulkanQueue {
         Ok(any)
     }
 
-    /// Records and runs something at once.
+    /// Records commands and runs them at once.
     fn run(&mut self, record: impl FnOnce(&Recorder<'_>, &Resources)) -> Result<(), Error> {
         self.timeline.wait_for_all()?;
         self.commands.record(self.scratch, |recorder| record(recorder, &self.resources))?;

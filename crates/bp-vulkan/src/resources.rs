@@ -1,4 +1,4 @@
-//! What the commands of a program work on: its buffers, bind groups and pipelines.
+//! The resources of a program: its buffers, bind groups and pipelines.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::{
@@ -17,11 +17,11 @@ use crate::{
     pipelines::{Compiled, Layout, Pipelines},
 };
 
-/// The same indices mean the same things as in the program.
+/// The resources, with the same indices as in the program.
 pub(crate) struct Resources {
     /// The compiled kernels.
     pub(crate) pipelines: Vec<Arc<Compiled>>,
-    /// A descriptor set for every bind group; they live as long as their pool.
+    /// A descriptor set for every bind group. They exist as long as their pool.
     pub(crate) sets: Vec<vk::DescriptorSet>,
     _pool: Owned<vk::DescriptorPool>,
     /// The buffers.
@@ -29,7 +29,7 @@ pub(crate) struct Resources {
 }
 
 impl Resources {
-    /// Allocates first, because that fails soonest, and then compiles what is not yet compiled; tells how long that took.
+    /// Allocates first, because that fails early, then compiles the missing kernels. Also returns the time spent on that.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         pipelines: &Mutex<Pipelines>,

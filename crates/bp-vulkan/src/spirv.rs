@@ -1,4 +1,4 @@
-//! WGSL to SPIR-V, by naga.
+//! Translation of WGSL to SPIR-V, by naga.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use naga::{
     valid::{Capabilities, ValidationFlags, Validator},
 };
 
-/// The SPIR-V of a kernel with these constants; else what naga says.
+/// The SPIR-V of a kernel with these constants. The error is naga's message.
 pub(crate) fn translate(pipeline: &Pipeline) -> Result<Vec<u32>, String> {
     let Pipeline { kernel, constants } = pipeline;
     translate_text(&kernel.source(), *kernel, constants).map_err(|error| format!("kernel {pipeline}: {error}"))
@@ -36,8 +36,8 @@ fn describe(error: impl fmt::Display) -> String {
     error.to_string()
 }
 
-/// Plain code, without checks that the kernels do not need: their loops end and their indices are within their buffers.
-/// Variables begin as zeros, on which some rely.
+/// Options for plain code, without checks that the kernels do not need: their loops end, and their indices stay within the
+/// buffers. Variables start as zeros, because some kernels rely on it.
 fn options() -> spv::Options<'static> {
     let unchecked = BoundsCheckPolicy::Unchecked;
     spv::Options {

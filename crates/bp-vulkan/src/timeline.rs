@@ -1,4 +1,4 @@
-//! What was handed to the device, and waiting for it.
+//! Submitted work, and waiting for it.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use bp_gpu::PATIENCE;
 
 use crate::{gpu::Gpu, object::Owned, validation};
 
-/// Counts pieces of work, submitted and done.
+/// Counts the submitted and the finished pieces of work.
 pub(crate) struct Timeline {
     semaphore: Owned<vk::Semaphore>,
     gpu: Arc<Gpu>,
@@ -18,7 +18,7 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    /// Nothing submitted yet.
+    /// Starts without submitted work.
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
@@ -27,12 +27,12 @@ impl Timeline {
         Ok(Self { semaphore: Owned::new(gpu, semaphore), gpu: Arc::clone(gpu), submitted: 0 })
     }
 
-    /// How many pieces were submitted so far.
+    /// The number of pieces submitted so far.
     pub(crate) fn submitted(&self) -> u64 {
         self.submitted
     }
 
-    /// Hands a piece of work to the device: command buffers that run in this order.
+    /// Submits a piece of work: command buffers that run in this order.
     pub(crate) fn submit(&mut self, commands: &[vk::CommandBuffer]) -> Result<(), Error> {
         let value = [self.submitted + 1];
         let mut values = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&value);
@@ -45,7 +45,7 @@ impl Timeline {
         Ok(())
     }
 
-    /// Waits until so many pieces are done, in vain for a device that was given up.
+    /// Waits until this many pieces are done. Fails if the device was abandoned.
     pub(crate) fn wait(&self, done: u64) -> Result<(), Error> {
         self.gpu.check()?;
         let info = vk::SemaphoreWaitInfo::default();
@@ -64,7 +64,7 @@ impl Timeline {
         }
     }
 
-    /// Waits until all of it is done.
+    /// Waits until all work is done.
     pub(crate) fn wait_for_all(&self) -> Result<(), Error> {
         self.wait(self.submitted)
     }

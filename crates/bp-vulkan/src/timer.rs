@@ -8,11 +8,11 @@ use bp_core::Error;
 
 use crate::{commands::Commands, gpu::Gpu, object::Owned};
 
-/// Notes times at marks.
+/// Writes timestamps at marks.
 pub(crate) struct Timer {
     queries: Owned<vk::QueryPool>,
     gpu: Arc<Gpu>,
-    /// For every mark, what notes its time.
+    /// The command buffer that writes each mark's timestamp.
     marks: Vec<vk::CommandBuffer>,
     marked: usize,
     ticks: Vec<u64>,
@@ -20,7 +20,7 @@ pub(crate) struct Timer {
 }
 
 impl Timer {
-    /// A timer for so many marks, if the queue keeps time.
+    /// Makes a timer for this many marks, if the queue has a clock.
     pub(crate) fn new(gpu: &Arc<Gpu>, commands: &mut Commands, marks: usize) -> Result<Option<Self>, Error> {
         if gpu.timestamp_bits == 0 || marks == 0 {
             return Ok(None);
@@ -46,14 +46,14 @@ impl Timer {
         self.times.clear();
     }
 
-    /// What notes the time of the next mark, unless there were as many as are kept.
+    /// The command buffer of the next mark, unless there is no room for more marks.
     pub(crate) fn mark(&mut self) -> Option<vk::CommandBuffer> {
         let mark = *self.marks.get(self.marked)?;
         self.marked += 1;
         Some(mark)
     }
 
-    /// Reads the clock's answers, once all marks are done.
+    /// Reads the timestamps after all marks are done.
     pub(crate) fn finish(&mut self) -> Result<(), Error> {
         self.times.clear();
         let ticks = &mut self.ticks[..self.marked];
@@ -75,7 +75,7 @@ impl Timer {
     }
 }
 
-/// Time between two readings of a clock of so many bits, that counts once in `period` nanoseconds.
+/// The time between two readings of a clock with this many bits and a tick of `period` nanoseconds.
 fn between(start: u64, end: u64, bits: u32, period: f32) -> Duration {
     // Bits beyond are 0 by the specification; a clock that ran over in between still gives the right difference.
     let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.min(64)));

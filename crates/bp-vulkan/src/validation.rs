@@ -1,7 +1,7 @@
-//! The Khronos validation layer, for tests: whether every call and every access is as Vulkan demands.
+//! The Khronos validation layer, for tests. It checks that every call and every access follows the rules of Vulkan.
 //!
-//! `BP_VULKAN_VALIDATION=1` in the environment, or [`turn_on`], loads it with whatever is opened from then on. What it
-//! complains of is counted, and fails the call that next waits for the device.
+//! `BP_VULKAN_VALIDATION=1` in the environment, or [`turn_on`], loads it for all devices opened from then on. Its messages
+//! are counted, and the next call that waits for the device fails.
 #![expect(unsafe_code, reason = "the layer calls back through a C interface")]
 
 use std::{
@@ -14,13 +14,13 @@ use std::{
 
 use ash::{Entry, ext, vk};
 
-/// Name of the layer; Debian's package is vulkan-validationlayers.
+/// The name of the layer. The Debian package is vulkan-validationlayers.
 pub(crate) const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// The extensions that it is used through: the first tells what it finds, the second says what it looks for.
+/// The extensions of the layer: the first delivers its messages, the second configures its checks.
 pub(crate) const EXTENSIONS: [&CStr; 2] = [ext::debug_utils::NAME, ext::validation_features::NAME];
 
-/// What it looks for besides its defaults.
+/// Checks besides the default ones.
 pub(crate) const EXTRAS: [vk::ValidationFeatureEnableEXT; 1] =
     [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
 
@@ -28,7 +28,7 @@ static WANTED: AtomicBool = AtomicBool::new(false);
 
 static MESSAGES: Mutex<Messages> = Mutex::new(Messages { count: 0, first: None });
 
-/// What the layer complained of in this process.
+/// The messages of the layer in this process.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Messages {
     /// How many warnings and errors there were.
@@ -37,7 +37,7 @@ pub struct Messages {
     pub first: Option<String>,
 }
 
-/// Validates what is opened from now on, if the layer is installed.
+/// Turns validation on for all devices opened from now on, if the layer is installed.
 pub fn turn_on() {
     WANTED.store(true, Ordering::Relaxed);
 }
@@ -48,13 +48,13 @@ pub fn is_installed() -> bool {
     crate::loader::entry().is_ok_and(has_layer)
 }
 
-/// What the layer complained of so far.
+/// The messages of the layer so far.
 #[must_use]
 pub fn messages() -> Messages {
     MESSAGES.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// Whether an instance that is made now has the layer.
+/// Whether a new instance loads the layer.
 pub(crate) fn is_on(entry: &Entry) -> bool {
     let wanted = WANTED.load(Ordering::Relaxed) || std::env::var_os("BP_VULKAN_VALIDATION").is_some_and(|on| on == "1");
     wanted && has_layer(entry)
@@ -66,7 +66,7 @@ fn has_layer(entry: &Entry) -> bool {
     layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER))
 }
 
-/// What a listener to the layer is made with.
+/// The description of a listener to the layer.
 pub(crate) fn listener() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)

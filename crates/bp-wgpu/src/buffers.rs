@@ -12,7 +12,7 @@ use crate::{
     pipelines::{self, PARAMETER_BYTES},
 };
 
-/// Makes the buffers of a program, and fills that of the parameters.
+/// Makes the buffers of a program and writes the parameters.
 pub(crate) fn make(gpu: &Gpu, program: &Program) -> Result<Vec<Buffer>, Error> {
     gpu.guard(program.bytes(), || {
         let make = |buffer: &bp_gpu::Buffer| self::buffer(gpu, buffer.name, buffer.bytes, usage(buffer.memory));
@@ -49,7 +49,7 @@ pub(crate) fn bind(gpu: &Gpu, group: &BindGroup, buffers: &[Buffer]) -> wgpu::Bi
     })
 }
 
-/// Sets all buffers of [`Memory::Device`] but the parameters to zeros.
+/// Sets all buffers of [`Memory::Device`] to zeros, except the parameters.
 pub(crate) fn clear(encoder: &mut CommandEncoder, program: &Program, buffers: &[Buffer]) {
     let named = program.buffers.iter().zip(buffers).skip(Program::PARAMETERS + 1);
     named.filter(|(named, _)| named.memory == Memory::Device).for_each(|(_, buffer)| {
@@ -57,8 +57,8 @@ pub(crate) fn clear(encoder: &mut CommandEncoder, program: &Program, buffers: &[
     });
 }
 
-/// Writes all of a buffer of [`Memory::Upload`] once `last`, the last submission that reads it, is done. To be called
-/// under [`Gpu::guard`].
+/// Writes a whole buffer of [`Memory::Upload`] after `last`, the last submission that reads it. Call it under
+/// [`Gpu::guard`].
 pub(crate) fn write(gpu: &Gpu, buffer: &Buffer, last: &SubmissionIndex, bytes: &[u8]) -> Result<(), Error> {
     buffer.map_async(MapMode::Write, .., |_| ());
     gpu.wait(last)?;
@@ -68,8 +68,8 @@ pub(crate) fn write(gpu: &Gpu, buffer: &Buffer, last: &SubmissionIndex, bytes: &
     Ok(())
 }
 
-/// Shows all of a buffer that can be mapped once `last`, the last submission that writes it, is done. To be called
-/// under [`Gpu::guard`].
+/// Reads a whole buffer that can be mapped, after `last`, the last submission that writes it. Call it under
+/// [`Gpu::guard`].
 pub(crate) fn read<T>(
     gpu: &Gpu,
     buffer: &Buffer,

@@ -10,23 +10,23 @@ use wgpu::{
 
 use crate::{buffers, gpu::Gpu};
 
-/// Notes the device's time at marks.
+/// Writes the device's time at marks.
 pub(crate) struct Clock {
     queries: QuerySet,
-    /// What queries are resolved to; wgpu lets no such buffer be mapped.
+    /// The buffer that queries are resolved to. wgpu does not allow mapping it.
     resolved: Buffer,
     readable: Buffer,
-    /// Nanoseconds of a tick.
+    /// The nanoseconds of a tick.
     period: f64,
     marks: u32,
     times: Vec<Duration>,
 }
 
 impl Clock {
-    /// What a device needs to have for it.
+    /// The features that a device needs for it.
     pub(crate) const FEATURES: Features = Features::TIMESTAMP_QUERY.union(Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
-    /// A clock for so many marks, where the device has one.
+    /// Makes a clock for this many marks, if the device has one.
     pub(crate) fn new(gpu: &Gpu, marks: usize) -> Result<Option<Self>, Error> {
         let count = marks.min(QUERY_SET_MAX_QUERIES as usize) as u32;
         if count == 0 || !gpu.device.features().contains(Self::FEATURES) {
@@ -89,8 +89,8 @@ impl Clock {
     }
 }
 
-/// The times between readings of a clock that counts once in `period` nanoseconds; none if it ran over, since wgpu does
-/// not tell at which number it does.
+/// The times between readings of a clock with a tick of `period` nanoseconds. None if the clock wrapped around: wgpu does not
+/// say at which number it does.
 fn between(ticks: impl Iterator<Item = u64> + Clone, period: f64) -> impl Iterator<Item = Duration> {
     let kept = if ticks.clone().is_sorted() { usize::MAX } else { 0 };
     let pairs = ticks.clone().zip(ticks.skip(1)).take(kept);

@@ -17,7 +17,7 @@ pub(crate) struct WgpuDevice {
 }
 
 impl WgpuDevice {
-    /// Opens an adapter with all that it allows, but for what `change` lowers; the error says why that failed.
+    /// Opens an adapter with all its limits, changed by `change`. The error is the reason in words.
     pub(crate) fn open(adapter: &Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
         let descriptor = DeviceDescriptor {
             label: None,
@@ -36,8 +36,7 @@ impl WgpuDevice {
         Ok(Self { gpu, adapter: adapter.clone(), limits, pipelines })
     }
 
-    /// What it allows, with no more memory than is free now: drivers let more be allocated than there is, and then
-    /// swap or end the program.
+    /// Its limits, with no more memory than is free now. Drivers allow larger allocations, and then swap or end the program.
     fn limits(&self) -> Limits {
         let bytes = [self.limits.memory_bytes, vulkan::free_bytes(&self.adapter)];
         Limits { memory_bytes: bytes.into_iter().flatten().min(), ..self.limits.clone() }
@@ -69,7 +68,7 @@ impl Device for WgpuDevice {
     }
 
     fn planned_bytes(&self, plan: &Plan) -> u64 {
-        // What is uploaded lies in host memory once more, see `WgpuQueue`.
+        // What is uploaded lies in host memory once more; see `WgpuQueue`.
         let upload = Program::new(plan, &self.limits).map_or(0, |program| program.buffers[Program::UPLOAD].bytes);
         Program::planned_bytes(plan, &self.limits).saturating_add(upload)
     }

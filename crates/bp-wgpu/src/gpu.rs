@@ -1,4 +1,4 @@
-//! Whatever goes wrong in wgpu, as an error. By itself wgpu panics where nobody asks for its errors.
+//! An open wgpu device that turns all failures into errors. By default, wgpu panics on errors that nobody handles.
 
 use std::{
     any::Any,
@@ -11,20 +11,20 @@ use bp_core::Error;
 use bp_gpu::PATIENCE;
 use wgpu::{ErrorFilter, PollError, PollType, SubmissionIndex};
 
-/// An open device of wgpu's, shared by all that is prepared on it.
+/// An open wgpu device. Everything prepared on it shares it.
 pub(crate) struct Gpu {
     /// Its name, for error messages.
     pub(crate) name: String,
-    /// Makes things.
+    /// The wgpu device, which makes resources.
     pub(crate) device: wgpu::Device,
-    /// Runs things.
+    /// The wgpu queue, which runs commands.
     pub(crate) queue: wgpu::Queue,
-    /// What ended it: nothing works after that.
+    /// The error that ended it. Nothing works after that.
     end: Arc<OnceLock<Error>>,
 }
 
 impl Gpu {
-    /// Listens for what wgpu reports outside of calls.
+    /// Listens to errors that wgpu reports outside of calls.
     pub(crate) fn new(name: String, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let end = Arc::new(OnceLock::new());
         let (lost, lost_name) = (Arc::clone(&end), name.clone());
@@ -38,7 +38,7 @@ impl Gpu {
         Self { name, device, queue, end }
     }
 
-    /// Does `work` and tells what went wrong in it; `bytes` is what the work allocates, or has allocated before.
+    /// Does `work` and returns its errors. `bytes` is what the work allocates, or has allocated before.
     pub(crate) fn guard<T>(&self, bytes: u64, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         self.alive()?;
         let filters = [ErrorFilter::Validation, ErrorFilter::Internal, ErrorFilter::OutOfMemory];
@@ -61,12 +61,12 @@ impl Gpu {
         }
     }
 
-    /// Waits until a submission is done. To be called under [`Gpu::guard`].
+    /// Waits until a submission is done. Call it under [`Gpu::guard`].
     pub(crate) fn wait(&self, submission: &SubmissionIndex) -> Result<(), Error> {
         self.wait_for(Some(submission.clone()))
     }
 
-    /// The same; for all submissions where none is named.
+    /// The same; without a submission, waits for all.
     fn wait_for(&self, submission_index: Option<SubmissionIndex>) -> Result<(), Error> {
         let wait = PollType::Wait { submission_index, timeout: Some(PATIENCE) };
         let end = match self.device.poll(wait) {
@@ -78,7 +78,7 @@ impl Gpu {
         Err(self.ended(end))
     }
 
-    /// Notes what ends the device, unless something has before, and returns what did.
+    /// Records the error that ended the device, and returns the first such error.
     fn ended(&self, end: Error) -> Error {
         self.end.get_or_init(|| end).clone()
     }
@@ -107,7 +107,7 @@ impl Drop for Gpu {
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     text.map_or_else(|| "wgpu panicked".to_owned(), |text| format!("wgpu panicked: {text}"))

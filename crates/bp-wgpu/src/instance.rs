@@ -1,4 +1,4 @@
-//! The adapters there are.
+//! The list of adapters.
 
 use bp_core::{DeviceInfo, DeviceKind};
 use bp_gpu::missing;
@@ -6,10 +6,10 @@ use wgpu::{Adapter, Backends, DeviceType, Instance, InstanceDescriptor, Instance
 
 use crate::vulkan;
 
-/// What wgpu is asked to reach devices through.
+/// The APIs through which wgpu may reach devices.
 const BACKENDS: Backends = Backends::VULKAN;
 
-/// All adapters, those expected to be fastest first; none where there is no driver.
+/// All adapters, the probably fastest first. Empty without a driver.
 pub(crate) fn adapters() -> Vec<Adapter> {
     // Without a backend for this system compiled in, wgpu panics.
     if !Instance::enabled_backend_features().intersects(BACKENDS) {
@@ -28,7 +28,7 @@ pub(crate) fn adapters() -> Vec<Adapter> {
     adapters
 }
 
-/// What an adapter is.
+/// The kind of an adapter.
 pub(crate) fn kind(adapter: &Adapter) -> DeviceKind {
     match adapter.get_info().device_type {
         DeviceType::DiscreteGpu => DeviceKind::DiscreteGpu,
@@ -39,7 +39,7 @@ pub(crate) fn kind(adapter: &Adapter) -> DeviceKind {
     }
 }
 
-/// What is known of an adapter.
+/// The description of an adapter.
 pub(crate) fn info(adapter: &Adapter) -> DeviceInfo {
     let info = adapter.get_info();
     let driver = [info.driver, info.driver_info].join(" ").trim().to_owned();
@@ -56,7 +56,7 @@ pub(crate) fn info(adapter: &Adapter) -> DeviceInfo {
     }
 }
 
-/// Why there is no device at an index beyond `count` adapters.
+/// The reason why there is no device at an index beyond `count` adapters.
 pub(crate) fn missing(count: usize) -> String {
     match count {
         0 if !vulkan::has_loader() => missing::loader(),

@@ -1,11 +1,12 @@
-//! GPU backend through wgpu. Its labels and messages are the scalar backend's to the bit.
+//! The GPU backend through wgpu. Its labels and messages equal those of the scalar backend to the bit.
 //!
-//! `bp-gpu` says what runs: this crate allocates, compiles, encodes and submits what a program says, and turns
-//! all that can go wrong there into errors. Its devices are those that have a Vulkan driver.
+//! It allocates, compiles, encodes and submits the programs of `bp_gpu`, and turns all failures into errors. Its devices are
+//! those with a Vulkan driver.
 //!
-//! `instance` lists adapters, `device` opens one, `buffers` and `pipelines` make what a program names, `recording` encodes
-//! its commands, `queue` runs them, `clock` times them, `gpu` keeps wgpu from ending the program, and
-//! `vulkan` asks for what wgpu does not tell.
+//! * `instance` lists adapters, and `device` opens them. `vulkan` asks Vulkan for properties that wgpu does not report.
+//! * `gpu` is an open device. It keeps wgpu from ending the program.
+//! * `buffers` and `pipelines` make the resources of a program. `recording` encodes its commands, `queue` runs them, and
+//!   `clock` takes their times.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffers;
@@ -26,8 +27,8 @@ use bp_gpu::Limits;
 pub struct Wgpu;
 
 impl Wgpu {
-    /// Opens a device as [`Backend::open`] does, but lets `change` lower what it is said to allow: how a small image
-    /// tests what else takes a large one.
+    /// Opens a device by its index in [`Backend::devices`], with changed limits. Tests lower them, so that small plans are
+    /// split like large ones.
     ///
     /// # Errors
     /// [`Error::Unavailable`] with the reason.

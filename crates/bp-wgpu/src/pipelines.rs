@@ -1,4 +1,4 @@
-//! The pipelines of a device: each is compiled once, whichever plans need it.
+//! The pipelines of a device. Each is compiled once and shared by all plans.
 
 use std::{
     collections::HashMap,
@@ -15,7 +15,7 @@ use wgpu::{
 
 use crate::{gpu::Gpu, vulkan};
 
-/// What a block of parameters is bound as.
+/// The size of the binding for a block of parameters.
 pub(crate) const PARAMETER_BYTES: Option<BufferSize> = BufferSize::new(Program::PARAMETER_BYTES);
 
 /// All pipelines made so far.
@@ -24,21 +24,21 @@ pub(crate) struct Pipelines {
     cache: Option<Cache>,
 }
 
-/// The driver's own form of pipelines, kept between runs.
+/// The driver's cache of compiled pipelines, kept between runs.
 struct Cache {
     key: String,
     pipelines: PipelineCache,
-    /// What is stored of it.
+    /// The cache as it was last stored.
     stored: Mutex<Vec<u8>>,
 }
 
 impl Pipelines {
-    /// No pipelines, but what earlier runs left of theirs.
+    /// Starts without pipelines, but with the cache of earlier runs.
     pub(crate) fn new(gpu: &Gpu, adapter: &Adapter) -> Result<Self, Error> {
         Ok(Self { made: Mutex::default(), cache: gpu.guard(0, || Ok(load(gpu, adapter)))? })
     }
 
-    /// The pipeline, and whether it was made just now.
+    /// Gets a pipeline, and whether it was compiled just now.
     pub(crate) fn get(&self, gpu: &Gpu, pipeline: &Pipeline) -> Result<(ComputePipeline, bool), Error> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = made.get(pipeline) {
@@ -50,7 +50,7 @@ impl Pipelines {
         Ok((new, true))
     }
 
-    /// Leaves what was compiled for later runs, unless an earlier one left the same.
+    /// Stores the cache for later runs, unless it is unchanged.
     pub(crate) fn store(&self) {
         let Some(cache) = &self.cache else { return };
         let Some(data) = cache.pipelines.get_data() else { return };
@@ -98,7 +98,7 @@ fn compile(gpu: &Gpu, pipeline: &Pipeline, cache: Option<&PipelineCache>) -> Com
     })
 }
 
-/// How a kernel's buffers are bound; wgpu takes equal layouts for one.
+/// The layout of a kernel's buffers. wgpu treats equal layouts as the same one.
 pub(crate) fn layout(gpu: &Gpu, kernel: Kernel) -> BindGroupLayout {
     let parameters = BindingType::Buffer {
         ty: BufferBindingType::Storage { read_only: true },

@@ -1,4 +1,4 @@
-//! A program made ready on a device.
+//! A program prepared on a device.
 
 use std::{
     mem,
@@ -18,14 +18,15 @@ use crate::{
     recording::{self, Recording},
 };
 
-/// A program made ready on a device.
+/// A program prepared on a device.
 pub(crate) struct WgpuQueue {
     gpu: Arc<Gpu>,
     recording: Recording,
     clock: Option<Clock>,
-    /// What is uploaded: wgpu lets mapped memory be written but not read, and who fills a slice may do both.
+    /// The data to upload. It needs memory of its own: wgpu's mapped memory cannot be read, but a function that fills a slice
+    /// may read it.
     upload: Vec<u8>,
-    /// What was appended and not submitted, if anything was.
+    /// The encoder of commands that are appended but not submitted, if there are any.
     encoder: Option<CommandEncoder>,
     last: SubmissionIndex,
     compile_time: Duration,
@@ -50,7 +51,7 @@ impl WgpuQueue {
         Ok(Self { gpu: Arc::clone(gpu), recording, clock, upload, encoder: None, last, compile_time, bytes })
     }
 
-    /// Submits what was appended, and returns the submission before.
+    /// Submits the appended commands, and returns the submission before.
     fn flush(&mut self) -> SubmissionIndex {
         match self.encoder.take() {
             Some(encoder) => mem::replace(&mut self.last, recording::submit(&self.gpu, encoder)),
@@ -65,12 +66,12 @@ impl WgpuQueue {
     }
 }
 
-/// The encoder of what is appended.
+/// The encoder of appended commands.
 fn open<'a>(gpu: &Gpu, encoder: &'a mut Option<CommandEncoder>) -> &'a mut CommandEncoder {
     encoder.get_or_insert_with(|| recording::encoder(gpu))
 }
 
-/// Compiles the kernels of a program, and tells how long that took. What it leaves in the buffers is of no use.
+/// Compiles the kernels of a program, and returns the time spent on it. It leaves arbitrary values in the buffers.
 fn compile(
     gpu: &Gpu,
     pipelines: &Pipelines,

@@ -1,4 +1,4 @@
-//! The commands of a program. wgpu runs a recording only once, so that they are encoded anew for every solve.
+//! The commands of a program. wgpu runs a recording only once, so they are encoded again for every solve.
 
 use bp_core::Error;
 use bp_gpu::{Command, Program};
@@ -9,7 +9,7 @@ use wgpu::{
 
 use crate::{buffers, gpu::Gpu};
 
-/// The commands of a program, and all that they name.
+/// The commands of a program, and the resources they use.
 pub(crate) struct Recording {
     /// The buffers of the program.
     pub(crate) buffers: Vec<Buffer>,
@@ -19,7 +19,7 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// Binds the buffers of a program. To be called under [`Gpu::guard`].
+    /// Binds the buffers of a program. Call it under [`Gpu::guard`].
     pub(crate) fn new(gpu: &Gpu, program: &Program, buffers: Vec<Buffer>, pipelines: Vec<ComputePipeline>) -> Self {
         let bind_groups = program.bind_groups.iter().map(|group| buffers::bind(gpu, group, &buffers)).collect();
         // wgpu itself finds where barriers are needed.
@@ -54,8 +54,8 @@ impl Recording {
         }
     }
 
-    /// Runs a workgroup of each of these pipelines, as some drivers compile a kernel only when it first runs. To be
-    /// called under [`Gpu::guard`].
+    /// Runs one workgroup of each of these pipelines, because some drivers compile a kernel at its first run. Call it under
+    /// [`Gpu::guard`].
     pub(crate) fn warm_up(&self, gpu: &Gpu, pipelines: &[usize]) -> Result<(), Error> {
         for &wanted in pipelines {
             let first = self.segments.iter().flatten().find_map(|command| match *command {
@@ -78,7 +78,7 @@ pub(crate) fn encoder(gpu: &Gpu) -> CommandEncoder {
     gpu.device.create_command_encoder(&CommandEncoderDescriptor::default())
 }
 
-/// Submits what was encoded.
+/// Submits the encoded commands.
 pub(crate) fn submit(gpu: &Gpu, encoder: CommandEncoder) -> SubmissionIndex {
     gpu.queue.submit([encoder.finish()])
 }

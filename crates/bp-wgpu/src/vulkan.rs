@@ -1,4 +1,4 @@
-//! What wgpu does not tell of a device, asked of Vulkan behind it: both see the same instance and driver.
+//! Properties of a device that wgpu does not report. They come from the Vulkan driver behind it.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::ops::Deref;
@@ -16,7 +16,7 @@ pub(crate) fn has_loader() -> bool {
     unsafe { Entry::load() }.is_ok()
 }
 
-/// The version of Vulkan that a device has, and whom it is asked through.
+/// The Vulkan version of a device, and the interface that reports it.
 pub(crate) fn api(adapter: &Adapter) -> Option<String> {
     let version = properties(adapter)?.api_version;
     let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
@@ -34,7 +34,7 @@ pub(crate) fn uuid(adapter: &Adapter) -> Option<String> {
     Some(Uuid::from_bytes(id.device_uuid).to_string())
 }
 
-/// Names the driver and the device for which stored pipelines are good.
+/// The key of stored pipelines: it names the driver and the device that can load them.
 pub(crate) fn cache_key(adapter: &Adapter) -> Option<String> {
     let vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, pipeline_cache_uuid, .. } =
         properties(adapter)?;
@@ -42,13 +42,13 @@ pub(crate) fn cache_key(adapter: &Adapter) -> Option<String> {
     Some(format!("wgpu-{vendor_id:x}-{device_id:x}-{driver_version:x}-{uuid}"))
 }
 
-/// Bytes of the heap that buffers on the device are taken from.
+/// The bytes of the heap that holds buffers on the device.
 pub(crate) fn memory_bytes(adapter: &Adapter) -> Option<u64> {
     let memory = memory(&*raw(adapter)?);
     Some(memory.memory_heaps[device_heap(&memory)?].size)
 }
 
-/// Bytes of that heap that are still free for this process, where the driver tells.
+/// The bytes of that heap that are still free for this process, if the driver reports them.
 pub(crate) fn free_bytes(adapter: &Adapter) -> Option<u64> {
     let hal = raw(adapter).filter(|hal| answers_more(hal))?;
     if !hal.physical_device_capabilities().supports_extension(ext::memory_budget::NAME) {
@@ -73,7 +73,7 @@ fn properties(adapter: &Adapter) -> Option<vk::PhysicalDeviceProperties> {
     Some(raw(adapter)?.physical_device_capabilities().properties())
 }
 
-/// Whether Vulkan is 1.1 or later on both sides: before that there are no extensible questions.
+/// Whether instance and device have Vulkan 1.1 or later. Earlier versions cannot answer extended queries.
 fn answers_more(hal: &hal::vulkan::Adapter) -> bool {
     let device = hal.physical_device_capabilities().properties().api_version;
     hal.shared_instance().instance_api_version().min(device) >= vk::API_VERSION_1_1
@@ -85,7 +85,7 @@ fn memory(hal: &hal::vulkan::Adapter) -> vk::PhysicalDeviceMemoryProperties {
     unsafe { instance.get_physical_device_memory_properties(hal.raw_physical_device()) }
 }
 
-/// The heap that wgpu takes buffers on the device from: that of the first type of memory which is the device's own.
+/// The heap that wgpu uses for buffers on the device: that of the first device-local type of memory.
 fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<usize> {
     let types = memory.memory_types_as_slice();
     let local = types.iter().find(|kind| kind.property_flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL));

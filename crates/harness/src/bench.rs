@@ -5,20 +5,22 @@
 mod list;
 mod settings;
 
-use std::{collections::HashSet, path::Path, time::Duration};
+use std::{collections::HashSet, ffi::OsString, path::Path, time::Duration};
 
 use list::Of;
 use settings::Settings;
 
+use bp_stereo::Watch;
+
 use crate::{
-    args::{DataArgs, SpeedArgs},
-    backends::{self, Asked},
-    command::{check_speed, write_speed},
     failure::Failure,
-    interrupt, machine, report, reproduce,
+    machine,
+    measure::Asked,
+    record::speed::Speed,
+    report, reproduce,
     scenes::Source,
-    speed::{self, Speed},
-    tell, threads,
+    speed::{self, Files, SpeedOptions},
+    threads,
 };
 
 /// One time of one contestant, as criterion is to know it.
@@ -45,14 +47,16 @@ impl Bench {
     }
 }
 
+/// Reads a variable of the environment, by its name.
+pub type Environment<'a> = dyn Fn(&str) -> Option<OsString> + Sync + 'a;
+
 /// All benches that there may be, without samples: whether a device has a clock shows when it is used.
 ///
 /// # Errors
 /// A message that names the variable of the environment that cannot be followed.
-pub fn possible() -> Result<Vec<Bench>, String> {
-    let settings = Settings::read(|name| std::env::var_os(name));
-    let job = settings.and_then(Job::new).map_err(|failure| failure.to_string())?;
-    Ok(job.possible)
+pub fn possible(environment: &Environment<'_>, watch: &Watch<'_>) -> Result<Vec<Bench>, String> {
+    let job = Settings::read(environment).and_then(|settings| Job::new(settings, watch));
+    Ok(job.map_err(|failure| failure.to_string())?.possible)
 }
 
 /// Measures every scene and problem that a bench whose name `is_asked` is of, writes records, tables and charts to a new
@@ -63,15 +67,17 @@ pub fn possible() -> Result<Vec<Bench>, String> {
 pub fn run(
     is_asked: &(dyn Fn(&str) -> bool + Sync),
     results: &Path,
+    environment: &Environment<'_>,
+    watch: &Watch<'_>,
     show: impl FnOnce(&[Bench]),
 ) -> Result<(), String> {
     let measure = || {
-        let job = Job::new(Settings::read(|name| std::env::var_os(name))?)?;
+        let job = Job::new(Settings::read(environment)?, watch)?;
         let asked = job.possible.iter().filter(|bench| is_asked(&bench.id())).map(|bench| bench.of).collect();
-        job.measure(&asked, results)
+        job.measure(&asked, results, watch)
     };
-    let measured = interrupt::listen().and_then(|()| threads::run_on(None, measure));
-    measured.and_then(|measured| measured.shown(show)).map_err(|failure| failure.to_string())
+    let measured = threads::run_on(None, measure).and_then(|measured| measured.shown(watch, show));
+    measured.map_err(|failure| failure.to_string())
 }
 
 /// What can be measured.
@@ -93,59 +99,65 @@ struct Measured {
 }
 
 impl Job {
-    fn new(settings: Settings) -> Result<Self, Failure> {
-        let source = Source::new(&DataArgs { data: settings.data.clone(), synthetic: false }, settings.quick)?;
-        let backends = settings.backends()?;
+    fn new(settings: Settings, watch: &Watch<'_>) -> Result<Self, Failure> {
+        let source = Source::new(settings.data.clone(), settings.quick)?;
+        let backends = settings.backends(watch)?;
         let possible = list::benches(&source.names(), &backends, None);
         Ok(Self { settings, source, backends, possible })
     }
 
-    fn measure(&self, asked: &HashSet<Of>, results: &Path) -> Result<Measured, Failure> {
+    fn measure(&self, asked: &HashSet<Of>, results: &Path, watch: &Watch<'_>) -> Result<Measured, Failure> {
         let Self { settings, source, backends, .. } = self;
-        let mut devices = backends::open_all(backends).map_err(|failure| failure.of(settings::BACKEND))?;
+        let devices = Asked::open_all(backends, watch).map_err(|failure| failure.of(settings::BACKEND))?;
         let is_asked = |name: &str| asked.iter().any(|of| matches!(of, Of::Scene(scene) if *scene == name));
         let scenes = source.names().into_iter().any(is_asked);
         if scenes {
-            tell(&format!("scenes: {}", source.set.described));
+            watch.note(&format!("scenes: {}", source.set.described));
             source.check()?;
         }
         let run = reproduce::settings(source, &devices, settings.quick, settings.rounds());
         let mut storage = reproduce::begin(results, machine::program()?, machine::machine(None), run)?;
         let mut late = Vec::new();
         if scenes {
-            let ran = reproduce::run(source, &mut devices, &mut storage, &is_asked);
+            let ran = reproduce::run(source, &devices, &mut storage, &is_asked, watch);
             late = ran.inspect_err(|_| {
                 let folder = storage.folder().display();
-                tell(&format!("what was measured is in {folder}; `bp report {folder}` makes its tables and charts"));
+                watch.note(&format!(
+                    "what was measured is in {folder}; `bp report {folder}` makes its tables and charts"
+                ));
             })?;
             report::write(storage.folder(), storage.record())?;
         }
         let problem = |of: &Of| if let Of::Problem(name) = of { Some((*name).to_owned()) } else { None };
-        let speed = kernels(settings, asked.iter().filter_map(problem).collect(), &mut devices)?;
-        speed.as_ref().map_or(Ok(()), |speed| write_speed(storage.folder(), speed))?;
+        let speed = kernels(settings, asked.iter().filter_map(problem).collect(), &devices, watch)?;
+        if let Some(speed) = &speed {
+            watch.note(&Files::new(storage.folder())?.write(speed)?);
+        }
         let benches = list::benches(&source.names(), backends, Some((storage.record(), speed.as_ref())));
         Ok(Measured { storage, scenes, late, speed, benches })
     }
 }
 
 /// Measures problems, if there are any.
-fn kernels(settings: &Settings, problem: Vec<String>, devices: &mut [Asked]) -> Result<Option<Speed>, Failure> {
-    if problem.is_empty() {
-        return Ok(None);
-    }
-    let (backend, rounds) = (Vec::new(), Some(settings.rounds()));
-    let args = SpeedArgs { backend, problem, rounds, quick: settings.quick, output: None, threads: None };
-    speed::measure(&args, devices).map(Some)
+fn kernels(
+    settings: &Settings,
+    problems: Vec<String>,
+    devices: &[Asked],
+    watch: &Watch<'_>,
+) -> Result<Option<Speed>, Failure> {
+    let options = SpeedOptions { rounds: Some(settings.rounds()), quick: settings.quick, problems, output: None };
+    let asked = (!options.problems.is_empty()).then(|| speed::measure(&options, devices, watch));
+    asked.transpose()
 }
 
 impl Measured {
     /// Shows the benches and tells where the tables and charts are; fails where something could not be measured.
-    fn shown(self, show: impl FnOnce(&[Bench])) -> Result<(), Failure> {
+    fn shown(self, watch: &Watch<'_>, show: impl FnOnce(&[Bench])) -> Result<(), Failure> {
         show(&self.benches);
         if self.scenes {
-            tell(&format!("tables and charts: {}", self.storage.folder().join(report::PAGE_FILE).display()));
+            watch.note(&format!("tables and charts: {}", self.storage.folder().join(report::PAGE_FILE).display()));
             reproduce::check_cells(self.storage.record(), self.late)?;
         }
-        self.speed.as_ref().map_or(Ok(()), check_speed)
+        self.speed.as_ref().map_or(Ok(()), speed::check)
     }
 }

@@ -7,7 +7,7 @@ use std::{collections::HashMap, path::Path};
 
 use serde::Serialize;
 use speed_ups::SpeedUps;
-pub(crate) use tables::page;
+pub use tables::page;
 
 use crate::{
     failure::Failure,
@@ -18,7 +18,7 @@ use crate::{
 
 /// What several records say about the same plans and scenes.
 #[derive(Serialize)]
-pub(crate) struct Comparison<'a> {
+pub struct Comparison<'a> {
     data: &'a str,
     labels: usize,
     k: u32,
@@ -102,7 +102,7 @@ const NOTE: &str = "Times are means over the scenes of the median of each; messa
 
 impl<'a> Comparison<'a> {
     /// Sets records beside one another, the first of them as the one to compare with.
-    pub(crate) fn new(records: &'a [(&'a Path, Record)]) -> Result<Self, Failure> {
+    pub fn new(records: &'a [(&'a Path, Record)]) -> Result<Self, Failure> {
         let Some(((first_path, first), others)) = records.split_first() else {
             return Err(Failure::usage("no record to compare"));
         };

@@ -13,18 +13,23 @@ use crate::{
 
 /// A format of another program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Format {
+pub enum Format {
+    /// Input of github-action-benchmark (customSmallerIsBetter).
     GithubActionBenchmark,
+    /// Bencher Metric Format.
     Bencher,
+    /// A table with a row for every sample.
     Csv,
+    /// A Vega-Lite chart.
     VegaLite,
 }
 
 impl Format {
-    pub(crate) const ALL: [Self; 4] = [Self::GithubActionBenchmark, Self::Bencher, Self::Csv, Self::VegaLite];
+    /// All formats.
+    pub const ALL: [Self; 4] = [Self::GithubActionBenchmark, Self::Bencher, Self::Csv, Self::VegaLite];
 
     /// What `--format` takes.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::GithubActionBenchmark => "github-action-benchmark",
             Self::Bencher => "bencher",
@@ -35,7 +40,7 @@ impl Format {
 }
 
 /// A record in a format.
-pub(crate) fn export(record: &Record, format: Format) -> Result<String, Failure> {
+pub fn export(record: &Record, format: Format) -> Result<String, Failure> {
     let json = |value: serde_json::Value| format!("{value:#}\n");
     match format {
         Format::GithubActionBenchmark => Ok(json(benchmarks::github_action_benchmark(record))),
@@ -106,7 +111,7 @@ fn setting(record: &Record) -> String {
 }
 
 /// Whether anything was measured at all.
-pub(crate) fn has_numbers(record: &Record) -> bool {
+pub fn has_numbers(record: &Record) -> bool {
     let whole = |measured: &Measurement| !measured.samples.is_empty();
     record.cells.iter().filter_map(|cell| cell.measured()).any(whole)
 }

@@ -1,147 +1,113 @@
-//! How the program fails: a message that says what to do, and an exit code that says who can mend it.
+//! How an experiment fails: a message that says what to do, and a kind that says who can mend it.
 
-use std::{io, path::Path};
+use std::path::Path;
 
-/// Why a command ended without its result.
+/// Why an experiment ended without its result.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
-pub(crate) struct Failure {
+pub struct Failure {
     kind: Kind,
     message: String,
 }
 
+/// What went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    ReaderGone,
+pub enum Kind {
+    /// A full disk, or an output that cannot be written.
     Other,
+    /// Options that contradict each other.
     Usage,
+    /// A file that is missing, broken or does not fit.
     Input,
+    /// Something is worse than a baseline allows.
     Gate,
+    /// A backend or device that is not there.
     Unavailable,
+    /// A plan beyond what a device can run.
     Unsupported,
+    /// A device that went away.
     DeviceLost,
+    /// Too little memory.
     OutOfMemory,
+    /// The caller asked to stop.
     Interrupted,
-}
-
-/// What the exit codes mean, in their order; help, man page and README take it from here.
-pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
-    (0, "done"),
-    (1, "other"),
-    (2, "usage"),
-    (3, "input"),
-    (4, "the gate failed"),
-    (5, "backend or device unavailable or unable to run the plan"),
-    (6, "out of memory"),
-    (130, "interrupted"),
-];
-
-/// The same as a sentence.
-pub(crate) fn exit_codes() -> String {
-    let codes: Vec<String> = EXIT_CODES.iter().map(|(code, what)| format!("{code} {what}")).collect();
-    format!("Exit codes: {}.", codes.join(", "))
 }
 
 impl Failure {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Self { kind, message: as_options(&message.into()) }
+        Self { kind, message: message.into() }
     }
 
     /// The fault of none of the below: a full disk, an output that cannot be written.
-    pub(crate) fn other(message: impl Into<String>) -> Self {
+    pub fn other(message: impl Into<String>) -> Self {
         Self::new(Kind::Other, message)
     }
 
     /// Options that contradict each other.
-    pub(crate) fn usage(message: impl Into<String>) -> Self {
+    pub fn usage(message: impl Into<String>) -> Self {
         Self::new(Kind::Usage, message)
     }
 
     /// A file that is missing, broken or does not fit.
-    pub(crate) fn input(message: impl Into<String>) -> Self {
+    pub fn input(message: impl Into<String>) -> Self {
         Self::new(Kind::Input, message)
     }
 
     /// A file that cannot be read.
-    pub(crate) fn reading(path: &Path, error: &dyn std::fmt::Display) -> Self {
+    pub fn reading(path: &Path, error: &dyn std::fmt::Display) -> Self {
         Self::input(format!("{}: {error}", path.display()))
     }
 
     /// A file that cannot be written.
-    pub(crate) fn writing(path: &Path, error: &dyn std::fmt::Display) -> Self {
+    pub fn writing(path: &Path, error: &dyn std::fmt::Display) -> Self {
         Self::other(format!("cannot write {}: {error}", path.display()))
     }
 
     /// Something is worse than a baseline allows.
-    pub(crate) fn gate(message: impl Into<String>) -> Self {
+    pub fn gate(message: impl Into<String>) -> Self {
         Self::new(Kind::Gate, message)
     }
 
     /// Too little memory.
-    pub(crate) fn out_of_memory(message: impl Into<String>) -> Self {
+    pub fn out_of_memory(message: impl Into<String>) -> Self {
         Self::new(Kind::OutOfMemory, message)
     }
 
     /// A backend or device that is not there.
-    pub(crate) fn unavailable(message: impl Into<String>) -> Self {
+    pub fn unavailable(message: impl Into<String>) -> Self {
         Self::new(Kind::Unavailable, message)
     }
 
     /// The same, told of something.
-    pub(crate) fn of(self, what: &str) -> Self {
+    pub fn of(self, what: &str) -> Self {
         Self { message: format!("{what}: {}", self.message), ..self }
     }
 
     /// Stopped by the user.
-    pub(crate) fn interrupted() -> Self {
+    pub fn interrupted() -> Self {
         Self::new(Kind::Interrupted, "interrupted")
     }
 
-    /// The exit code.
+    /// What went wrong, and so who can mend it.
     #[must_use]
-    pub(crate) fn code(&self) -> u8 {
-        match self.kind {
-            Kind::ReaderGone => 0,
-            Kind::Other => 1,
-            Kind::Usage => 2,
-            Kind::Input => 3,
-            Kind::Gate => 4,
-            Kind::Unavailable | Kind::Unsupported | Kind::DeviceLost => 5,
-            Kind::OutOfMemory => 6,
-            Kind::Interrupted => 130,
-        }
+    pub fn kind(&self) -> Kind {
+        self.kind
     }
 
     /// Whether the device is there, but the plan is more than it can run.
-    pub(crate) fn is_beyond_device(&self) -> bool {
+    pub fn is_beyond_device(&self) -> bool {
         matches!(self.kind, Kind::Unsupported | Kind::OutOfMemory)
     }
 
     /// Who can mend it, as devices ask.
-    pub(crate) fn cause(&self) -> bp_stereo::Cause {
+    pub fn cause(&self) -> bp_stereo::Cause {
         if self.kind == Kind::DeviceLost { bp_stereo::Cause::DeviceLost } else { bp_stereo::Cause::System }
     }
 
     /// Whether the user stopped the program.
-    pub(crate) fn is_interrupted(&self) -> bool {
+    pub fn is_interrupted(&self) -> bool {
         self.kind == Kind::Interrupted
     }
-}
-
-/// Libraries name options by their fields, as in `` `max_memory` ``; on a command line that is `--max-memory`.
-pub(crate) fn as_options(message: &str) -> String {
-    let is_field = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
-    let parts: Vec<&str> = message.split('`').collect();
-    let mut text = String::new();
-    for (index, part) in parts.iter().enumerate() {
-        let is_quoted = index % 2 == 1 && index + 1 < parts.len();
-        text += &match (is_quoted, is_field(part)) {
-            (true, true) => format!("--{}", part.replace('_', "-")),
-            (true, false) => format!("`{part}`"),
-            (false, _) => (*part).to_owned(),
-        };
-    }
-    text
 }
 
 impl From<bp_core::Error> for Failure {
@@ -176,26 +142,5 @@ impl From<bp_stereo::Error> for Failure {
 impl From<bp_stereo::Stopped> for Failure {
     fn from(_: bp_stereo::Stopped) -> Self {
         Self::interrupted()
-    }
-}
-
-/// Standard output that cannot be written to: a full disk, say. A reader that closed its end, as `head` does, has what
-/// it wanted.
-impl From<io::Error> for Failure {
-    fn from(error: io::Error) -> Self {
-        let kind = if error.kind() == io::ErrorKind::BrokenPipe { Kind::ReaderGone } else { Kind::Other };
-        Self::new(kind, format!("cannot write to standard output: {error}"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_readme_lists_the_exit_codes() {
-        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-        let readme = include_str!("../../../README.md");
-        assert!(words(readme).contains(&exit_codes()), "{}", exit_codes());
     }
 }

@@ -15,22 +15,24 @@ mod table;
 mod tests;
 mod verdict;
 
-use std::collections::BTreeMap;
+use std::path::PathBuf;
 
-use crate::{args::GateArgs, failure::Failure, machine, record::Machine, scenes};
+use bp_stereo::Watch;
+
+use crate::{failure::Failure, machine, record::Machine, scenes};
 use baseline::Baselines;
-pub(crate) use callgrind::Solve;
+pub use callgrind::Counted;
 use guarded::Guarded;
-pub(crate) use instructions::instructions;
-pub(crate) use judge::Judgement;
+pub use instructions::instructions;
+pub use judge::Judgement;
 use measure::{Measured, Problem, measure};
-pub(crate) use renew::Renewal;
+pub use renew::Renewal;
 use runners::Runners;
-pub(crate) use table::page;
+pub use table::page;
 
 /// Whether the text of a file holds baselines, of one kind or the other.
 #[cfg(feature = "fuzzing")]
-pub(crate) fn is_baseline(path: &std::path::Path, text: &str) -> bool {
+pub fn is_baseline(path: &std::path::Path, text: &str) -> bool {
     file::parse::<baseline::Baseline>(path, text).is_ok() || file::parse::<callgrind::Counts>(path, text).is_ok()
 }
 
@@ -44,22 +46,36 @@ const QUICK: (usize, usize, u32) = (3, 40, 18);
 /// is a part of the noise.
 const MEASUREMENTS_OF_A_BASELINE: usize = 3;
 
-/// Measures and judges; with `--update`, renews the baselines.
-pub(crate) fn gate(args: &GateArgs) -> Result<Judgement, Failure> {
+/// What is measured, and what it is held against.
+#[derive(Debug)]
+pub struct GateOptions {
+    /// A smaller image and fewer loops.
+    pub quick: bool,
+    /// Rounds of a measurement.
+    pub rounds: u32,
+    /// The folder of the baselines.
+    pub baselines: PathBuf,
+    /// Baselines to write anew.
+    pub update: Option<Renewal>,
+}
+
+/// Measures and judges, or renews the baselines if that is asked for.
+pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
     let machine = machine::machine(None);
-    let mut baselines = Baselines::read(&args.baselines, &machine, args.update.is_some())?;
+    let mut baselines = Baselines::read(&options.baselines, &machine, options.update.is_some())?;
     let runners = Runners::open()?;
-    let gate = Gate { args, guarded: guarded::all(&runners.lineup), problem: problem(args.quick)?, runners, machine };
-    let first = gate.measure()?;
+    let gate =
+        Gate { options, guarded: guarded::all(&runners.lineup), problem: problem(options.quick)?, runners, machine };
+    let first = gate.measure(watch)?;
     let mut judgement = Judgement::new(&gate, &baselines, &first)?;
-    if let Some(renewal) = args.update {
+    if let Some(renewal) = options.update {
         let mut all = vec![first];
         for _ in 1..MEASUREMENTS_OF_A_BASELINE {
-            all.push(gate.measure()?);
+            all.push(gate.measure(watch)?);
         }
         judgement.written = gate.renew(renewal, &mut baselines, &all)?;
     } else if judgement.is_any_worse() {
-        judgement.repeat(&gate.measure()?);
+        judgement.repeat(&gate.measure(watch)?);
     }
     Ok(judgement)
 }
@@ -72,7 +88,7 @@ fn problem(quick: bool) -> Result<Problem, Failure> {
 
 /// What is measured, and where.
 struct Gate<'a> {
-    args: &'a GateArgs,
+    options: &'a GateOptions,
     guarded: Vec<Guarded>,
     problem: Problem,
     runners: Runners,
@@ -80,16 +96,12 @@ struct Gate<'a> {
 }
 
 impl Gate<'_> {
-    fn measure(&self) -> Result<Measured, Failure> {
-        measure(&self.guarded, &self.runners, &self.problem, self.args.rounds)
+    fn measure(&self, watch: &Watch<'_>) -> Result<Measured, Failure> {
+        measure(&self.guarded, &self.runners, &self.problem, self.options.rounds, watch)
     }
 
     /// Which of a baseline's runs is like this one.
     fn setting(&self) -> &'static str {
-        if self.args.quick { "quick" } else { "full" }
-    }
-
-    fn devices(&self) -> BTreeMap<String, String> {
-        self.runners.all.iter().map(|runner| (runner.name.clone(), runner.device())).collect()
+        if self.options.quick { "quick" } else { "full" }
     }
 }

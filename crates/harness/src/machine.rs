@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// The machine; `name` replaces the one made from the processor's.
-pub(crate) fn machine(name: Option<&str>) -> Machine {
+pub fn machine(name: Option<&str>) -> Machine {
     let what = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
     // Where the system does not tell, the record says so rather than the run failing.
     let system = System::new_with_specifics(what).ok();
@@ -30,7 +30,7 @@ pub(crate) fn machine(name: Option<&str>) -> Machine {
 }
 
 /// The processor told apart from others that go by the same name, as rented ones do.
-pub(crate) fn processor(machine: &Machine) -> String {
+pub fn processor(machine: &Machine) -> String {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(id) = raw_cpuid::CpuId::new().get_feature_info() {
         return format!("{}, family {}, model {}", machine.cpu, id.family_id(), id.model_id());
@@ -39,13 +39,13 @@ pub(crate) fn processor(machine: &Machine) -> String {
 }
 
 /// The kind of a machine: alike are those of one processor and as many cores.
-pub(crate) fn kind(machine: &Machine) -> String {
+pub fn kind(machine: &Machine) -> String {
     slug(&format!("{} {} cores", processor(machine), machine.cores))
 }
 
 /// Refuses what does not fit into the memory that a device can have now, before anything is allocated. Where that is not
 /// known, allocating will.
-pub(crate) fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
+pub fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
     let iec = |bytes| ByteSize(bytes).display().iec();
     match Memory::available_to(kind) {
         Some(free) if needed > free => {
@@ -57,7 +57,7 @@ pub(crate) fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Resul
 }
 
 /// The running program.
-pub(crate) fn program() -> Result<Program, Failure> {
+pub fn program() -> Result<Program, Failure> {
     let failed = |error: io::Error| Failure::other(format!("cannot read this program's own file: {error}"));
     let file = std::env::current_exe().and_then(fs::read).map_err(failed)?;
     Ok(Program {
@@ -71,7 +71,7 @@ pub(crate) fn program() -> Result<Program, Failure> {
 }
 
 /// The commit that the running program was built from, and whether with changes.
-pub(crate) fn commit() -> String {
+pub fn commit() -> String {
     let changes = if env!("BP_CLEAN_TREE") == "true" { "" } else { " with changes" };
     format!("{}{changes}", env!("BP_COMMIT"))
 }

@@ -2,14 +2,18 @@
 //! schema.
 
 mod load;
+mod sample;
+pub mod speed;
 
+pub use bp_stereo::description::milliseconds;
 pub use bp_stereo::description::{Clock, Clocked, Cut, Device, Energy, Errors, Finish, Settings, Stages};
-pub(crate) use bp_stereo::description::{Derived, clocks};
-#[cfg(feature = "fuzzing")]
-pub(crate) use load::parse;
-pub(crate) use load::{MAPS_FOLDER, RECORD_FILE, load, record_file};
+pub use load::parse;
+pub use load::{MAPS_FOLDER, RECORD_FILE, SPEED_FILE, load, load_speed, record_file};
+pub use sample::Sample;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
 
 /// Version of the schema; changes with every change of meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -145,11 +149,12 @@ pub struct Cell {
 /// Numbers, or why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+#[schemars(rename = "Outcome")]
+pub enum Outcome<M = Measurement> {
     /// Not run yet.
     Pending,
     /// It ran.
-    Measured(Box<Measurement>),
+    Measured(Box<M>),
     /// It failed.
     Error(String),
     /// This machine lacks the backend's device, or the device is too small for the plan; no fault of the run.
@@ -176,23 +181,6 @@ pub struct Measurement {
     pub map: String,
 }
 
-/// One timed solve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sample {
-    /// Which round of taking turns it belongs to, from 0.
-    pub round: u32,
-    /// Milliseconds to allocate by the wall clock, apart from the total.
-    pub prepare_ms: f64,
-    /// Milliseconds of these that compiling kernels took, where the device compiles any.
-    #[serde(default)]
-    pub compile_ms: Option<f64>,
-    /// Milliseconds from images to labels by the wall clock.
-    pub total_ms: f64,
-    /// Milliseconds of each stage, by the wall clock first.
-    pub clocks: Vec<Clocked>,
-}
-
 /// A labelling and its energy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -207,11 +195,20 @@ pub struct Labelling {
     pub energy: Energy,
 }
 
-impl Sample {
-    /// Milliseconds of message passing, `refine` and `update_messages`, by the device's clock where it has one.
+impl<M> Outcome<M> {
+    /// What a failure leaves: a device that is too small for the plan is no fault of the run.
+    pub fn failed(failure: &Failure) -> Self {
+        let reason = failure.to_string();
+        if failure.is_beyond_device() { Self::Unavailable(reason) } else { Self::Error(reason) }
+    }
+
+    /// The measurement, where there is one.
     #[must_use]
-    pub fn message_passing_ms(&self) -> f64 {
-        self.clocks.last().map_or(0.0, |clocked| clocked.stages.refine_ms + clocked.stages.update_messages_ms)
+    pub fn measured(&self) -> Option<&M> {
+        match self {
+            Self::Measured(measurement) => Some(measurement),
+            Self::Pending | Self::Error(_) | Self::Unavailable(_) => None,
+        }
     }
 }
 
@@ -219,10 +216,7 @@ impl Cell {
     /// The measurement, where there is one.
     #[must_use]
     pub fn measured(&self) -> Option<&Measurement> {
-        match &self.outcome {
-            Outcome::Measured(measurement) => Some(measurement),
-            Outcome::Pending | Outcome::Error(_) | Outcome::Unavailable(_) => None,
-        }
+        self.outcome.measured()
     }
 }
 

@@ -3,7 +3,7 @@
 mod diagrams;
 mod escape;
 mod figures;
-pub(crate) mod format;
+pub mod format;
 mod html;
 mod legend;
 mod markdown;
@@ -14,28 +14,27 @@ mod tables;
 mod thesis;
 mod tradeoffs;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bp_charts::png;
 
-pub(crate) use escape::{markdown as markdown_escaped, printable};
-pub(crate) use markdown::lines;
+pub use escape::{markdown as markdown_escaped, printable};
+pub use markdown::lines;
 pub use opening::headline;
-pub(crate) use opening::{device_fact, machine_fact, program_fact};
-pub(crate) use tables::of_times as table_of_times;
+pub use opening::{device_fact, machine_fact, program_fact};
+pub use tables::of_times as table_of_times;
 
 use crate::{
-    args::ReportArgs,
     failure::Failure,
     files::{write_text, write_whole},
-    note,
     record::{RECORD_FILE, Record, load},
+    speed,
 };
 use readme::{BEGIN, END};
 use results::Results;
 
 /// Name of the self-contained page, written last.
-pub(crate) const PAGE_FILE: &str = "report.html";
+pub const PAGE_FILE: &str = "report.html";
 
 /// A drawing and the words around it.
 struct Drawing {
@@ -89,7 +88,7 @@ impl<'a> Report<'a> {
 }
 
 /// Writes REPORT.md, report.html and the drawings beside a record.
-pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
+pub fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
     let report = Report::new(folder, record)?;
     for drawing in report.drawings() {
         write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
@@ -104,28 +103,39 @@ pub(crate) fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
 
 /// The pages of a record whose maps are not there, and what stands in a README.
 #[cfg(feature = "fuzzing")]
-pub(crate) fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
+pub fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
     let report = Report::of(Results::new(record)?, Vec::new())?;
     Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), Path::new(""), &report.results)])
 }
 
-/// `bp report`.
-pub(crate) fn command(args: &ReportArgs) -> Result<(), Failure> {
-    let run = if args.run.ends_with(RECORD_FILE) { args.run.parent().unwrap_or(&args.run) } else { &args.run };
-    let record = load(&args.run)?;
-    match &args.readme {
-        None => {
-            write(run, &record)?;
-            note(&format!("report: {}", run.join(PAGE_FILE).display()));
-            Ok(())
-        }
-        Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|error| Failure::reading(path, &error))?;
-            let part = readme::part(path, run, &Results::new(&record)?);
-            let missing = || Failure::reading(path, &format!("the markers {BEGIN} and {END} are not in it"));
-            write_text(path, &readme::splice(&text, &part).ok_or_else(missing)?)
-        }
+/// Writes the report of a recorded run again; returns its page.
+///
+/// # Errors
+/// A message that names the file.
+pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
+    if speed::is_record(run) {
+        return speed::renew(run);
     }
+    let (folder, record) = (folder(run), load(run)?);
+    write(folder, &record)?;
+    Ok(folder.join(PAGE_FILE))
+}
+
+/// Writes the part of a page that comes from a recorded run, between its markers.
+///
+/// # Errors
+/// A message that names the file, also where it has no markers.
+pub fn renew_page(run: &Path, page: &Path) -> Result<(), Failure> {
+    let record = load(run)?;
+    let text = std::fs::read_to_string(page).map_err(|error| Failure::reading(page, &error))?;
+    let part = readme::part(page, folder(run), &Results::new(&record)?);
+    let missing = || Failure::reading(page, &format!("the markers {BEGIN} and {END} are not in it"));
+    write_text(page, &readme::splice(&text, &part).ok_or_else(missing)?)
+}
+
+/// The folder of a run that was named by it or by its record.
+fn folder(run: &Path) -> &Path {
+    if run.ends_with(RECORD_FILE) { run.parent().unwrap_or(run) } else { run }
 }
 
 /// The text of a page with the part that comes from a run made anew; `None` where it has no markers or the run cannot be

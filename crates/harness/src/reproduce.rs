@@ -1,22 +1,26 @@
 //! `bp reproduce`: the thesis's experiments, run and recorded.
 
 mod energies;
-pub(crate) mod plans;
+pub mod plans;
 mod run;
 mod storage;
 
-pub(crate) use plans::all as plans;
+pub use plans::all as plans;
 pub use run::ONE_SAMPLE_ABOVE_MS;
-pub(crate) use run::run;
-pub(crate) use storage::{Storage, begin};
+pub use run::run;
+pub use storage::{Storage, begin};
 
-use std::{ops::ControlFlow, path::Path};
+use std::{
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+};
+
+use bp_stereo::Watch;
 
 use crate::{
-    args::ReproduceArgs,
-    backends::{self, Asked},
     failure::Failure,
-    interrupt, machine, note,
+    machine,
+    measure::Asked,
     record::{Cell, Labelling, Outcome, Record, Run},
     report,
     scenes::Source,
@@ -39,36 +43,52 @@ pub fn outside_energies(data: &Path) -> Result<Vec<Labelling>, String> {
     energies::compare(data, &mut |_| ControlFlow::Continue(())).map_err(|failure| failure.to_string())
 }
 
-/// Runs the command.
-pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
-    interrupt::listen()?;
-    threads::run_on(args.threads, || run_all(args))
+/// What a run is asked for.
+#[derive(Debug)]
+pub struct ReproduceOptions {
+    /// The folder of public data; without one the synthetic scenes run.
+    pub data: Option<PathBuf>,
+    /// Small images and few loops.
+    pub quick: bool,
+    /// The devices, as [`Asked::open`] reads them.
+    pub backends: Vec<String>,
+    /// Threads that the devices must work with.
+    pub threads: Option<u16>,
+    /// Samples of a cell, by default [`SAMPLES`], or one in a quick run.
+    pub samples: Option<u32>,
+    /// The folder of recorded runs.
+    pub results: PathBuf,
+    /// Name of this machine there.
+    pub machine: Option<String>,
 }
 
-/// Runs what is asked for and writes its report.
-fn run_all(args: &ReproduceArgs) -> Result<(), Failure> {
-    let source = Source::new(&args.data, args.quick)?;
-    let mut devices = backends::open_all(&args.backend)?;
-    let opened: Vec<_> = devices.iter().filter_map(|asked| asked.device.as_ref().ok()).collect();
-    threads::check(args.threads, &opened)?;
-    let samples = args.samples.unwrap_or(if args.quick { 1 } else { SAMPLES });
-    let settings = settings(&source, &devices, args.quick, samples);
-    note(&format!("scenes: {}", source.set.described));
+/// Runs what is asked for and writes its report; or goes on with a run that was interrupted.
+pub fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Failure> {
+    let source = Source::new(options.data.clone(), options.quick)?;
+    let devices = Asked::open_all(&options.backends, watch)?;
+    threads::check(options.threads, &options.backends, Asked::opened(&devices).map(|runner| runner.info.workers))?;
+    let samples = options.samples.unwrap_or(if options.quick { 1 } else { SAMPLES });
+    let settings = settings(&source, &devices, options.quick, samples);
+    watch.note(&format!("scenes: {}", source.set.described));
     source.check()?;
-    let machine = machine::machine(args.machine.as_deref());
-    let mut storage = storage::open(&args.results, machine, settings)?;
-    let outcome = run(&source, &mut devices, &mut storage, &|_| true);
+    let machine = machine::machine(options.machine.as_deref());
+    let mut storage = storage::open(&options.results, machine, settings, watch)?;
+    let outcome = run(&source, &devices, &mut storage, &|_| true, watch);
     if outcome.as_ref().is_err_and(Failure::is_interrupted) {
-        note(&format!("what was run is kept in {}; the same command goes on from there", storage.folder().display()));
+        let folder = storage.folder().display();
+        watch.note(&format!("what was run is kept in {folder}; the same command goes on from there"));
     }
     let late = outcome?;
     report::write(storage.folder(), storage.record())?;
-    note(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
+    watch.note(&format!("report: {}", storage.folder().join(report::PAGE_FILE).display()));
+    if let Some(line) = report::headline(storage.record()) {
+        watch.note(&line);
+    }
     check_cells(storage.record(), late)
 }
 
 /// What a run on these scenes and devices asks for.
-pub(crate) fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
+pub fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
     Run {
         data: source.set.name.to_owned(),
         quick,
@@ -81,7 +101,7 @@ pub(crate) fn settings(source: &Source, devices: &[Asked], quick: bool, samples:
 }
 
 /// Fails where a cell failed, be it `late`, after samples that are kept, or where none could be run at all.
-pub(crate) fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
+pub fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
     let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
     let failed = record.cells.iter().filter_map(|cell| match &cell.outcome {
         Outcome::Error(error) => Some(format!("{}: {error}", such_as(cell))),

@@ -7,29 +7,28 @@ use bp_testkit::synthetic;
 use serde::Deserialize;
 
 use crate::{
-    args::DataArgs,
     failure::Failure,
     files::{PixelLimit, pixels_sha256, read_image, read_map},
     record::{self, ImageSum},
 };
 
 /// The thesis's six scenes as we identify them, in its order.
-pub(crate) const THESIS_SCENES: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
+pub const THESIS_SCENES: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
 
 /// What the small synthetic scenes are divided by.
 const SMALL_DIVISOR: usize = 2;
 
 /// Six scenes of one origin and size.
 #[derive(Debug)]
-pub(crate) struct Set {
+pub struct Set {
     /// Its name in records, and of its folder in a data folder.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// Labels of every scene: above the largest true disparity of all six, a multiple of 8.
-    pub(crate) labels: usize,
+    pub labels: usize,
     /// What it is, in a sentence.
-    pub(crate) described: &'static str,
+    pub described: &'static str,
     /// The same in few words, for every table and chart.
-    pub(crate) short: &'static str,
+    pub short: &'static str,
 }
 
 const HALF_SIZE: Set = Set {
@@ -58,31 +57,32 @@ const SMALL_SYNTHETIC: Set = Set {
 };
 
 /// The set of that name in records.
-pub(crate) fn set(name: &str) -> Option<&'static Set> {
+pub fn set(name: &str) -> Option<&'static Set> {
     [&HALF_SIZE, &THIRD_SIZE, &SYNTHETIC, &SMALL_SYNTHETIC].into_iter().find(|set| set.name == name)
 }
 
 /// A pair with its ground truth.
-pub(crate) struct Scene {
-    pub(crate) pair: StereoPair,
-    pub(crate) truth: GroundTruth,
-    pub(crate) record: record::Scene,
+pub struct Scene {
+    /// The images.
+    pub pair: StereoPair,
+    /// The ground truth of the left image.
+    pub truth: GroundTruth,
+    /// Its description.
+    pub record: record::Scene,
 }
 
 /// Where scenes come from.
 #[derive(Clone, Debug)]
-pub(crate) struct Source {
+pub struct Source {
     /// The data folder; `None` for synthetic scenes.
     folder: Option<PathBuf>,
-    pub(crate) set: &'static Set,
+    /// Which six scenes.
+    pub set: &'static Set,
 }
 
 impl Source {
-    /// What the options ask for: the data folder's scenes where one is given, at half size or, when `quick`, at third
-    /// size; else the synthetic scenes.
-    pub(crate) fn new(args: &DataArgs, quick: bool) -> Result<Self, Failure> {
-        let named = |folder: &PathBuf| !folder.as_os_str().is_empty();
-        let folder = args.data.clone().filter(|folder| named(folder) && !args.synthetic);
+    /// The scenes of a data folder, at half size or, if `quick`, at third size. Without a folder, the synthetic scenes.
+    pub fn new(folder: Option<PathBuf>, quick: bool) -> Result<Self, Failure> {
         let set = match (&folder, quick) {
             (Some(_), false) => &HALF_SIZE,
             (Some(_), true) => &THIRD_SIZE,
@@ -100,23 +100,23 @@ impl Source {
     }
 
     /// The folder of public data, where that is used.
-    pub(crate) fn folder(&self) -> Option<&Path> {
+    pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
     /// The names of the six scenes, in order.
-    pub(crate) fn names(&self) -> [&'static str; 6] {
+    pub fn names(&self) -> [&'static str; 6] {
         if self.folder.is_some() { THESIS_SCENES } else { synthetic::NAMES }
     }
 
     /// Fails where a file of the six scenes is missing or not the one listed; for telling so before a run begins.
-    pub(crate) fn check(&self) -> Result<(), Failure> {
+    pub fn check(&self) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };
         THESIS_SCENES.iter().try_for_each(|scene| middlebury(folder, self.set, scene).map(drop))
     }
 
     /// Loads scene `index` of six.
-    pub(crate) fn load(&self, index: usize) -> Result<Scene, Failure> {
+    pub fn load(&self, index: usize) -> Result<Scene, Failure> {
         match &self.folder {
             Some(folder) => middlebury(folder, self.set, THESIS_SCENES[index]),
             None => made_up(index, if self.set.name == SYNTHETIC.name { 1 } else { SMALL_DIVISOR }),
@@ -141,7 +141,7 @@ fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<Ima
 }
 
 /// Makes scene `index` of six with both sides divided by `divisor`.
-pub(crate) fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
+pub fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
     let synthetic::Scene { name, pair, truth_left, visible, .. } = synthetic::scene(index, divisor);
     let truth = GroundTruth::with_mask(truth_left, visible)?;
     let sum = |path: &str, image: &Image| ImageSum { path: path.to_owned(), sha256: pixels_sha256(image) };
@@ -171,43 +171,47 @@ fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
     Ok(Scene { record: described(scene, &pair, &truth, images), pair, truth })
 }
 
-/// What the public data files should be: `bench-data/middlebury.json`.
+/// The manifest as messages name it.
+const MANIFEST: &str = "crates/harness/data/middlebury.json";
+
+/// The expected checksums of the public data files: `data/middlebury.json`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Manifest {
+pub struct Manifest {
     #[expect(dead_code, reason = "for readers of the file")]
     about: String,
-    pub(crate) files: Vec<ManifestEntry>,
+    /// The files.
+    pub files: Vec<ManifestEntry>,
 }
 
 /// A data file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct ManifestEntry {
+pub struct ManifestEntry {
     /// Path below the data folder.
-    pub(crate) path: String,
+    pub path: String,
     width: usize,
     height: usize,
     /// Of a disparity map: stored value over disparity in pixels.
-    pub(crate) scale: Option<f32>,
+    pub scale: Option<f32>,
     /// Of the decoded pixels.
     sha256: String,
 }
 
 impl Manifest {
     /// The manifest of this build.
-    pub(crate) fn read() -> Result<Self, Failure> {
-        let text = include_str!("../../../bench-data/middlebury.json");
-        serde_json::from_str(text).map_err(|error| Failure::other(format!("bench-data/middlebury.json: {error}")))
+    pub fn read() -> Result<Self, Failure> {
+        let text = include_str!("../data/middlebury.json");
+        serde_json::from_str(text).map_err(|error| Failure::other(format!("{MANIFEST}: {error}")))
     }
 
     fn entry(&self, path: &str) -> Result<&ManifestEntry, Failure> {
         let entry = self.files.iter().find(|entry| entry.path == path);
-        entry.ok_or_else(|| Failure::other(format!("bench-data/middlebury.json does not list {path}")))
+        entry.ok_or_else(|| Failure::other(format!("{MANIFEST} does not list {path}")))
     }
 
     /// Reads a listed image and fails, with its name, where it is not the one listed.
-    pub(crate) fn checked(&self, folder: &Path, path: &Path) -> Result<Image, Failure> {
+    pub fn checked(&self, folder: &Path, path: &Path) -> Result<Image, Failure> {
         let below = path.strip_prefix(folder).unwrap_or(path);
         let entry = self.entry(&below.to_string_lossy().replace('\\', "/"))?;
         let image = read_image(path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
@@ -217,7 +221,7 @@ impl Manifest {
             return Err(Failure::reading(path, &format!("{width}x{height} pixels instead of {expected}")));
         }
         if pixels_sha256(&image) != entry.sha256 {
-            let what = "its pixels are not those that bench-data/middlebury.json lists; delete it and fetch it again";
+            let what = format!("its pixels are not those that {MANIFEST} lists; delete it and fetch it again");
             return Err(Failure::reading(path, &what));
         }
         Ok(image)

@@ -1,19 +1,17 @@
 //! A record in brief: every plan on every backend, over all scenes.
 
-mod interval;
-
 use std::collections::HashMap;
 
-pub(crate) use interval::{interval, mean_of_medians, ratio_interval};
+pub(crate) use crate::statistics::{interval, mean_of_medians, ratio_interval};
 
 use crate::record::{Cell, Measurement, Record, Sample};
 
 /// A plan on a backend, over the scenes of a record.
 pub(crate) struct Group<'a> {
-    pub(crate) plan: &'a str,
-    pub(crate) backend: &'a str,
+    pub plan: &'a str,
+    pub backend: &'a str,
     /// One a scene, in their order.
-    pub(crate) cells: Vec<Option<&'a Cell>>,
+    pub cells: Vec<Option<&'a Cell>>,
 }
 
 /// The groups of a record, in the order of their first cells.

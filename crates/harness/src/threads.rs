@@ -1,25 +1,25 @@
 //! The threads that work is shared by.
 
-use crate::{backends::Opened, failure::Failure};
+use crate::failure::Failure;
 
-/// Runs `work` on a worker of a pool of so many threads, by default as many as RAYON_NUM_THREADS
-/// says, else one a processor. The rayon backend works in the pool
-/// that it is called in; called from one of its workers, it need not hand every kernel over to another thread.
-pub(crate) fn run_on<T: Send>(
+/// Runs `work` on a worker of a pool of so many threads. The backend `rayon` works in the pool that it is called in; called
+/// from one of its workers, it need not hand every kernel over to another thread.
+///
+/// # Errors
+/// Those of `work`, and a failure where the threads cannot be started.
+pub fn run_on<T: Send, E: From<Failure> + Send>(
     threads: Option<u16>,
-    work: impl FnOnce() -> Result<T, Failure> + Send,
-) -> Result<T, Failure> {
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from));
-    let failed = |error| Failure::other(format!("cannot start the threads: {error}; fewer --threads may do"));
-    builder.build().map_err(failed)?.install(work)
+    work: impl FnOnce() -> Result<T, E> + Send,
+) -> Result<T, E> {
+    let pool = bp_stereo::thread_pool(threads.map(usize::from)).map_err(Failure::from)?;
+    pool.install(work)
 }
 
-/// Refuses a number of threads that no device works with.
-pub(crate) fn check(threads: Option<u16>, devices: &[&Opened]) -> Result<(), Failure> {
+/// Refuses a number of threads that none of these devices works with.
+pub fn check(threads: Option<u16>, names: &[String], workers: impl IntoIterator<Item = usize>) -> Result<(), Failure> {
     match threads.map(usize::from) {
-        Some(threads) if devices.iter().all(|device| device.info.workers != threads) => {
-            let names = devices.iter().map(|device| device.name.as_str()).collect::<Vec<_>>().join(",");
-            let what = format!("--backend {names} has no threads; --backend rayon has");
+        Some(threads) if workers.into_iter().all(|workers| workers != threads) => {
+            let what = format!("--backend {} has no threads; --backend rayon has", names.join(","));
             Err(Failure::usage(format!("--threads {threads}: {what}")))
         }
         _ => Ok(()),

@@ -4,9 +4,9 @@ use super::Plan;
 use crate::{Schedule, Stage};
 
 impl Plan {
-    /// Bytes that each stage has to read and write at least, each value of a step counted once, where every stage finds
-    /// what it reads in memory and leaves what it makes there, in the order of [`Stage::ALL`]. `None` under
-    /// [`Schedule::Sweep`], whose stages share what they read in ways that differ between backends.
+    /// The bytes that each stage has to read and write at least, in the order of [`Stage::ALL`], if every stage reads its
+    /// input from memory and writes its output there. It counts each value once per step. `None` under
+    /// [`Schedule::Sweep`], whose stages share their input in ways that differ between backends.
     #[must_use]
     pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         let (grids, settings, pixels) = (self.grids(), self.settings(), self.image_size().pixels() as u64);
@@ -47,7 +47,7 @@ impl Plan {
 mod tests {
     use crate::{Model, Plan, Profile, Schedule, Settings, Size};
 
-    fn moved(schedule: Schedule, grids: usize, steps: u32) -> Option<[u64; 5]> {
+    fn moved(schedule: Schedule, grids: u32, steps: u32) -> Option<[u64; 5]> {
         let size = Size { width: 4, height: 2 };
         let settings = crate::Algorithm::Bp.settings(size, 1, 1, schedule);
         let model = Model::new(Profile::Thesis, 3).unwrap();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{codes, shrink::LONGEST_SIDE};
-use crate::{DisparityMap, Error, StereoPair, maps, memory};
+use crate::{DisparityMap, Error, StereoPair, finish, memory};
 
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.
 const RADIUS: usize = 2;
@@ -56,7 +56,7 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
         search.match_row(y, row);
     }
     let map = DisparityMap::new(size, disparities)?;
-    let map = maps::remove_speckles(map, (size.pixels() / SPECK).max(LEAST_PATCH))?;
+    let map = finish::remove_speckles(map, (size.pixels() / SPECK).max(LEAST_PATCH))?;
     Ok(Matches { rows_down, map })
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{coarse::Matches, codes};
-use crate::{Image, Size, StereoPair};
+use crate::{Image, Node, Size, StereoPair};
 
 /// Matches looked at, up to twice as many.
 const POINTS: usize = 256;
@@ -48,7 +48,7 @@ struct Point {
 pub(super) fn offsets(pair: &StereoPair, looks: &[Matches], factor: usize) -> Option<RowOffsets> {
     let most_down = looks.iter().map(|look| look.rows_down.unsigned_abs()).max()?;
     let reach = factor * (most_down + 2);
-    let look = |(x, y, column)| Some(Point { x, y, costs: costs(pair, (x, y), column, reach, factor)? });
+    let look = |(x, y, column)| Some(Point { x, y, costs: costs(pair, Node { x, y }, column, reach, factor)? });
     let points: Vec<Point> = places(looks, factor).filter_map(look).collect();
     let Size { width, height } = pair.size();
     let offset = |part: &dyn Fn(&Point) -> bool| {
@@ -90,8 +90,8 @@ fn places(looks: &[Matches], factor: usize) -> impl Iterator<Item = (usize, usiz
 }
 
 /// The least number of bits that differ at each row offset from `-reach` to `reach`, over the columns within `factor`
-/// of `column`; `None` where a window leaves its image.
-fn costs(pair: &StereoPair, (x, y): (usize, usize), column: i64, reach: usize, factor: usize) -> Option<Vec<u32>> {
+/// of `column`; `None` if a window leaves its image.
+fn costs(pair: &StereoPair, Node { x, y }: Node, column: i64, reach: usize, factor: usize) -> Option<Vec<u32>> {
     let size = pair.size();
     let (half_width, half_height) = (WINDOW_WIDTH / 2, WINDOW_HEIGHT / 2);
     let (left, top) = (x.checked_sub(half_width)?, y.checked_sub(half_height + reach)?);

@@ -2,16 +2,16 @@
 
 use crate::{Error, Image, Size, StereoPair, image::grey, memory};
 
-/// Longest side of the shrunk images in pixels: half of it either way gives disparities that fit 8 bits.
+/// The longest side of the shrunk images in pixels. Disparities of up to half of it, in both directions, fit 8 bits.
 pub const LONGEST_SIDE: usize = 200;
 
-/// By what both sides are divided.
+/// The factor by which both sides are divided.
 pub(super) fn factor(size: Size) -> usize {
     size.width.max(size.height).div_ceil(LONGEST_SIDE)
 }
 
-/// Both images in grey, the luma of the mean colour of each `factor` by `factor` block as a pixel. What fills no block
-/// is left out, unless there is nothing else.
+/// Shrinks both images to grey: a pixel is the luma of the mean colour of a `factor` by `factor` block. Incomplete blocks
+/// at the right and bottom are left out, unless there is no complete one.
 pub(super) fn shrunk(pair: &StereoPair, factor: usize) -> Result<StereoPair, Error> {
     StereoPair::new(mean_of_blocks(pair.left(), factor)?, mean_of_blocks(pair.right(), factor)?)
 }

@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use crate::{Cut, Error, Plan, Settings, Size, StereoPair, image::APRON};
 
-/// Of the columns or rows of an image: those that a tile matches, and those of them whose answer is kept.
+/// The columns or the rows of a tile: those that it matches, and those of them whose labels are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Span {
     /// All that are matched.
     pub all: Range<usize>,
-    /// What is kept. The spans of an image share all its columns, or rows, among them.
+    /// Those that are kept. The spans of an image keep each of its columns, or rows, once.
     pub kept: Range<usize>,
 }
 
-/// A part of an image that is matched by itself.
+/// A part of an image that is matched on its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Its columns.
@@ -23,13 +23,13 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Pixels that are matched.
+    /// The size of the part that is matched.
     #[must_use]
     pub fn size(&self) -> Size {
         Size { width: self.columns.all.len(), height: self.rows.all.len() }
     }
 
-    /// The plan of the tile: the whole image's, with the cut where the tile meets it.
+    /// The plan of the tile: that of the whole image, with the cut moved to the tile's own coordinates.
     ///
     /// # Errors
     /// None for a tile of that plan's [`crate::Tiling`].
@@ -45,17 +45,17 @@ impl Tile {
         (x.is_some() || y.is_some()).then(|| Cut { x: x.unwrap_or(0), y: y.unwrap_or(0), seed_start })
     }
 
-    /// A copy of the tile's part of a pair.
+    /// Copies the tile's part of a pair.
     ///
     /// # Panics
-    /// Where the tile lies outside.
+    /// If the tile lies outside.
     #[must_use]
     pub fn pair(&self, pair: &StereoPair) -> StereoPair {
         let strip = pair.strip(self.rows.all.clone());
         if self.columns.all.len() == pair.size().width { strip } else { strip.columns(self.columns.all.clone()) }
     }
 
-    /// Bytes of such copies, of the tile and of the rows that it is cut from.
+    /// The bytes of such a copy, and of the copy of whole rows that it is made from.
     pub(super) fn pair_bytes(&self, image: Size) -> u64 {
         let width = self.columns.all.len();
         let columns = if width == image.width { width } else { width + image.width };
@@ -63,9 +63,15 @@ impl Tile {
     }
 }
 
-/// The parts of `len` columns or rows of which so many are kept each, with so many more before and after where there are
-/// any.
-pub(super) fn spans(len: usize, kept: usize, (before, after): (usize, usize)) -> Vec<Span> {
+/// How many columns or rows a tile has beside those that it keeps.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Margin {
+    pub(super) before: usize,
+    pub(super) after: usize,
+}
+
+/// Splits `len` columns or rows into spans that keep `kept` each. A span also has its margin, as far as the image goes.
+pub(super) fn spans(len: usize, kept: usize, Margin { before, after }: Margin) -> Vec<Span> {
     let span = |start: usize| {
         let end = (start + kept).min(len);
         Span { all: start.saturating_sub(before)..(end + after).min(len), kept: start..end }
@@ -73,7 +79,7 @@ pub(super) fn spans(len: usize, kept: usize, (before, after): (usize, usize)) ->
     (0..len).step_by(kept).map(span).collect()
 }
 
-/// One span of each length.
+/// The first span of each length.
 pub(super) fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {
     let first = |index: usize| spans.iter().position(|span| span.all.len() == spans[index].all.len()) == Some(index);
     spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)

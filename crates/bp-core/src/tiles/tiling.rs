@@ -1,30 +1,30 @@
-//! Which tiles a plan is cut into, known before anything runs.
+//! How a plan is cut into tiles. It is known before anything runs.
 
-use super::tile::{Span, Tile, distinct, spans};
+use super::tile::{Margin, Span, Tile, distinct, spans};
 use crate::{BAND_ROWS, Error, Plan, Schedule, Size};
 
-/// Tiles begin at multiples of so many columns and rows, so that nodes of up to five grids have the same children and the
-/// same colour as in the whole image.
+/// Tiles begin at multiples of this many columns and rows, so that on up to five grids their nodes have the same children
+/// and the same colour as in the whole image.
 const ALIGN: usize = 32;
 
-/// Columns, and rows where those beyond are wanted too, that a tile is matched with on either side of what is kept of it.
+/// How many columns a tile is matched with beside those that it keeps, on either side; rows too, except under `sweep`.
 pub const HALO: usize = 96;
 
-/// How near the answer of tiles is to the whole image's.
+/// How close the result of tiles comes to that of the whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
-    /// The same to the bit: there is one tile, or strips under [`Schedule::Sweep`] that begin at multiples of as many rows
-    /// as a band of the coarsest grid covers. On every grid bands depend on those that cover them on coarser ones, and on
-    /// no others. Not so with a known match, which fixes costs on both sides of a cut that may be a seam.
+    /// The same to the bit. Either there is one tile, or there are strips under [`Schedule::Sweep`] that begin at seams of
+    /// the coarsest grid: a band depends only on the bands that cover it on coarser grids. A known match rules this out,
+    /// because it sets costs on both sides of a cut, which may be a seam.
     Same,
-    /// Only what lies farther off than the halo was not heard of.
+    /// Nearly the same: only pixels beyond the halo have no influence.
     Near,
-    /// Bands of coarser grids were cut under [`Schedule::Sweep`].
+    /// Less similar: tiles cut bands of coarser grids under [`Schedule::Sweep`].
     Rough,
 }
 
 impl Likeness {
-    /// The answer in words.
+    /// A description in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl Likeness {
     }
 }
 
-/// A plan, and the tiles that it is run on.
+/// A plan, and the tiles that it runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
     plan: Plan,
@@ -48,13 +48,13 @@ impl Tiling {
     #[must_use]
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
-        Self { plan, columns: spans(width, width, (0, 0)), rows: spans(height, height, (0, 0)) }
+        Self { plan, columns: spans(width, width, Margin::default()), rows: spans(height, height, Margin::default()) }
     }
 
-    /// Tiles of which `kept` columns and rows are kept, both rounded up to multiples of 32, with at least `halo` columns
-    /// around that. Where labels match to the left, there are as many more columns on the left as the largest disparity,
-    /// so that all costs of what is kept are the whole image's; likewise on the right. Rows have a halo too, but not under
-    /// [`Schedule::Sweep`], where bands of rows are independent of each other.
+    /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32, with at least `halo` columns around
+    /// them. If labels match to the left, a tile has as many more columns on its left as the largest disparity, so that
+    /// the pixels it keeps have the costs of the whole image; likewise on the right. Rows have a halo too, but not under
+    /// [`Schedule::Sweep`], where bands of rows do not depend on each other.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
         let Size { width, height } = plan.image_size();
@@ -63,20 +63,21 @@ impl Tiling {
             .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(ALIGN));
         let swept = plan.settings().schedule == Schedule::Sweep;
         let beyond = if swept { 0 } else { halo.next_multiple_of(ALIGN) };
-        let columns = spans(width, kept.width.next_multiple_of(ALIGN), (left, right));
-        let rows = spans(height, kept.height.next_multiple_of(ALIGN), (beyond, beyond));
+        let columns = spans(width, kept.width.next_multiple_of(ALIGN), Margin { before: left, after: right });
+        let rows = spans(height, kept.height.next_multiple_of(ALIGN), Margin { before: beyond, after: beyond });
         Self { plan, columns, rows }
     }
 
-    /// The tiling that runs within `bytes`, where `needed` tells what a device needs for a plan, or why it cannot run it:
+    /// The tiling that runs within `bytes`. `needed` says how many bytes a device needs for a plan, or why it cannot run it.
+    /// The first of these that fits is taken:
     ///
     /// 1. the whole image;
-    /// 2. strips of rows that give the same answer, the fewest, see [`Likeness::Same`];
-    /// 3. tiles with a halo of [`HALO`]: those that compute least in all; under [`Schedule::Sweep`] the highest among
-    ///    those that compute no more than four times what the whole image does, if any.
+    /// 2. the fewest strips of rows that give the same result; see [`Likeness::Same`];
+    /// 3. tiles with a halo of [`HALO`]: those with the least work in all. Under [`Schedule::Sweep`], the highest tiles
+    ///    whose work is at most four times that of the whole image, if there are any.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], which names what the smallest tiles need, or why those cannot run.
+    /// [`Error::OutOfMemory`] with the bytes that the smallest tiles need, or the reason why those cannot run.
     pub fn within(plan: &Plan, bytes: u64, needed: &Needed<'_>) -> Result<Self, Error> {
         let fits = |tiling: &Self| tiling.bytes(needed).is_ok_and(|needed| needed <= bytes);
         let whole = Self::whole(plan.clone());
@@ -106,7 +107,7 @@ impl Tiling {
         &self.plan
     }
 
-    /// All tiles, those of one size one after another, the largest first.
+    /// All tiles, grouped by size, the largest first.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let mut tiles = Vec::with_capacity(self.columns.len() * self.rows.len());
@@ -117,13 +118,13 @@ impl Tiling {
         tiles
     }
 
-    /// How many tiles lie beside and above each other.
+    /// The number of tiles across and down.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
         (self.columns.len(), self.rows.len())
     }
 
-    /// The largest number of columns and of rows that a tile matches.
+    /// The most columns and the most rows that a tile matches.
     #[must_use]
     pub fn tile_size(&self) -> Size {
         let longest = |spans: &[Span]| spans.iter().map(|span| span.all.len()).max().unwrap_or(1);
@@ -136,7 +137,7 @@ impl Tiling {
         self.counts() == (1, 1)
     }
 
-    /// How near the answer is to the whole image's.
+    /// How close the result comes to that of the whole image.
     #[must_use]
     pub fn likeness(&self) -> Likeness {
         let swept = self.plan.settings().schedule == Schedule::Sweep;
@@ -150,15 +151,15 @@ impl Tiling {
         }
     }
 
-    /// Message entries that all tiles compute.
+    /// The message entries that all tiles compute.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
         let plans = self.tiles().into_iter().filter_map(|tile| tile.plan(&self.plan).ok());
         plans.fold(0, |sum: u64, plan| sum.saturating_add(plan.message_updates()))
     }
 
-    /// Bytes that [`crate::Tiled`] needs for it: for the largest tile, with a copy of its part of the pair, and for the
-    /// labels of all.
+    /// The bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the labels of
+    /// all tiles.
     ///
     /// # Errors
     /// Those of `needed`.
@@ -184,10 +185,10 @@ impl Tiling {
     }
 }
 
-/// Tells how many bytes a device needs for a plan, or why it cannot run it.
+/// Returns how many bytes a device needs for a plan, or why it cannot run it.
 pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
 
-/// Rows that a band of the coarsest grid covers.
+/// The rows of the image that a band of the coarsest grid covers.
 fn exact_rows(plan: &Plan) -> usize {
     BAND_ROWS << (plan.grids() - 1)
 }
@@ -220,8 +221,8 @@ fn widest(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> Option<
     evenly(blocks, |blocks| fits(&tiles(blocks))).map(tiles)
 }
 
-/// How many of so many units a part has, if parts are as few as may be and as even: whatever is smaller than a part that
-/// fits does so too. `None` where not even one unit fits.
+/// Divides `units` into the fewest parts that fit, as even as possible, and returns the units of a part. If a part fits,
+/// every smaller part has to fit too. `None` if not even one unit fits.
 fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
     let (mut most, mut too_many) = (0, units + 1);
     while most + 1 < too_many {

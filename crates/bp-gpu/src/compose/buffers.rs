@@ -8,16 +8,16 @@ use crate::{
     layout::Grid,
 };
 
-/// What sizes are rounded up to: the most that devices align buffers to, so that they lie side by side without gaps.
+/// Sizes are rounded up to a multiple of this, the largest alignment of any device, so that buffers leave no gaps.
 const BUFFER_ALIGNMENT: u64 = 256;
 
-/// Indices of a strip's buffers, each for colour 0 and 1.
+/// The indices of a strip's buffers, for colours 0 and 1.
 pub(crate) struct StripBuffers {
-    /// Stored data costs.
+    /// The stored data costs.
     pub(crate) cost: [usize; 2],
-    /// Unclipped ones.
+    /// The unclipped data costs.
     pub(crate) sums: Option<[usize; 2]>,
-    /// What nodes sent, `[set][side][colour]`; two sets under [`Schedule::Sync`], else one.
+    /// The messages sent, `[set][side][colour]`. There are two sets under [`Schedule::Sync`], else one.
     pub(crate) sent: Vec<[[usize; 2]; 4]>,
 }
 
@@ -26,11 +26,11 @@ pub(crate) struct Buffers {
     pub(crate) list: Vec<Buffer>,
     /// Bytes of the left and the right image.
     pub(crate) images: [usize; 2],
-    /// What the profile compares, of both.
+    /// The features of both images.
     pub(crate) features: [usize; 2],
     pub(crate) seed: usize,
     pub(crate) labels: usize,
-    /// Stand in for sums that are not kept, where a kernel would read or write them.
+    /// Bound in place of sums that are not kept, where a kernel would read or write them.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
     /// Grey values of the whole grid, where there are weak edges, `[grid]`.

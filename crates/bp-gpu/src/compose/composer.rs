@@ -9,10 +9,10 @@ use super::{
 };
 use crate::{BindGroup, Command, Limits, Parameters, Pipeline, WORKGROUP, layout::Grid};
 
-/// Alignment of dynamic offsets: the most that any device asks for.
+/// The alignment of dynamic offsets: the largest of any device.
 pub(super) const PARAMETERS_ALIGNMENT: usize = 256;
 
-/// Which nodes a dispatch computes.
+/// The nodes that a dispatch computes.
 #[derive(Clone, Copy)]
 pub(super) struct Nodes {
     pub(super) grid: usize,
@@ -20,7 +20,7 @@ pub(super) struct Nodes {
     pub(super) colour: usize,
 }
 
-/// Which rows of a strip a kernel computes.
+/// The rows of a strip that a dispatch computes.
 #[derive(Clone, Copy)]
 pub(super) struct Rows {
     pub(super) first: usize,
@@ -39,7 +39,7 @@ pub(super) struct Composer<'a> {
     pub(super) bind_groups: IndexSet<BindGroup>,
 }
 
-/// Parameters of a dispatch, its rows, and how many invocations a row takes.
+/// The parameters of a dispatch, its rows, and the number of invocations of a row.
 pub(super) struct Work {
     pub(super) parameters: Parameters,
     pub(super) rows: Rows,
@@ -47,13 +47,12 @@ pub(super) struct Work {
 }
 
 impl Composer<'_> {
-    /// Which set of message buffers holds what was sent before a step. Under [`Schedule::Sync`] a step reads one set and
-    /// writes the other.
+    /// The set of message buffers that a step reads. Under [`Schedule::Sync`] it writes the other set.
     pub(super) fn set(&self, step: u32) -> usize {
         if self.plan.settings().schedule == Schedule::Sync { step as usize % 2 } else { 0 }
     }
 
-    /// Records dispatches of a kernel to rows of a strip, as many as the limits ask for.
+    /// Records a kernel for rows of a strip, in as many dispatches as the limits require.
     pub(super) fn dispatch(&mut self, part: &mut PartRecorder, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
         let kernel = pipeline.kernel;
         let pipeline = self.pipelines.insert_full(pipeline).0;
@@ -71,8 +70,8 @@ impl Composer<'_> {
         }
     }
 
-    /// Message entries that a row of this work is worth: an invocation makes four messages at four nodes for every label,
-    /// or does less.
+    /// The message entries that a row of this work is worth. An invocation computes four messages at four nodes for every
+    /// label, or does less.
     fn row_entries(&self, work: &Work) -> u64 {
         work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
     }
@@ -84,7 +83,7 @@ impl Composer<'_> {
         usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
     }
 
-    /// The parameters of a strip's nodes of one colour, on rows that are still to be told.
+    /// The parameters of a strip's nodes of one colour, for these rows.
     pub(super) fn work(&self, nodes: Nodes, rows: Rows) -> Work {
         let grid = &self.grids[nodes.grid];
         let (model, cut) = (self.plan.model(), self.plan.settings().cut);

@@ -9,12 +9,12 @@ use super::{
 use crate::{Kernel, Pipeline};
 
 impl Composer<'_> {
-    /// The grey values of a grid, or, where a kernel is to read none, costs that it is given anyway.
+    /// The buffer of the grid's grey values. Without weak edges no kernel reads them, and a buffer of costs is bound instead.
     pub(super) fn greys_read(&self, nodes: Nodes) -> usize {
         self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
     }
 
-    /// Whether kernels are to look for weak edges, as a constant of theirs.
+    /// The constant that tells kernels to look for weak edges.
     fn looks_for_weak_edges(&self) -> (&'static str, u32) {
         ("WEAK", self.buffers.greys.is_some().into())
     }
@@ -28,7 +28,8 @@ impl Composer<'_> {
         Pipeline { kernel: Kernel::UpdateMessages, constants }
     }
 
-    /// Data cost, what the other colour sent, what these nodes send, and grey values.
+    /// The buffers of the data costs, of the messages from the other colour, of those that these nodes send, and of the grey
+    /// values.
     pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
         let strip = self.strip(nodes);
         let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
@@ -36,7 +37,7 @@ impl Composer<'_> {
         [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
     }
 
-    /// Whether a stored data cost plus so many messages plus `more` may pass 255, as 1 or 0.
+    /// 1 if a stored data cost plus this many messages plus `more` may exceed 255, else 0.
     fn saturates(&self, messages: u32, more: u8) -> u32 {
         let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
         (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()

@@ -1,4 +1,4 @@
-//! The commands of every part.
+//! The commands of every part of a program.
 
 use bp_core::{MessageStart, Schedule, Side, image::APRON};
 
@@ -49,7 +49,7 @@ impl Composer<'_> {
         }
     }
 
-    /// Grey values of the left image, where they tell weak edges.
+    /// The grey values of the left image, if the model has weak edges.
     fn greys(&mut self, part: &mut PartRecorder) {
         let Some(greys) = &self.buffers.greys else { return };
         let pipeline = Pipeline { kernel: Kernel::Greys, constants: vec![("APRON", APRON as u32)] };
@@ -59,7 +59,7 @@ impl Composer<'_> {
         }
     }
 
-    /// Those of a coarser grid.
+    /// The grey values of a coarser grid.
     fn coarsen_greys(&mut self, part: &mut PartRecorder, grid: usize) {
         let Some(greys) = &self.buffers.greys else { return };
         let pipeline = Pipeline { kernel: Kernel::CoarsenGreys, constants: Vec::new() };
@@ -70,7 +70,7 @@ impl Composer<'_> {
         }
     }
 
-    /// The nodes of one colour in all rows of a grid, for what is not cut into strips.
+    /// The nodes of one colour in all rows of a grid, for buffers that are not cut into strips.
     fn whole_grid(&self, grid: usize, colour: usize) -> Work {
         let count = self.grids[grid].size.height;
         self.work(Nodes { grid, strip: 0, colour }, Rows { first: 0, step: 1, count })
@@ -83,7 +83,7 @@ impl Composer<'_> {
         [strip.cost[nodes.colour], sums]
     }
 
-    /// Every strip of the finer grid gives its rows of the coarser one.
+    /// Computes the costs of a grid. Every strip of the finer grid gives its rows of this one.
     pub(super) fn coarsen(&mut self, part: &mut PartRecorder, grid: usize) {
         self.coarsen_greys(part, grid);
         let (fine, coarse) = (&self.grids[grid - 1], &self.grids[grid]);
@@ -128,7 +128,7 @@ impl Composer<'_> {
         self.join_strips(part, grid, 0, &[0, 1]);
     }
 
-    /// Whether these nodes take over what was sent to that side, see [`Schedule::Sweep`].
+    /// Whether these nodes start with the messages of the coarser grid to that side; see [`Schedule::Sweep`].
     fn starts(&self, nodes: Nodes, side: Side) -> bool {
         self.plan.settings().schedule != Schedule::Sweep
             || match side {
@@ -155,7 +155,7 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, vec![sent, planes[0], planes[1]], work);
     }
 
-    /// One step that depends on the step before only, or one loop of [`Schedule::Sweep`].
+    /// Records one step, which depends only on the step before, or one loop of [`Schedule::Sweep`].
     pub(super) fn step(&mut self, part: &mut PartRecorder, grid: usize, step: u32) {
         let (read, written) = (self.set(step), self.set(step + 1));
         match self.plan.settings().schedule {
@@ -179,7 +179,7 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }
 
-    /// Copies what was sent across the border of two strips to where the other strip looks for it.
+    /// Copies messages that cross the border of two strips to the buffers of the other strip.
     fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, colours: &[usize]) {
         let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
         let bytes = layout.row_bytes();

@@ -1,4 +1,4 @@
-//! Collects commands as segments, none of them longer than a submission.
+//! The recorder collects commands in segments that fit a submission.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::{BindGroup, Buffer, Command, Segment};
 /// All parts of a program, in the order recorded.
 pub(crate) struct Recorder {
     parts: Vec<PartRecorder>,
-    /// Most message entries of a segment.
+    /// The most message entries of a segment.
     most: u64,
 }
 
@@ -48,7 +48,7 @@ impl Recorder {
 }
 
 impl PartRecorder {
-    /// Appends a command that is worth so many message entries.
+    /// Appends a command that is worth this many message entries.
     pub(crate) fn push(&mut self, command: Command, entries: u64) {
         match self.segments.last_mut() {
             Some(last) if last.entries + entries <= self.most => {
@@ -64,7 +64,7 @@ impl PartRecorder {
         self.push(command, 0);
     }
 
-    /// Every buffer that a kernel is given counts once in a part, be it read or written; a copy reads and writes.
+    /// Counts the bytes that are moved: every buffer that a kernel binds once per part, and a copy twice.
     fn count_moved_bytes(&mut self, bind_groups: &IndexSet<BindGroup>, buffers: &[Buffer]) {
         let mut bound: IndexMap<usize, u64> = IndexMap::new();
         let mut others = 0;

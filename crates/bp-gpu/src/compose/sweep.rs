@@ -1,4 +1,4 @@
-//! The schedule `sweep`: all bands at once, their rows one after another.
+//! The schedule `sweep`: all bands at the same time, their rows one after another.
 
 use bp_core::{BAND_ROWS, Side};
 
@@ -21,7 +21,7 @@ struct BandRow {
 }
 
 impl Composer<'_> {
-    /// One loop on a grid: forward and backward through every band, see [`bp_core::Schedule::Sweep`].
+    /// Records one loop on a grid, forward and backward through every band; see [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, part: &mut PartRecorder, grid: usize) {
         let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
         for row in 0..last {
@@ -36,7 +36,7 @@ impl Composer<'_> {
         self.send(part, BandRow { grid, colour: ODD, row: 0 }, &horizontal);
     }
 
-    /// The nodes of one colour in one row of every band send to these sides.
+    /// Records that these nodes send to these sides.
     fn send(&mut self, part: &mut PartRecorder, at: BandRow, sides: &[Side]) {
         let pipeline = self.update_pipeline(true);
         for (nodes, rows) in self.band_rows(at) {
@@ -48,7 +48,7 @@ impl Composer<'_> {
         part.push_short(Command::Barrier);
     }
 
-    /// Labels of every band from its top row to its bottom row, in a row first of even nodes.
+    /// Records the labels of every band from its top row to its bottom row, in each row first for even nodes.
     pub(super) fn decode(&mut self, part: &mut PartRecorder) {
         for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
             for (nodes, rows) in self.band_rows(BandRow { grid: 0, colour, row }) {
@@ -58,7 +58,7 @@ impl Composer<'_> {
         }
     }
 
-    /// The row so far below the first one of every band, in each strip that has any; strips begin with a band.
+    /// The nodes and rows of a [`BandRow`] in each strip that has any. Strips begin with a band.
     fn band_rows(&self, at: BandRow) -> Vec<(Nodes, Rows)> {
         let BandRow { grid, colour, row } = at;
         let strips = self.grids[grid].strips.iter().enumerate();

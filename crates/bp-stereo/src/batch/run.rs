@@ -1,8 +1,12 @@
 //! Three threads, a pair in each: one reads, one matches, one writes.
 
 use std::{
+    collections::BTreeMap,
     io,
-    sync::mpsc::{Receiver, SyncSender, sync_channel},
+    sync::{
+        Mutex, PoisonError,
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
     thread,
     time::Instant,
 };
@@ -16,7 +20,9 @@ use super::{
     record::{Done, FileState, PairRecord, PairTimes, history},
     summary::Failed,
 };
-use crate::{Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Memory, Start, Watch, description};
+use crate::{
+    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Memory, Start, Warning, Watch, description,
+};
 
 /// A pair in memory.
 struct Read<'a> {
@@ -57,6 +63,27 @@ pub(super) struct Run<'a> {
     pub(super) making: &'a Making,
     pub(super) settings_sha256: &'a str,
     pub(super) watch: &'a Watch<'a>,
+    pub(super) warned: Warned,
+}
+
+/// How many pairs had each warning. The first one is told at once, the others in one sentence at the end.
+#[derive(Default)]
+pub(super) struct Warned(Mutex<BTreeMap<&'static str, usize>>);
+
+impl Warned {
+    fn count(&self, warning: &Warning) -> usize {
+        let mut counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = counts.entry(warning.of_many()).or_default();
+        *count += 1;
+        *count
+    }
+
+    fn tell_others(&self, watch: &Watch<'_>) {
+        let counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for (what, count) in counts.iter().filter(|&(_, &count)| count > 1) {
+            watch.warn(&format!("{} more pairs {what}; their records say how", count - 1));
+        }
+    }
 }
 
 impl Run<'_> {
@@ -71,6 +98,7 @@ impl Run<'_> {
             let writer = scope.spawn(|| writer.write_all(to_write));
             let solved = self.solve_all(to_match, matched);
             let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            self.warned.tell_others(self.watch);
             // Where writing fails, matching ends for want of a writer.
             written.and_then(|failed| solved.map(|()| failed))
         })
@@ -142,7 +170,9 @@ impl Run<'_> {
         let planned = matcher.plan_within(&pair, &survey, &|disparity| job.outputs.hold(disparity))?;
         let warnings: Vec<String> = planned.warnings.iter().map(|warning| warning.about(&job.images_name())).collect();
         // Told first: exchanged images may be why the outputs cannot hold what is asked for.
-        warnings.iter().for_each(|warning| self.watch.warn(warning));
+        let is_first = |warning: &Warning| self.warned.count(warning) == 1;
+        let firsts = planned.warnings.iter().zip(&warnings).filter(|(warning, _)| is_first(warning));
+        firsts.for_each(|(_, text)| self.watch.warn(text));
         job.outputs.check_plan(self.making, &planned.plan)?;
         // The batch counts pairs, not the work within one.
         let events = |event: Event<'_>| {

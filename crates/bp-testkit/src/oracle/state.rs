@@ -1,4 +1,4 @@
-//! The model as defined, computed in the obvious way: what the oracle knows between two kernels.
+//! The state of the oracle between two kernels, and the message as defined.
 
 use bp_core::{Node, Plan, Side};
 
@@ -39,7 +39,7 @@ impl State {
         self.plan.size(grid).index(node)
     }
 
-    /// Makes the costs of a grid from their sums.
+    /// Computes the costs of a grid from its sums.
     pub(super) fn set_costs(&mut self, grid: usize) {
         let clips = grid > 0 && self.plan.settings().coarse_clip;
         let truncation = i64::from(self.plan.model().truncation());
@@ -62,7 +62,8 @@ impl State {
         move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
     }
 
-    /// What the node at `from` sends, given what it `received`: all but what came from the receiver, `to`.
+    /// The message that the node `from` sends to the side `to`, given the messages it `received`. It uses all but the one
+    /// from that side.
     pub(super) fn message(&self, grid: usize, from: Node, received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
         let costs = &self.grids[grid].costs[self.index(grid, from)];
         let smoothness = self.smoothness(grid, from, to);

@@ -3,9 +3,9 @@
 /// A place in a surface's own coordinates.
 #[derive(Clone, Copy)]
 pub(super) struct Spot {
-    /// Share of the spine, 0..=1 inside.
+    /// The position along the spine, from 0 to 1 inside the surface.
     pub(super) t: f64,
-    /// Distance from the spine as a share of the greatest half width; with sign.
+    /// The signed distance from the spine, as a share of the greatest half width.
     pub(super) aside: f64,
     /// The half width here as a share of the greatest.
     pub(super) rim: f64,

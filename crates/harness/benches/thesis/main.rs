@@ -36,11 +36,30 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints what a bench has to say beside criterion's lines.
+fn tell(event: Event<'_>) {
+    match event {
+        Event::Line(line) | Event::Note(line) => eprintln!("{line}"),
+        Event::Warning(line) => eprintln!("warning: {line}"),
+        _ => {}
+    }
+}
+
 fn run(arguments: &[String]) -> Result<(), String> {
+    let stop = Stop::default();
+    let asks = stop.clone();
+    let stops = move || {
+        if asks.stop() {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(stops).map_err(|error| format!("cannot handle Ctrl-C: {error}"))?;
+    let watch = Watch::new(&tell, &stop);
+    let environment = |name: &str| std::env::var_os(name);
     let has = |option: &str| arguments.iter().any(|argument| argument == option);
     let mut criterion = Criterion::default().without_plots().configure_from_args();
     if has("--list") {
-        replay::list(&mut criterion, &bench::possible()?);
+        replay::list(&mut criterion, &bench::possible(&environment, &watch)?);
         return Ok(());
     }
     // As criterion tells a test of benches from a run.
@@ -54,7 +73,9 @@ fn run(arguments: &[String]) -> Result<(), String> {
         return Ok(());
     }
     let results = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("bench-results");
-    bench::run(&|id| asked.contains(id), &results, |benches| replay::replay(&mut criterion, benches))?;
+    bench::run(&|id| asked.contains(id), &results, &environment, &watch, |benches| {
+        replay::replay(&mut criterion, benches);
+    })?;
     criterion.final_summary();
     Ok(())
 }

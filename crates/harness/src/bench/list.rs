@@ -6,10 +6,10 @@ use bp_core::Stage;
 
 use super::Bench;
 use crate::{
-    record::{Cell, Clock, Record, Sample},
+    record::{Cell, Record, Sample, speed::Speed},
     report::table_of_times,
     reproduce,
-    speed::{Problem, Speed},
+    speed::Problem,
 };
 
 /// What has to be measured for a bench.
@@ -44,10 +44,7 @@ impl Part {
     fn ms(self, sample: &Sample) -> Option<f64> {
         match self {
             Self::Total => Some(sample.total_ms),
-            Self::OnDevice => {
-                let device = sample.clocks.iter().find(|clocked| clocked.clock == Clock::Device)?;
-                Some(device.stages.in_order().iter().sum())
-            }
+            Self::OnDevice => sample.device_ms(),
             Self::MessagePassing => Some(sample.message_passing_ms()),
         }
     }
@@ -94,7 +91,7 @@ fn samples(cell: Option<&Cell>, part: Part) -> Vec<Duration> {
 fn of_kernels(backends: &[String], speed: Option<&Speed>) -> Vec<Bench> {
     let mut benches = Vec::new();
     for stage in Stage::ALL {
-        for problem in Problem::KERNELS.map(Problem::name) {
+        for problem in Problem::KERNELS {
             benches.extend(backends.iter().map(|backend| kernel(stage, problem, backend, speed)));
         }
     }

@@ -7,7 +7,9 @@ use std::{
 
 use bp_core::{Backend, DeviceKind};
 
-use crate::{backends, failure::Failure, tell};
+use bp_stereo::Watch;
+
+use crate::{backends, failure::Failure};
 
 /// How much is measured: "quick" or "full".
 const SIZE: &str = "BP_BENCH";
@@ -56,8 +58,8 @@ impl Settings {
     }
 
     /// The backends as records name them: those asked for, else all; in a full run only those whose times matter.
-    pub(super) fn backends(&self) -> Result<Vec<String>, Failure> {
-        let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend));
+    pub(super) fn backends(&self, watch: &Watch<'_>) -> Result<Vec<String>, Failure> {
+        let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend, watch));
         let names =
             self.named.clone().unwrap_or_else(|| by_default().map(|backend| backend.name().to_owned()).collect());
         let mut chosen: Vec<String> = Vec::new();
@@ -74,7 +76,7 @@ impl Settings {
 
 /// Whether a full run has the backend without being asked: the reference and software rasterisers would make an hour of
 /// minutes, and tell nothing of the algorithms that the quick run does not.
-fn matters(backend: &dyn Backend) -> bool {
+fn matters(backend: &dyn Backend, watch: &Watch<'_>) -> bool {
     let name = backend.name();
     let software = backend.devices().into_iter().next().filter(|info| info.kind == DeviceKind::SoftwareRasteriser);
     let why = match software {
@@ -82,7 +84,7 @@ fn matters(backend: &dyn Backend) -> bool {
         None if name == backends::ALL[0].name() => "it is the reference, and slow".to_owned(),
         None => return true,
     };
-    tell(&format!("{name}: left out of a full run: {why}; {BACKEND}={name} asks for it"));
+    watch.note(&format!("{name}: left out of a full run: {why}; {BACKEND}={name} asks for it"));
     false
 }
 
@@ -102,7 +104,7 @@ mod tests {
         assert_eq!(read(&[(SIZE, "full")]).unwrap(), full);
         let quick = read(&[(SIZE, "quick"), (BACKEND, "rayon,scalar"), (DATA, "/data")]).unwrap();
         assert_eq!(quick.data, Some(PathBuf::from("/data")));
-        assert_eq!(quick.backends().unwrap(), ["rayon", "scalar"]);
+        assert_eq!(quick.backends(&Watch::default()).unwrap(), ["rayon", "scalar"]);
         assert!(quick.rounds() < full.rounds());
     }
 
@@ -114,7 +116,7 @@ mod tests {
 
     #[test]
     fn every_backend_is_in_a_quick_run_and_the_slow_reference_not_in_a_full_one() {
-        let backends = |size| read(&[(SIZE, size)]).unwrap().backends().unwrap();
+        let backends = |size| read(&[(SIZE, size)]).unwrap().backends(&Watch::default()).unwrap();
         let [quick, full] = ["quick", "full"].map(backends);
         assert_eq!(quick.len(), backends::ALL.len());
         assert!(full.contains(&"rayon".to_owned()) && !full.contains(&"scalar".to_owned()), "{full:?}");
@@ -123,7 +125,7 @@ mod tests {
     #[test]
     fn what_a_variable_must_not_say_is_refused_by_its_name() {
         let told = |variables: &[(&str, &str)]| {
-            read(variables).and_then(|settings| settings.backends()).unwrap_err().to_string()
+            read(variables).and_then(|settings| settings.backends(&Watch::default())).unwrap_err().to_string()
         };
         let size = told(&[(SIZE, "fast")]);
         assert!(size.contains("BP_BENCH=fast") && size.contains("quick or full"), "{size}");

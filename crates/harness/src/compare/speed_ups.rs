@@ -9,10 +9,10 @@ use super::Row;
 use crate::{
     record::{Record, Sample},
     report::{
-        format::{Spread, number, or},
+        format::{number, or},
         lines,
     },
-    summary::interval,
+    statistics::{interval, median},
 };
 
 /// The plan that others are held against.
@@ -81,10 +81,8 @@ impl<'a> SpeedUps<'a> {
 fn ratio(record: &Record, (scene, plan, backend): (&str, &str, &str), ms: fn(&Sample) -> f64) -> Option<Ratio> {
     let samples = |plan| Some(&record.cell(scene, plan, backend)?.measured()?.samples);
     let (base, own) = (samples(BASE)?, samples(plan)?);
-    let in_round = |own: &Sample| Some(ms(base.iter().find(|base| base.round == own.round)?) / ms(own));
-    let ratios: Vec<f64> = own.iter().filter_map(in_round).filter(|ratio| ratio.is_finite()).collect();
-    let median = Spread::of(ratios.iter().copied())?.median;
-    Some(Ratio { median, interval: interval(&[ratios]) })
+    let ratios: Vec<f64> = Sample::ratios(base, own, ms).into_iter().filter(|ratio| ratio.is_finite()).collect();
+    Some(Ratio { median: median(ratios.iter().copied())?, interval: interval(&[ratios]) })
 }
 
 /// Whether the intervals of a record and the first one overlap; none where one of them has too few samples.

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// The whole page.
-pub(crate) fn page(comparison: &Comparison<'_>) -> String {
+pub fn page(comparison: &Comparison<'_>) -> String {
     let mut text = String::from("# Records beside one another\n\n");
     for (place, record) in comparison.records.iter().enumerate() {
         let facts = facts(record);

@@ -17,7 +17,7 @@ struct Row<'a> {
     device: &'a str,
     software_rasteriser: Option<bool>,
     round: u32,
-    prepare_ms: f64,
+    prepare_ms: Option<f64>,
     total_ms: f64,
     /// Whose clock the stages are by: the device's, where it has one.
     stages_clock: &'static str,

@@ -4,7 +4,7 @@ use arbitrary::Unstructured;
 use bp_core::{
     Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, Likeness, MAX_GRIDS,
     MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
-    maps::{Finish, MEDIANS, confidence},
+    finish::{Finish, MEDIANS, confidence},
     survey::Survey,
 };
 use bp_cpu_rayon::Rayon;

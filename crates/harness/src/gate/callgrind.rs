@@ -11,17 +11,23 @@
 use std::{
     collections::BTreeMap,
     fs,
-    io::Write,
     path::Path,
     process::{Command, Stdio},
     time::Duration,
 };
 
-use bp_core::{Driver, Error, Image, Plan, Size, Stage, StereoPair};
+use bp_core::{Error, Image, Plan, Size, Stage, StereoPair};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{backends, failure::Failure, interrupt, machine, speed::Problem, threads};
+use bp_stereo::Watch;
+
+use crate::{
+    failure::Failure,
+    machine,
+    measure::{Asked, Meter, Solve},
+    speed::Problem,
+};
 
 /// What the sides of the problems' images are divided by: valgrind takes some fifty times as long as the processor.
 const DIVISOR: usize = 6;
@@ -35,7 +41,7 @@ const TOLD_FROM: f64 = 0.001;
 /// What was counted, and with what: counts of other processors, compilers, flags or valgrinds do not compare.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Counts {
+pub(super) struct Counts {
     /// Commit of the program.
     pub(super) commit: String,
     /// The processor.
@@ -59,14 +65,14 @@ impl Counts {
     }
 }
 
-/// A problem of `bp speed`, in small, on a backend.
+/// A problem of `bp speed`, in small, on one thread of a CPU backend. It is solved in a process of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Solve {
+pub struct Counted {
     backend: &'static str,
-    problem: Problem,
+    problem: &'static str,
 }
 
-impl Solve {
+impl Counted {
     /// The CPU backends on the update alone and on our two plans.
     fn all() -> impl Iterator<Item = Self> {
         Problem::KERNELS.into_iter().flat_map(|problem| ["scalar", "rayon"].map(|backend| Self { backend, problem }))
@@ -74,32 +80,33 @@ impl Solve {
 
     /// Its name in the hidden option.
     fn name(self) -> String {
-        format!("{}:{}", self.problem.name(), self.backend)
+        format!("{}:{}", self.problem, self.backend)
     }
 
     /// What the hidden option says.
     ///
     /// # Errors
     /// Where there is no such solve.
-    pub(crate) fn parse(name: &str) -> Result<Self, String> {
+    pub fn parse(name: &str) -> Result<Self, String> {
         Self::all().find(|solve| solve.name() == name).ok_or_else(|| "not counted".to_owned())
     }
 
-    /// Solves it on one thread and prints the device's name: what `bp gate --counted` does, in the process that
-    /// valgrind runs.
-    pub(crate) fn run(self) -> Result<(), Failure> {
-        let device = solve(self.backend, self.problem.plan(DIVISOR)?)?;
-        Ok(writeln!(std::io::stdout(), "{device}")?)
+    /// Solves it once, in the process that valgrind runs; the device's name.
+    pub fn run(self) -> Result<String, Failure> {
+        let problem = Problem::asked(&[self.problem.to_owned()]).into_iter().next();
+        let problem = problem.ok_or_else(|| Failure::other("there is no such problem"))?;
+        solve(self.backend, problem.plan(DIVISOR)?)
     }
 
     /// Counts it: the device's name, and instructions by name.
-    fn count(self, program: &Path) -> Result<(String, Vec<(String, u64)>), Failure> {
-        interrupt::check()?;
-        let counted = callgrind(program, &["gate", "--counted", &self.name()]).map_err(|e| e.of(&self.name()))?;
-        interrupt::check()?;
+    fn count(self, program: &Path, watch: &Watch<'_>) -> Result<(String, Vec<(String, u64)>), Failure> {
+        watch.check()?;
+        let counted =
+            callgrind(program, &["gate", "--counted", &self.name()], watch).map_err(|e| e.of(&self.name()))?;
+        watch.check()?;
         let whole: u64 = counted.instructions.iter().sum();
         let is_told = |&(_, count): &(Stage, u64)| count as f64 >= TOLD_FROM * whole as f64;
-        let name = |stage: Stage| format!("{}, {}, {}", self.problem.name(), self.backend, stage.name());
+        let name = |stage: Stage| format!("{}, {}, {}", self.problem, self.backend, stage.name());
         let told = Stage::ALL.into_iter().zip(counted.instructions).filter(is_told);
         let counts = told.map(|(stage, count)| (name(stage), count)).collect();
         Ok((counted.printed.trim_end().to_owned(), counts))
@@ -108,12 +115,10 @@ impl Solve {
 
 /// Solves a plan once on one thread; the device's name.
 fn solve(backend: &str, plan: Plan) -> Result<String, Failure> {
-    threads::run_on(Some(1), || {
-        let opened = backends::open(backend, None)?;
-        let pair = pair(plan.image_size())?;
-        Driver::new(opened.device.as_ref(), plan)?.solve(&pair)?;
-        Ok(opened.info.name)
-    })
+    let runner = Asked::open(&format!("{backend}@1"))?.runner.map_err(Failure::unavailable)?;
+    let pair = pair(plan.image_size())?;
+    Solve::prepare(&runner, plan, &pair)?.sample(0, &Meter::new(&Watch::default()))?;
+    Ok(runner.info.name)
 }
 
 /// Noise, seen from two places: valgrind would take longer to render a scene than for all kernels.
@@ -125,18 +130,18 @@ fn pair(size: Size) -> Result<StereoPair, Error> {
 }
 
 /// Name and version of valgrind; `None` where there is none.
-pub(crate) fn valgrind() -> Option<String> {
+pub(super) fn valgrind() -> Option<String> {
     let output = Command::new("valgrind").arg("--version").stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 /// Counts all solves with this valgrind, several at once: they do not disturb one another.
-pub(crate) fn count(valgrind: String) -> Result<Counts, Failure> {
+pub(super) fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
     let failed = |error| Failure::other(format!("cannot find this program's own file: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
-    let solves: Vec<_> = Solve::all().collect();
-    let counted = solves.par_iter().map(|solve| solve.count(&program)).collect::<Result<Vec<_>, _>>()?;
-    let device = |(solve, (device, _)): (&Solve, &(String, _))| (solve.backend.to_owned(), device.clone());
+    let solves: Vec<_> = Counted::all().collect();
+    let counted = solves.par_iter().map(|solve| solve.count(&program, watch)).collect::<Result<Vec<_>, _>>()?;
+    let device = |(solve, (device, _)): (&Counted, &(String, _))| (solve.backend.to_owned(), device.clone());
     Ok(Counts {
         commit: machine::commit(),
         processor: machine::processor(&machine::machine(None)),
@@ -149,7 +154,7 @@ pub(crate) fn count(valgrind: String) -> Result<Counts, Failure> {
 }
 
 /// A program that ran under callgrind.
-struct Counted {
+struct Profile {
     /// Its standard output.
     printed: String,
     /// Instructions of the solver's kernels and of all that they call, in the order of [`Stage::ALL`].
@@ -157,7 +162,7 @@ struct Counted {
 }
 
 /// Runs a program that solves something.
-fn callgrind(program: &Path, arguments: &[&str]) -> Result<Counted, Failure> {
+fn callgrind(program: &Path, arguments: &[&str], watch: &Watch<'_>) -> Result<Profile, Failure> {
     let failed = |what: &dyn std::fmt::Display| Failure::other(format!("valgrind: {what}"));
     let folder = tempfile::tempdir().map_err(|e| failed(&format!("no temporary folder: {e}")))?;
     // Its own settings, for profiles that are plain to read, and none of the user's.
@@ -169,7 +174,7 @@ fn callgrind(program: &Path, arguments: &[&str]) -> Result<Counted, Failure> {
     if !output.status.success() {
         // Ctrl-C may have ended it before this program was told.
         std::thread::sleep(Duration::from_millis(50));
-        interrupt::check()?;
+        watch.check()?;
         let said = String::from_utf8_lossy(&output.stderr);
         return Err(failed(&format!("{}: {}", output.status, said.trim_end())));
     }
@@ -178,7 +183,7 @@ fn callgrind(program: &Path, arguments: &[&str]) -> Result<Counted, Failure> {
     if instructions[Stage::UpdateMessages as usize] == 0 {
         return Err(failed(&"its profile does not name the kernels; a stripped program cannot be counted"));
     }
-    Ok(Counted { printed: String::from_utf8_lossy(&output.stdout).into_owned(), instructions })
+    Ok(Profile { printed: String::from_utf8_lossy(&output.stdout).into_owned(), instructions })
 }
 
 /// Instructions of the kernels in a profile. There, `cfn=` names a function that is called, and the line after `calls=`
@@ -247,15 +252,16 @@ mod tests {
 
     #[test]
     fn names_lead_back_to_solves() {
-        assert_eq!(Solve::all().count(), 6);
-        assert!(Solve::all().all(|solve| Solve::parse(&solve.name()) == Ok(solve)));
-        assert!(Solve::parse("sweep:vulkan").is_err());
+        assert_eq!(Counted::all().count(), 6);
+        assert!(Counted::all().all(|solve| Counted::parse(&solve.name()) == Ok(solve)));
+        assert!(Counted::parse("sweep:vulkan").is_err());
     }
 
     fn solve_loops(loops: u32) {
         let size = Size { width: 60, height: 40 };
         let settings = Settings { steps: loops, ..Algorithm::Bp.settings(size, 1, 1, Schedule::Sync) };
-        solve("rayon", Plan::new(size, Model::new(Profile::Thesis, 16).unwrap(), settings).unwrap()).unwrap();
+        let plan = Plan::new(size, Model::new(Profile::Thesis, 16).unwrap(), settings).unwrap();
+        solve("rayon", plan).unwrap();
     }
 
     /// Counted below, as is the next.
@@ -277,7 +283,7 @@ mod tests {
         let program = std::env::current_exe().unwrap();
         let count = |test: &str| {
             let test = format!("gate::callgrind::tests::{test}");
-            callgrind(&program, &["--exact", &test]).unwrap().instructions
+            callgrind(&program, &["--exact", &test], &Watch::default()).unwrap().instructions
         };
         let [five, again, ten] = ["five_loops", "five_loops", "ten_loops"].map(count);
         let alike = |(&a, b): (&u64, u64)| a.abs_diff(b) as f64 <= 0.002 * a as f64;

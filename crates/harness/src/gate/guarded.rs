@@ -2,7 +2,7 @@
 
 use bp_core::Stage;
 
-use super::measure::Sample;
+use crate::record::Sample;
 
 /// The plans of the thesis that are held against its first.
 const AGAINST_BP: [&str; 4] = ["cfbp", "cfcsbp", "ctbp", "ctcsbp"];
@@ -118,11 +118,10 @@ impl Guarded {
 impl Part {
     /// This part of a solve, in milliseconds.
     pub(super) fn ms(self, sample: &Sample) -> f64 {
-        let stage = |stage: Stage| sample.stages_ms[stage as usize];
         match self {
             Self::Total => sample.total_ms,
-            Self::MessagePassing => stage(Stage::Refine) + stage(Stage::UpdateMessages),
-            Self::Kernel(kernel) => stage(kernel),
+            Self::MessagePassing => sample.message_passing_ms(),
+            Self::Kernel(stage) => sample.stages_ms()[stage as usize],
         }
     }
 }

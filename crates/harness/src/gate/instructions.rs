@@ -1,6 +1,9 @@
 //! `bp gate --instructions`: counts beside those that were recorded.
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 
@@ -9,7 +12,9 @@ use super::{
     file,
     table::table,
 };
-use crate::{args::GateArgs, failure::Failure, report::format::whole};
+use bp_stereo::Watch;
+
+use crate::{failure::Failure, report::format::whole};
 
 /// Name of the file.
 const FILE: &str = "instructions.json";
@@ -20,7 +25,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// What was counted, judged.
 #[derive(Serialize)]
-pub(crate) struct CountJudgement {
+pub struct CountJudgement {
     #[serde(skip)]
     baselines: PathBuf,
     counts: Counts,
@@ -31,18 +36,18 @@ pub(crate) struct CountJudgement {
 }
 
 /// Counts, and holds against the file what is comparable.
-pub(crate) fn instructions(args: &GateArgs) -> Result<CountJudgement, Failure> {
+pub fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
-    let recorded: Option<Counts> = file::read(&args.baselines.join(FILE))?;
-    let counts = callgrind::count(valgrind)?;
+    let recorded: Option<Counts> = file::read(&baselines.join(FILE))?;
+    let counts = callgrind::count(valgrind, watch)?;
     let unlike = match &recorded {
-        None => Some(format!("there is no {}", args.baselines.join(FILE).display())),
+        None => Some(format!("there is no {}", baselines.join(FILE).display())),
         Some(recorded) if recorded.tools() != counts.tools() => Some(format!("it is of {}", recorded.tools())),
         Some(_) => None,
     };
     let recorded = recorded.filter(|_| unlike.is_none());
-    Ok(CountJudgement { baselines: args.baselines.clone(), counts, recorded, unlike })
+    Ok(CountJudgement { baselines: baselines.to_owned(), counts, recorded, unlike })
 }
 
 impl CountJudgement {
@@ -55,7 +60,7 @@ impl CountJudgement {
     }
 
     /// Counts that grew beyond the tolerance or are no more, and backends that went to another device, in words.
-    pub(crate) fn failures(&self) -> Vec<String> {
+    pub fn failures(&self) -> Vec<String> {
         let grown = self.rows().filter_map(|(name, now, before)| {
             let (before, more) = before.filter(|&(_, more)| more > TOLERANCE)?;
             let percent = 100.0 * more;
@@ -72,7 +77,7 @@ impl CountJudgement {
     }
 
     /// The page.
-    pub(crate) fn page(&self) -> String {
+    pub fn page(&self) -> String {
         let mut text = format!("# Instructions\n\n* Counted on {}.\n", self.counts.tools());
         self.counts.devices.iter().for_each(|(backend, device)| _ = writeln!(text, "* {backend}: {device}."));
         if let Some(unlike) = &self.unlike {
@@ -90,7 +95,7 @@ impl CountJudgement {
     }
 
     /// Writes the counts as the new baseline; the file's name.
-    pub(crate) fn update(&self) -> Result<String, Failure> {
+    pub fn update(&self) -> Result<String, Failure> {
         let path = self.baselines.join(FILE);
         file::write(&path, &self.counts)?;
         Ok(path.display().to_string())

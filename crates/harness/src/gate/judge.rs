@@ -21,7 +21,7 @@ const TOLERANCE_ANYWHERE: f64 = 0.4;
 
 /// What a gate found.
 #[derive(Serialize)]
-pub(crate) struct Judgement {
+pub struct Judgement {
     pub(super) program: Program,
     pub(super) machine: Machine,
     pub(super) quick: bool,
@@ -38,7 +38,7 @@ pub(crate) struct Judgement {
     /// What is expected of devices that are here, and was not measured.
     pub(super) missing: Vec<String>,
     /// Baselines that were written.
-    pub(crate) written: Vec<String>,
+    pub written: Vec<String>,
 }
 
 /// A guarded speed-up, judged.
@@ -78,13 +78,13 @@ impl SpeedUp {
 impl Judgement {
     /// Judges a first measurement.
     pub(super) fn new(gate: &Gate<'_>, baselines: &Baselines, measured: &Measured) -> Result<Self, Failure> {
-        let devices = gate.devices();
+        let devices = gate.runners.devices();
         let known = Known { gate, baselines };
         Ok(Self {
             program: machine::program()?,
             machine: gate.machine.clone(),
-            quick: gate.args.quick,
-            rounds: gate.args.rounds,
+            quick: gate.options.quick,
+            rounds: gate.options.rounds,
             baseline: baselines.path_here().display().to_string(),
             has_baseline: known.expected(baselines.here.as_ref()).is_some(),
             devices: devices.into_iter().collect(),
@@ -113,7 +113,7 @@ impl Judgement {
     }
 
     /// What is worse than it may be, or not what it was, in words.
-    pub(crate) fn failures(&self) -> Vec<String> {
+    pub fn failures(&self) -> Vec<String> {
         let worse = self.speed_ups.iter().filter(|speed_up| speed_up.is_worse()).map(|speed_up| {
             let now = speed_up.second.unwrap_or(speed_up.first).median;
             format!("{}: {now:.2} times, was {:.2}", speed_up.name, speed_up.baseline.unwrap_or(f64::NAN))
@@ -141,13 +141,13 @@ impl<'a> Known<'a> {
 
     /// What this machine's baseline expects, where these runners were the same devices then.
     fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
-        let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.devices());
+        let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.runners.devices());
         runners.iter().all(|&runner| here.devices.get(runner) == devices.get(runner)).then_some(here)
     }
 
     /// What is expected of the devices that are here, and was not measured.
     fn missing(&self, measured: &Measured) -> Vec<String> {
-        let devices = self.gate.devices();
+        let devices = self.gate.runners.devices();
         let of_device = |expected: &Expected, name: &str| {
             let is_of = |runner: &String| {
                 name.starts_with(&format!("{runner}: ")) || name.starts_with(&format!("{runner} over "))

@@ -1,23 +1,31 @@
-//! Takes the samples: every entrant in turns, so that whatever else the machine does meets all of them alike.
+//! Takes the samples of everything that is guarded, and notes what does not vary.
 
-use std::collections::BTreeMap;
+use std::{cell::RefCell, collections::BTreeMap};
 
-use bp_core::{Driver, Energy, Stage};
+use bp_core::{Driver, Energy};
 
 use super::{
-    guarded::{Entrant, Guarded},
-    runners::{Runner, Runners},
+    guarded::{Entrant, Guarded, Part},
+    runners::Runners,
     verdict::Ratio,
 };
+use bp_stereo::Watch;
+
 use crate::{
     failure::Failure,
-    interrupt::{self, ProgressBar},
-    machine,
-    report::format::Spread,
+    measure::{self, Contestant, Meter, Rules, Runner, Solve, take_turns},
+    record::Sample,
     reproduce::plans::{self, Planned},
     scenes::Scene,
-    speed::milliseconds,
 };
+
+/// A problem is solved again and again until a turn has taken so many milliseconds: the times of a short solve alone
+/// would mostly tell about what came before it.
+const TURN_MS: f64 = 20.0;
+
+/// The same of all threads of the fast processor backend. Systems take their time to spread threads that have just been
+/// woken over the processors: until then two are no faster than one.
+const TURN_OF_THREADS_MS: f64 = 300.0;
 
 /// The most solves of a turn.
 const MOST_SOLVES: u32 = 400;
@@ -30,21 +38,12 @@ pub(super) struct Problem {
     pub(super) k: u32,
 }
 
-/// Times of a solve, in milliseconds.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
-    /// By the wall clock.
-    pub(super) total_ms: f64,
-    /// By the device's clock where it has one, in the order of [`Stage::ALL`].
-    pub(super) stages_ms: [f64; Stage::ALL.len()],
-}
-
 /// What was measured.
 pub(super) struct Measured {
     /// Every guarded speed-up, in order, but those that could not be had.
     pub(super) ratios: Vec<(Guarded, Ratio)>,
     /// What does not vary, by name.
-    pub(super) facts: BTreeMap<String, Fact>,
+    pub(super) facts: Facts,
 }
 
 /// Something that does not vary.
@@ -55,15 +54,8 @@ pub(super) struct Fact {
     pub(super) runner: Option<String>,
 }
 
-/// An entrant ready to run.
-struct Ready<'a> {
-    entrant: &'a Entrant,
-    runner: &'a Runner,
-    driver: Driver,
-    solves: u32,
-    /// One a round.
-    turns: Vec<Sample>,
-}
+/// By name.
+pub(super) type Facts = BTreeMap<String, Fact>;
 
 /// Measures everything that is guarded in so many rounds.
 pub(super) fn measure(
@@ -71,28 +63,21 @@ pub(super) fn measure(
     runners: &Runners,
     problem: &Problem,
     rounds: u32,
+    watch: &Watch<'_>,
 ) -> Result<Measured, Failure> {
-    let entrants = entrants(guarded, &runners.lineup.reference);
-    let bar = ProgressBar::new(entrants.len() as u64 * u64::from(rounds + 1));
-    let mut facts = BTreeMap::new();
-    let mut ready = Vec::new();
-    for entrant in entrants {
-        bar.message(format!("{} {}", entrant.runner, entrant.plan));
-        ready.push(enter(entrant, runners, problem, &mut facts)?);
-        let _ = bar.update(ready.len() as u64);
-    }
-    add_other_plans(runners, problem, &mut facts)?;
-    let mut done = ready.len() as u64;
-    for round in 1..=rounds {
-        bar.message(format!("round {round} of {rounds}"));
-        for entrant in &mut ready {
-            entrant.take_turn(problem)?;
-            done += 1;
-            let _ = bar.update(done);
-        }
-    }
-    bar.finish();
-    let ratios = guarded.iter().filter_map(|guarded| Some((guarded.clone(), ratio(guarded, &ready)?))).collect();
+    let facts = RefCell::default();
+    let enter = |entrant| {
+        let turn = Turn::new(entrant, runners, problem, &facts)?;
+        Ok(measure::Entrant::new(format!("{} {}", entrant.runner, entrant.plan), turn))
+    };
+    let entrants = entrants(guarded, &runners.lineup.reference).into_iter();
+    let mut entrants = entrants.map(enter).collect::<Result<Vec<_>, Failure>>()?;
+    let rules = Rules { rounds, slow_rounds: rounds, warm_up: true, fail_fast: true };
+    take_turns(&mut entrants, &rules, &mut Meter::new(watch))?;
+    let ratios = guarded.iter().filter_map(|guarded| Some((guarded.clone(), ratio(guarded, &entrants)?))).collect();
+    drop(entrants);
+    let mut facts = facts.into_inner();
+    add_other_plans(runners, problem, &mut facts, watch)?;
     Ok(Measured { ratios, facts })
 }
 
@@ -108,50 +93,90 @@ fn entrants<'a>(guarded: &'a [Guarded], reference: &str) -> Vec<&'a Entrant> {
     entrants
 }
 
-/// Makes an entrant ready, solves the problem once and adds what does not vary.
-fn enter<'a>(
+/// A plan on a runner, which takes turns.
+struct Turn<'a> {
     entrant: &'a Entrant,
-    runners: &'a Runners,
-    problem: &Problem,
-    facts: &mut BTreeMap<String, Fact>,
-) -> Result<Ready<'a>, Failure> {
-    interrupt::check()?;
-    let planned = plans::all().into_iter().find(|planned| planned.name == entrant.plan);
-    let known = runners.get(&entrant.runner).zip(planned);
-    let (runner, planned) = known.ok_or_else(|| Failure::other(format!("there is no plan {}", entrant.plan)))?;
-    let mut ready =
-        Ready { entrant, runner, driver: prepare(runner, &planned, problem)?, solves: 1, turns: Vec::new() };
-    let first = ready.solve(problem)?;
-    ready.solves = ((runner.turn_ms / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
-    add_answer(&runner.name, entrant.plan, &ready.driver, problem, facts)?;
-    let owner = Some(runner.name.clone()).filter(|runner| *runner != runners.lineup.reference);
-    let allocated = Fact { value: ready.driver.allocated_bytes().to_string(), runner: owner };
-    facts.insert(format!("{}: {}, bytes allocated", runner.name, entrant.plan), allocated);
-    Ok(ready)
+    runner: &'a Runner,
+    planned: Planned,
+    problem: &'a Problem,
+    facts: &'a RefCell<Facts>,
+    /// Whose bytes are the same on every machine.
+    reference: &'a str,
+    /// How long a turn takes at least, unless that were too many solves.
+    turn_ms: f64,
+    solves: u32,
+    ready: Option<Solve<'a>>,
+}
+
+impl<'a> Turn<'a> {
+    fn new(
+        entrant: &'a Entrant,
+        runners: &'a Runners,
+        problem: &'a Problem,
+        facts: &'a RefCell<Facts>,
+    ) -> Result<Self, Failure> {
+        let planned = plans::all().into_iter().find(|planned| planned.name == entrant.plan);
+        let known = runners.get(&entrant.runner).zip(planned);
+        let (runner, planned) = known.ok_or_else(|| Failure::other(format!("there is no plan {}", entrant.plan)))?;
+        let threaded = runners.lineup.all_threads.as_ref() == Some(&runner.name);
+        let turn_ms = if threaded { TURN_OF_THREADS_MS } else { TURN_MS };
+        let reference = &runners.lineup.reference;
+        Ok(Self { entrant, runner, planned, problem, facts, reference, turn_ms, solves: 1, ready: None })
+    }
+
+    /// Adds what the plan answers and how many bytes it takes.
+    fn add_facts(&self, driver: &Driver) -> Result<(), Failure> {
+        let (runner, facts) = (&self.runner.name, &mut self.facts.borrow_mut());
+        add_answer(runner, self.entrant.plan, driver, self.problem, facts)?;
+        let owner = Some(runner.clone()).filter(|runner| runner != self.reference);
+        let allocated = Fact { value: driver.allocated_bytes().to_string(), runner: owner };
+        facts.insert(format!("{runner}: {}, bytes allocated", self.entrant.plan), allocated);
+        Ok(())
+    }
+}
+
+impl Contestant for Turn<'_> {
+    fn warm_up(&mut self, meter: &Meter<'_>) -> Result<Sample, Failure> {
+        let mut solve = prepare(self.runner, &self.planned, self.problem)?;
+        let first = solve.sample(0, meter).map_err(|failure| failure.of(&self.runner.name))?;
+        self.solves = ((self.turn_ms / first.total_ms).ceil() as u32).clamp(1, MOST_SOLVES);
+        self.add_facts(&solve.driver)?;
+        self.ready = Some(solve);
+        Ok(first)
+    }
+
+    /// Solves the problem as often as a turn takes; the medians count. Nothing is reported meanwhile: it would take part
+    /// in the times of short solves.
+    fn turn(&mut self, round: u32, _: &Meter<'_>) -> Result<Sample, Failure> {
+        let not_ready = || Failure::other("it is not ready");
+        let solve = self.ready.as_mut().ok_or_else(not_ready)?;
+        let silent = Meter::new(&Watch::default());
+        let samples = (0..self.solves).map(|_| solve.sample(round, &silent)).collect::<Result<Vec<_>, _>>();
+        let samples = samples.map_err(|failure| failure.of(&self.runner.name))?;
+        Sample::median(&samples).ok_or_else(not_ready)
+    }
+
+    fn entries(&self) -> u64 {
+        u64::from(self.solves) * self.ready.as_ref().map_or(1, Solve::entries)
+    }
 }
 
 /// Adds what the plans answer whose times are not guarded, by the fast processor backend.
-fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut BTreeMap<String, Fact>) -> Result<(), Failure> {
+fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut Facts, watch: &Watch<'_>) -> Result<(), Failure> {
     let Some(runner) = runners.get(&runners.lineup.one_thread) else { return Ok(()) };
     for planned in plans::all() {
         if facts.contains_key(&format!("{}: energy", planned.name)) {
             continue;
         }
-        let mut driver = prepare(runner, &planned, problem)?;
-        runner.run(|| driver.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
-        add_answer(&runner.name, planned.name, &driver, problem, facts)?;
+        let mut solve = prepare(runner, &planned, problem)?;
+        solve.sample(0, &Meter::new(watch)).map_err(|failure| failure.of(&runner.name))?;
+        add_answer(&runner.name, planned.name, &solve.driver, problem, facts)?;
     }
     Ok(())
 }
 
 /// Adds what a plan answers; fails where another runner answered otherwise.
-fn add_answer(
-    runner: &str,
-    plan: &str,
-    driver: &Driver,
-    problem: &Problem,
-    facts: &mut BTreeMap<String, Fact>,
-) -> Result<(), Failure> {
+fn add_answer(runner: &str, plan: &str, driver: &Driver, problem: &Problem, facts: &mut Facts) -> Result<(), Failure> {
     for (name, value) in answer(driver, problem)? {
         let new = Fact { value: value.clone(), runner: None };
         let known = facts.entry(format!("{plan}: {name}")).or_insert(new);
@@ -163,15 +188,9 @@ fn add_answer(
     Ok(())
 }
 
-fn prepare(runner: &Runner, planned: &Planned, problem: &Problem) -> Result<Driver, Failure> {
+fn prepare<'a>(runner: &'a Runner, planned: &Planned, problem: &'a Problem) -> Result<Solve<'a>, Failure> {
     let plan = planned.plan(problem.scene.pair.size(), problem.labels, problem.k)?;
-    let device = runner.opened.device.as_ref();
-    let prepared = runner.run(|| {
-        let needed = device.planned_bytes(&plan);
-        machine::check_memory(runner.opened.info.kind, needed, "a full run needs more than --quick")?;
-        Ok(Driver::new(device, plan)?)
-    });
-    prepared.map_err(|failure: Failure| failure.of(&runner.name))
+    Solve::prepare(runner, plan, &problem.scene.pair).map_err(|failure| failure.of(&runner.name))
 }
 
 /// What every backend must answer, by name.
@@ -189,42 +208,14 @@ fn answer(driver: &Driver, problem: &Problem) -> Result<[(&'static str, String);
     ])
 }
 
-impl Ready<'_> {
-    fn solve(&mut self, problem: &Problem) -> Result<Sample, Failure> {
-        let Self { runner, driver, .. } = self;
-        let times =
-            runner.run(|| driver.solve(&problem.scene.pair)).map_err(|error| Failure::from(error).of(&runner.name))?;
-        // Without a clock of its own a GPU's stages are those of handing over work: they are no numbers.
-        let waits = runner.opened.info.api.is_none();
-        let stages = times.device.or(waits.then_some(times.wall)).map(|stages| stages.map(milliseconds));
-        Ok(Sample { total_ms: milliseconds(times.total), stages_ms: stages.unwrap_or([f64::NAN; Stage::ALL.len()]) })
-    }
-
-    /// Solves the problem as often as a turn takes.
-    fn take_turn(&mut self, problem: &Problem) -> Result<(), Failure> {
-        interrupt::check()?;
-        let solves = (0..self.solves).map(|_| self.solve(problem)).collect::<Result<Vec<_>, _>>()?;
-        self.turns.push(Sample::median(&solves));
-        Ok(())
-    }
-}
-
-impl Sample {
-    /// The median of each time.
-    fn median(samples: &[Self]) -> Self {
-        let median =
-            |ms: &dyn Fn(&Self) -> f64| Spread::of(samples.iter().map(ms)).map_or(f64::NAN, |spread| spread.median);
-        let mut stages_ms = [0.0; Stage::ALL.len()];
-        for (stage, ms) in stages_ms.iter_mut().enumerate() {
-            *ms = median(&|sample| sample.stages_ms[stage]);
-        }
-        Self { total_ms: median(&|sample| sample.total_ms), stages_ms }
-    }
-}
-
-/// A speed-up, from the two times of each round; `None` where one of its entrants did not run.
-fn ratio(guarded: &Guarded, ready: &[Ready<'_>]) -> Option<Ratio> {
-    let turns = |entrant: &Entrant| Some(&ready.iter().find(|ready| ready.entrant == entrant)?.turns);
-    let ratios = turns(&guarded.over)?.iter().zip(turns(&guarded.of)?);
-    Ratio::of(&ratios.map(|(over, of)| guarded.part.ms(over) / guarded.part.ms(of)).collect::<Vec<_>>())
+/// A speed-up, from the two times of each round; `None` where one of its entrants did not run, or where a device without
+/// a clock of its own hides how long a stage took.
+fn ratio(guarded: &Guarded, entrants: &[measure::Entrant<Turn<'_>>]) -> Option<Ratio> {
+    let samples = |entrant: &Entrant| {
+        let own = entrants.iter().find(|own| own.contestant.entrant == entrant)?;
+        let timed = |sample: &Sample| own.contestant.runner.waits() || sample.device_ms().is_some();
+        (guarded.part == Part::Total || own.samples.iter().all(timed)).then_some(&own.samples)
+    };
+    let (over, of) = (samples(&guarded.over)?, samples(&guarded.of)?);
+    Ratio::of(&Sample::ratios(over, of, |sample| guarded.part.ms(sample)))
 }

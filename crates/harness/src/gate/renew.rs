@@ -1,18 +1,16 @@
 //! New baselines from measurements.
 
-use clap::ValueEnum;
-
 use super::{
     Gate,
     baseline::{Baseline, Baselines, Expected},
     guarded::Guarded,
     measure::{Fact, Measured},
 };
-use crate::{failure::Failure, machine, report::format::Spread};
+use crate::{failure::Failure, machine, statistics::median};
 
 /// Which baselines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Renewal {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Renewal {
     /// The file for this kind of machine.
     Here,
     /// That and the file for all machines.
@@ -49,16 +47,16 @@ impl Gate<'_> {
         is_told: impl Fn(&Fact) -> bool,
     ) -> Expected {
         let ratios = || measured.iter().flat_map(|measured| &measured.ratios);
-        let median = |name: &str| {
+        let median_of = |name: &str| {
             let own = ratios().filter(|(guarded, _)| guarded.name() == name);
-            Spread::of(own.map(|(_, ratio)| ratio.median)).map(|spread| (1000.0 * spread.median).round() / 1000.0)
+            median(own.map(|(_, ratio)| ratio.median)).map(|median| (1000.0 * median).round() / 1000.0)
         };
         let names = ratios().filter(|(guarded, _)| is_expected(guarded)).map(|(guarded, _)| guarded.name());
         let facts = measured.iter().flat_map(|measured| &measured.facts).filter(|(_, fact)| is_told(fact));
         Expected {
             commit: machine::commit(),
-            devices: self.devices(),
-            speed_ups: names.filter_map(|name| Some((name.clone(), median(&name)?))).collect(),
+            devices: self.runners.devices(),
+            speed_ups: names.filter_map(|name| Some((name.clone(), median_of(&name)?))).collect(),
             facts: facts.map(|(name, fact)| (name.clone(), fact.value.clone())).collect(),
         }
     }

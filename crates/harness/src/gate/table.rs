@@ -14,7 +14,7 @@ const READING: &str = "A speed-up says how many times as long the other side tak
                        in two measurements.";
 
 /// The whole page.
-pub(crate) fn page(judgement: &Judgement) -> String {
+pub fn page(judgement: &Judgement) -> String {
     let kind = if judgement.quick { ", quick" } else { "" };
     let mut text = format!("# Gate{kind}, on {}\n\n", judgement.machine.cpu);
     about(judgement).iter().for_each(|line| _ = writeln!(text, "* {line}"));

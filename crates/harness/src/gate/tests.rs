@@ -5,27 +5,19 @@ use std::{fs, path::Path};
 use super::{baseline::Baseline, *};
 
 /// The processor's backends on a tiny scene.
-fn gate(args: &GateArgs) -> Gate<'_> {
+fn gate(options: &GateOptions) -> Gate<'_> {
     let runners = Runners::open().unwrap();
     let lineup = guarded::Lineup { devices: Vec::new(), ..runners.lineup.clone() };
     let problem = Problem { scene: scenes::made_up(0, 12).unwrap(), labels: 12, k: 18 };
-    Gate { args, guarded: guarded::all(&lineup), problem, runners, machine: machine::machine(None) }
+    Gate { options, guarded: guarded::all(&lineup), problem, runners, machine: machine::machine(None) }
 }
 
-fn args(baselines: &Path) -> GateArgs {
-    GateArgs {
-        quick: true,
-        rounds: 3,
-        baselines: baselines.to_owned(),
-        instructions: false,
-        update: None,
-        json: false,
-        counted: None,
-    }
+fn options(baselines: &Path) -> GateOptions {
+    GateOptions { quick: true, rounds: 3, baselines: baselines.to_owned(), update: None }
 }
 
 fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
-    let baselines = Baselines::read(&gate.args.baselines, &machine::machine(None), false).unwrap();
+    let baselines = Baselines::read(&gate.options.baselines, &machine::machine(None), false).unwrap();
     Judgement::new(gate, &baselines, measured).unwrap()
 }
 
@@ -39,9 +31,9 @@ fn edit(path: &Path, change: impl FnOnce(&mut serde_json::Value)) {
 #[test]
 fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    let args = args(folder.path());
-    let gate = gate(&args);
-    let measured = gate.measure().unwrap();
+    let options = options(folder.path());
+    let gate = gate(&options);
+    let measured = gate.measure(&Watch::default()).unwrap();
     let first = judge(&gate, &measured);
     assert!(first.failures().is_empty() && page(&first).contains("There is no baseline"), "{}", page(&first));
 
@@ -66,29 +58,29 @@ fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
 #[test]
 fn other_devices_and_other_settings_have_no_baseline() {
     let folder = tempfile::tempdir().unwrap();
-    let mut args = args(folder.path());
+    let mut options = options(folder.path());
     let (measured, path) = {
-        let gate = gate(&args);
-        let measured = gate.measure().unwrap();
+        let gate = gate(&options);
+        let measured = gate.measure(&Watch::default()).unwrap();
         let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
         gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
         (measured, baselines.path_here().to_owned())
     };
     edit(&path, |json| json["baseline"]["runs"]["quick"]["devices"]["rayon on 1 thread"] = "another".into());
-    let told = page(&judge(&gate(&args), &measured));
+    let told = page(&judge(&gate(&options), &measured));
     assert!(told.lines().filter(|line| line.contains("no baseline |")).all(|line| line.contains("rayon on 1 thread")));
     assert!(told.contains("no baseline |"), "{told}");
-    args.quick = false;
-    let told = page(&judge(&gate(&args), &measured));
+    options.quick = false;
+    let told = page(&judge(&gate(&options), &measured));
     assert!(told.contains("There is no baseline") && !told.contains("as before"), "{told}");
 }
 
 #[test]
 fn what_is_expected_and_not_measured_fails() {
     let folder = tempfile::tempdir().unwrap();
-    let args = args(folder.path());
-    let gate = gate(&args);
-    let mut measured = gate.measure().unwrap();
+    let options = options(folder.path());
+    let gate = gate(&options);
+    let mut measured = gate.measure(&Watch::default()).unwrap();
     let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
     gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
     measured.ratios.pop();

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{report::format::Spread, summary::interval};
+use crate::statistics::{interval, median};
 
 /// A measured speed-up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -33,7 +33,7 @@ impl Ratio {
     /// From the ratios of the rounds; `None` where those are too few for an interval.
     pub(super) fn of(rounds: &[f64]) -> Option<Self> {
         let [low, high] = interval(&[rounds.to_vec()])?;
-        Some(Self { median: Spread::of(rounds.iter().copied())?.median, low, high })
+        Some(Self { median: median(rounds.iter().copied())?, low, high })
     }
 
     /// Compares with a baseline, from which `tolerance`, a fraction, is no difference.

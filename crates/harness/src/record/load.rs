@@ -9,16 +9,22 @@ use std::{
     path::Path,
 };
 
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 
-use super::{Cell, Record, SCHEMA_VERSION};
+use super::{
+    Cell, Record, SCHEMA_VERSION,
+    speed::{self, Speed},
+};
 use crate::{failure::Failure, report::printable};
 
 /// Name of the record in a run's folder.
-pub(crate) const RECORD_FILE: &str = "record.json";
+pub const RECORD_FILE: &str = "record.json";
+
+/// Name of the record of `bp speed` in a run's folder.
+pub const SPEED_FILE: &str = "speed.json";
 
 /// Name of the folder of maps beside it.
-pub(crate) const MAPS_FOLDER: &str = "maps";
+pub const MAPS_FOLDER: &str = "maps";
 
 /// Larger files are not read: ours are below one MiB, and somebody's may be of any size.
 const MAX_BYTES: u64 = 64 << 20;
@@ -33,28 +39,51 @@ struct Versioned {
 }
 
 /// Reads a record: the file, or the one in a run's folder.
-pub(crate) fn load(path: &Path) -> Result<Record, Failure> {
+pub fn load(path: &Path) -> Result<Record, Failure> {
     let path = record_file(path);
     parse(&path, &read(&path)?)
 }
 
 /// The record in the text of a file.
-pub(crate) fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
-    let refused = |error: &dyn Display| {
-        let why: String = printable(&error.to_string()).chars().take(MAX_MESSAGE).collect();
-        Failure::reading(path, &format!("not a record of `bp reproduce` (see results/schema.json): {why}"))
-    };
-    // The version comes first: another one may well have other fields.
-    let Versioned { schema_version } = serde_json::from_str(text).map_err(|error| refused(&error))?;
-    if schema_version != SCHEMA_VERSION {
-        let what = format!("schema version {schema_version}, this program reads {SCHEMA_VERSION}");
-        return Err(Failure::reading(path, &format!("{what}; read it with the version of bp that wrote it")));
-    }
-    let record: Record = serde_json::from_str(text).map_err(|error| refused(&error))?;
+pub fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
+    let record: Record = versioned(path, text, &REPRODUCE)?;
     match record.cells.iter().filter_map(Cell::measured).find(|measured| !is_beside(&measured.map)) {
-        Some(measured) => Err(refused(&format!("a map outside of its folder: {}", measured.map))),
+        Some(measured) => Err(refused(path, &REPRODUCE, &format!("a map outside of its folder: {}", measured.map))),
         None => Ok(record),
     }
+}
+
+/// Reads the record of a run of `bp speed`: the file, or the one in its folder.
+pub fn load_speed(path: &Path) -> Result<Speed, Failure> {
+    let path: Cow<'_, Path> = if path.is_dir() { path.join(SPEED_FILE).into() } else { path.into() };
+    versioned(&path, &read(&path)?, &SPEED)
+}
+
+/// A kind of record.
+struct Kind {
+    /// Its name in messages.
+    what: &'static str,
+    /// The version that this program reads.
+    version: u32,
+}
+
+const REPRODUCE: Kind = Kind { what: "record of `bp reproduce` (see results/schema.json)", version: SCHEMA_VERSION };
+const SPEED: Kind = Kind { what: "record of `bp speed`", version: speed::SCHEMA_VERSION };
+
+fn refused(path: &Path, kind: &Kind, error: &dyn Display) -> Failure {
+    let why: String = printable(&error.to_string()).chars().take(MAX_MESSAGE).collect();
+    Failure::reading(path, &format!("not a {}: {why}", kind.what))
+}
+
+/// A record of the version that this program reads.
+fn versioned<T: DeserializeOwned>(path: &Path, text: &str, kind: &Kind) -> Result<T, Failure> {
+    // The version comes first: another one may well have other fields.
+    let Versioned { schema_version } = serde_json::from_str(text).map_err(|error| refused(path, kind, &error))?;
+    if schema_version != kind.version {
+        let what = format!("schema version {schema_version}, this program reads {}", kind.version);
+        return Err(Failure::reading(path, &format!("{what}; read it with the version of bp that wrote it")));
+    }
+    serde_json::from_str(text).map_err(|error| refused(path, kind, &error))
 }
 
 /// Whether a map is where ours are: reports show it, and a stranger's record may name any file.
@@ -64,7 +93,7 @@ fn is_beside(map: &str) -> bool {
 }
 
 /// The file that a record is in, where its folder may have been named.
-pub(crate) fn record_file(path: &Path) -> Cow<'_, Path> {
+pub fn record_file(path: &Path) -> Cow<'_, Path> {
     if path.is_dir() { path.join(RECORD_FILE).into() } else { path.into() }
 }
 

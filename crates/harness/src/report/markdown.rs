@@ -64,7 +64,7 @@ pub(super) fn grid(table: &Table) -> String {
 }
 
 /// The lines of a table of these columns and rows.
-pub(crate) fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
+pub fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| {
         let cells: Vec<_> = cells.iter().map(|cell| escape::markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))

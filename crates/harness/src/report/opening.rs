@@ -129,19 +129,19 @@ fn names(results: &Results<'_>) -> Table {
 }
 
 /// The machine in a sentence.
-pub(crate) fn machine_fact(machine: &Machine) -> String {
+pub fn machine_fact(machine: &Machine) -> String {
     format!("Machine: {}, {}, {}.", machine.cpu, counted(machine.cores, "core"), machine.system)
 }
 
 /// The program in a sentence.
-pub(crate) fn program_fact(program: &Program) -> String {
+pub fn program_fact(program: &Program) -> String {
     let changes = if program.clean_tree { "" } else { " with uncommitted changes" };
     let Program { version, commit, rustc, flags, .. } = program;
     format!("Program: bp {version}, commit {commit}{changes}, {rustc}, {flags}.")
 }
 
 /// A device in a sentence.
-pub(crate) fn device_fact(backend: &str, device: &Device) -> String {
+pub fn device_fact(backend: &str, device: &Device) -> String {
     let through =
         [&device.api, &device.driver].into_iter().flatten().map(|name| format!(", {name}")).collect::<String>();
     let software = " (a software rasteriser: it runs on the CPU, so its times are not a GPU's)";

@@ -91,7 +91,7 @@ const SINGLE: [(&[Named], [&str; 3]); 5] = [
 ];
 
 /// The table that the times of a plan stand in: its number, and what is measured there.
-pub(crate) fn of_times(plan: &str) -> (&'static str, &'static str) {
+pub fn of_times(plan: &str) -> (&'static str, &'static str) {
     let single = SINGLE.iter().find(|(plans, _)| plans.iter().any(|named| named.plan == plan));
     single.map_or((ours::PROFILES, "ours"), |&(plans, [speed, ..])| (speed, family(plans)))
 }

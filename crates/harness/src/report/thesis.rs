@@ -1,4 +1,4 @@
-//! What the thesis prints: `bench-data/thesis.json`.
+//! What the thesis prints: `data/thesis.json`.
 
 use std::collections::BTreeMap;
 
@@ -37,8 +37,8 @@ pub(super) struct PrintedImage {
 impl Thesis {
     /// The numbers of this build.
     pub(super) fn read() -> Result<Self, Failure> {
-        let text = include_str!("../../../../bench-data/thesis.json");
-        serde_json::from_str(text).map_err(|error| Failure::other(format!("bench-data/thesis.json: {error}")))
+        let text = include_str!("../../data/thesis.json");
+        serde_json::from_str(text).map_err(|error| Failure::other(format!("crates/harness/data/thesis.json: {error}")))
     }
 
     /// The printed time of an algorithm on image `index`.

@@ -7,22 +7,22 @@ const Z: u32 = 2;
 
 /// A plan of the tables.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Planned {
+pub struct Planned {
     /// Its name in records.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// Its algorithm.
-    pub(crate) algorithm: Algorithm,
+    pub algorithm: Algorithm,
     profile: Profile,
     /// What loops are divided by.
-    pub(crate) z: Option<u32>,
+    pub z: Option<u32>,
     schedule: Schedule,
     /// Grids and steps on each, in place of the algorithm's own.
-    fixed: Option<(usize, u32)>,
+    fixed: Option<(u32, u32)>,
 }
 
 /// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and three of
 /// ours, with the census transform as data cost on few grids: few loops, many half-steps, and one sweep a grid.
-pub(crate) fn all() -> Vec<Planned> {
+pub fn all() -> Vec<Planned> {
     let thesis = |name, algorithm: Algorithm, z: u32| Planned {
         name,
         algorithm,
@@ -43,12 +43,12 @@ pub(crate) fn all() -> Vec<Planned> {
 }
 
 /// Name of our plan with census costs and few loops.
-pub(crate) const CENSUS: &str = "census";
+pub const CENSUS: &str = "census";
 
 impl Planned {
     /// The plan for images of `size`, with so many labels; `k` loops are what its own are derived from, unless those are
     /// fixed.
-    pub(crate) fn plan(&self, size: Size, labels: usize, k: u32) -> Result<Plan, Error> {
+    pub fn plan(&self, size: Size, labels: usize, k: u32) -> Result<Plan, Error> {
         let model = Model::new(self.profile, labels)?;
         let settings = self.algorithm.settings(size, k, self.z.unwrap_or(1), self.schedule);
         let settings = match self.fixed {
@@ -59,7 +59,7 @@ impl Planned {
     }
 
     /// The loops that its own are derived from.
-    pub(crate) fn k(&self, k: u32) -> Option<u32> {
+    pub fn k(&self, k: u32) -> Option<u32> {
         self.fixed.is_none().then_some(k)
     }
 }

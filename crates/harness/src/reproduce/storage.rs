@@ -7,10 +7,12 @@ use std::{
 
 use jiff::{Timestamp, Zoned};
 
+use bp_stereo::Watch;
+
 use crate::{
     failure::Failure,
     files::{create_folder, write_json},
-    machine, note,
+    machine,
     record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
 };
@@ -19,7 +21,7 @@ use crate::{
 const LOCK_FILE: &str = ".lock";
 
 /// A run being recorded.
-pub(crate) struct Storage {
+pub struct Storage {
     folder: PathBuf,
     record: Record,
     /// Held as long as the run is at work; the system lets go of it however the program ends.
@@ -28,7 +30,7 @@ pub(crate) struct Storage {
 
 /// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
 /// process is at work on is left to it.
-pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage, Failure> {
+pub(super) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
         let same = |record: &Record| record.program == program && record.machine == machine && record.run == run;
@@ -38,7 +40,7 @@ pub(crate) fn open(results: &Path, machine: Machine, run: Run) -> Result<Storage
         let Some(lock) = lock(&folder)? else { continue };
         // Judged again under the lock: until then another process may have been at work on it.
         let Some(record) = interrupted(&folder) else { continue };
-        note(&format!("going on with the interrupted run in {}", folder.display()));
+        watch.note(&format!("going on with the interrupted run in {}", folder.display()));
         return Ok(Storage { folder, record, _lock: lock });
     }
     begin(results, program, machine, run)
@@ -50,7 +52,7 @@ fn is_unfinished(folder: &Path, record: &Record) -> bool {
 }
 
 /// Begins a run.
-pub(crate) fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
+pub fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Result<Storage, Failure> {
     let folder = new_folder(results, &machine, &run)?;
     let lock = lock(&folder)?.ok_or_else(|| Failure::writing(&folder, &"another process took it"))?;
     let now = Timestamp::now().to_string();
@@ -112,22 +114,22 @@ fn new_folder(results: &Path, machine: &Machine, run: &Run) -> Result<PathBuf, F
 
 impl Storage {
     /// The run's folder.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The record so far.
-    pub(crate) fn record(&self) -> &Record {
+    pub fn record(&self) -> &Record {
         &self.record
     }
 
     /// The record, to be changed and then saved.
-    pub(crate) fn record_mut(&mut self) -> &mut Record {
+    pub fn record_mut(&mut self) -> &mut Record {
         &mut self.record
     }
 
     /// Writes the record.
-    pub(crate) fn save(&mut self) -> Result<(), Failure> {
+    pub fn save(&mut self) -> Result<(), Failure> {
         self.record.updated = Timestamp::now().to_string();
         let path = self.folder.join(RECORD_FILE);
         write_json(&path, &self.record)

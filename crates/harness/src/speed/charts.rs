@@ -3,24 +3,30 @@
 use bp_charts::{Axis, BLACK, Key, Level, Line, Plot, Point, Series, Style, Value};
 use bp_core::Stage;
 
-use super::record::{Contest, Contestant, Entry, Family, Speed, StageTime};
-use crate::report::format::Spread;
+use crate::{
+    record::{
+        Sample,
+        speed::{Contest, Contestant, Entry, Family, Speed, StageTime},
+    },
+    statistics::Spread,
+};
 
 /// A chart and the words around it.
-pub(crate) struct Chart {
+pub(super) struct Chart {
     /// File name without ending.
-    pub(crate) name: &'static str,
-    pub(crate) plot: Plot,
+    pub name: &'static str,
+    pub plot: Plot,
     /// What a reader must know.
-    pub(crate) caption: String,
+    pub caption: String,
 }
 
 /// File names, without ending, of all charts that there may be.
-pub(crate) const CHART_NAMES: [&str; 4] =
-    [Family::Pixels.name(), Family::Labels.name(), Family::Loops.name(), "roofline"];
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    Family::ALL.into_iter().map(Family::name).chain(["roofline"])
+}
 
 /// All charts that this run has numbers for.
-pub(crate) fn charts(speed: &Speed) -> Vec<Chart> {
+pub(super) fn charts(speed: &Speed) -> Vec<Chart> {
     Family::ALL.into_iter().filter_map(|family| growth(speed, family)).chain(roofline(speed)).collect()
 }
 
@@ -29,11 +35,16 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
     let series: Vec<_> = contests.first()?.entries.iter().map(|entry| grown(speed, family, entry)).collect();
     let names: Vec<_> = series.iter().map(|series| series.name.as_str()).collect();
-    let title = format!("Time against {}", family.name());
+    let title = match family {
+        Family::Pixels | Family::Labels | Family::Loops => format!("Time against {}", family.name()),
+        Family::SweepPixels => "Time of a sweep against pixels".to_owned(),
+        Family::HalfStepPixels => "Time of half-steps against pixels".to_owned(),
+        Family::HalfStepLabels => "Time of half-steps against labels".to_owned(),
+    };
     let ticks = contests.iter().map(|contest| family.number_of(contest) as f64).collect();
     let plot = Plot {
         description: format!("{title}. Series: {}.", names.join("; ")),
-        x: Axis { ticks, ..Axis::logarithmic(family.name()) },
+        x: Axis { ticks, ..Axis::logarithmic(family.grows()) },
         y: Axis::logarithmic("milliseconds from images to labels"),
         levels: Vec::new(),
         keys: Vec::new(),
@@ -48,7 +59,7 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
 fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
     let point = |contest: &Contest| {
         let own = contest.entries.iter().find(|entry| entry.contestant == first.contestant)?;
-        let ms = Spread::of(own.outcome.measured()?.samples.iter().map(|sample| sample.total_ms))?;
+        let ms = Sample::spread(&own.outcome.measured()?.samples, |sample| sample.total_ms)?;
         Some(Point::new(family.number_of(contest) as f64, with_range(ms)))
     };
     let place = speed.place(&first.contestant);

@@ -3,13 +3,20 @@
 
 use bp_core::{Algorithm, Error, Image, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
-use super::record::Family;
+use crate::record::speed::Family;
+
+/// Baby1's size in the thesis.
+const BABY1: [usize; 2] = [620, 555];
 
 /// A problem.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Problem {
-    name: &'static str,
-    family: Option<Family>,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Its name in records.
+    pub name: String,
+    /// The name that `--problem` asks for it by: its own, or that of all problems like it.
+    group: &'static str,
+    /// The problems beside it that are alike but for one number.
+    pub(super) family: Option<Family>,
     /// Width and height in pixels.
     size: [usize; 2],
     labels: usize,
@@ -22,93 +29,134 @@ pub(crate) struct Problem {
 enum Passing {
     /// So many synchronous loops on one grid.
     Loops(u32),
-    /// On each of so many grids so many half-steps in checkerboard order.
-    HalfSteps(usize, u32),
+    /// The thesis's CFCSBP with so many loops asked for and Z'' = 2.
+    Cfcsbp(u32),
+    /// So many half-steps in checkerboard order on each grid.
+    HalfSteps { grids: u32, steps: u32 },
     /// As [`Algorithm::Sweep`] says.
     Sweep,
 }
 
 impl Problem {
-    const UPDATE: Self = Self::new("update", [620, 555], 64, Profile::Thesis, Passing::Loops(10));
-    const HIERARCHY: Self = Self::new("hierarchy", [620, 555], 128, Profile::Census, Passing::HalfSteps(5, 10));
-    const SWEEP: Self = Self::new("sweep", [620, 555], 128, Profile::Census, Passing::Sweep);
-
-    /// Those by which kernels are compared.
-    pub(crate) const KERNELS: [Self; 3] = [Self::UPDATE, Self::HIERARCHY, Self::SWEEP];
-
-    /// All of them: the update alone, our two plans, the thesis's BP, the size at which others publish times, and the
-    /// families, small enough that a slow device is soon done with them.
-    pub(crate) const ALL: [Self; 23] = [
-        Self::UPDATE,
-        Self::HIERARCHY,
-        Self::SWEEP,
-        Self::new("thesis", [620, 555], 112, Profile::Thesis, Passing::Loops(112)),
-        Self::new("published", [900, 750], 128, Profile::Census, Passing::HalfSteps(5, 7)),
-        Self::one_of(Family::Pixels, "pixels-x1", [80, 60], 16, 5),
-        Self::one_of(Family::Pixels, "pixels-x4", [160, 120], 16, 5),
-        Self::one_of(Family::Pixels, "pixels-x16", [320, 240], 16, 5),
-        Self::one_of(Family::Pixels, "pixels-x64", [640, 480], 16, 5),
-        Self::one_of(Family::Pixels, "pixels-x256", [1280, 960], 16, 5),
-        Self::one_of(Family::Labels, "labels-8", [240, 180], 8, 5),
-        Self::one_of(Family::Labels, "labels-16", [240, 180], 16, 5),
-        Self::one_of(Family::Labels, "labels-32", [240, 180], 32, 5),
-        Self::one_of(Family::Labels, "labels-64", [240, 180], 64, 5),
-        Self::one_of(Family::Labels, "labels-128", [240, 180], 128, 5),
-        Self::one_of(Family::Labels, "labels-256", [240, 180], 256, 5),
-        Self::one_of(Family::Loops, "loops-1", [320, 240], 16, 1),
-        Self::one_of(Family::Loops, "loops-2", [320, 240], 16, 2),
-        Self::one_of(Family::Loops, "loops-4", [320, 240], 16, 4),
-        Self::one_of(Family::Loops, "loops-8", [320, 240], 16, 8),
-        Self::one_of(Family::Loops, "loops-16", [320, 240], 16, 16),
-        Self::one_of(Family::Loops, "loops-32", [320, 240], 16, 32),
-        Self::one_of(Family::Loops, "loops-64", [320, 240], 16, 64),
+    /// The groups that `--problem` can ask for. The last of them take long, or say something of fast devices only: they
+    /// run if they are named.
+    pub const ASKED: [&str; 14] = [
+        "update",
+        "hierarchy",
+        "sweep",
+        "thesis",
+        "published",
+        "pixels",
+        "labels",
+        "loops",
+        "half-steps",
+        "cfcsbp",
+        "peers",
+        "sweep-pixels",
+        "half-step-pixels",
+        "half-step-labels",
     ];
 
-    /// By what they can be asked for: the name of a problem, or that of a family for all of it.
-    pub(crate) const ASKED: [&str; 8] =
-        ["update", "hierarchy", "sweep", "thesis", "published", "pixels", "labels", "loops"];
+    /// How many groups run without being named.
+    const BY_DEFAULT: usize = 8;
 
-    const fn new(name: &'static str, size: [usize; 2], labels: usize, profile: Profile, passing: Passing) -> Self {
-        Self { name, family: None, size, labels, profile, passing }
+    /// The groups, of one problem each, by which kernels are compared.
+    pub const KERNELS: [&str; 3] = ["update", "hierarchy", "sweep"];
+
+    /// The problems of some groups; of no names, those that run by default.
+    pub fn asked(names: &[String]) -> Vec<Self> {
+        let by_default = Self::ASKED[..Self::BY_DEFAULT].iter().map(|&name| name.to_owned()).collect();
+        let names = if names.is_empty() { by_default } else { names.to_vec() };
+        Self::ASKED.into_iter().filter(|&group| names.iter().any(|name| name == group)).flat_map(Self::group).collect()
     }
 
-    const fn one_of(family: Family, name: &'static str, size: [usize; 2], labels: usize, loops: u32) -> Self {
-        Self { family: Some(family), ..Self::new(name, size, labels, Profile::Thesis, Passing::Loops(loops)) }
+    /// The problems of a group.
+    fn group(group: &'static str) -> Vec<Self> {
+        let half_steps = |grids, steps| Passing::HalfSteps { grids, steps };
+        let census = |size, labels, passing| vec![Self::new(group, size, labels, Profile::Census, passing)];
+        let thesis = |labels, passing| vec![Self::new(group, BABY1, labels, Profile::Thesis, passing)];
+        match group {
+            "update" => thesis(64, Passing::Loops(10)),
+            "hierarchy" => census(BABY1, 128, half_steps(5, 10)),
+            "sweep" => census(BABY1, 128, Passing::Sweep),
+            "thesis" => thesis(112, Passing::Loops(112)),
+            // The size and the number of labels that others publish times of.
+            "published" => census([900, 750], 128, half_steps(5, 7)),
+            "half-steps" => census(BABY1, 128, half_steps(1, 10)),
+            "cfcsbp" => thesis(112, Passing::Cfcsbp(112)),
+            "peers" => [("tsukuba", [384, 288], 16), ("cones", [450, 375], 64), ("aloe", [641, 555], 112)]
+                .into_iter()
+                .flat_map(|(pair, size, labels)| {
+                    census(size, labels, Passing::Sweep).into_iter().map(move |problem| problem.named(pair))
+                })
+                .collect(),
+            _ => Family::ALL.into_iter().filter(|family| family.name() == group).flat_map(Self::family).collect(),
+        }
     }
 
-    /// Its name in records.
-    pub(crate) const fn name(self) -> &'static str {
-        self.name
+    /// The problems of a family. The first three are small enough that a slow device is soon done with them.
+    fn family(family: Family) -> Vec<Self> {
+        let of = |name: String, size, labels, passing| Self {
+            family: Some(family),
+            ..Self::new(family.name(), size, labels, Profile::Thesis, passing).named(&name)
+        };
+        let census = |problem: Self| Self { profile: Profile::Census, ..problem };
+        let large = |passing| {
+            let problem = |megapixels: f64| {
+                let width = (megapixels * 1e6 * 4.0 / 3.0).sqrt().round();
+                let size = [width as usize, (0.75 * width).round() as usize];
+                census(of(format!("{megapixels}mp"), size, 64, passing))
+            };
+            [0.1, 0.3, 1.0, 3.0, 10.0, 30.0].map(problem).into()
+        };
+        let half_steps = Passing::HalfSteps { grids: 1, steps: 10 };
+        match family {
+            Family::Pixels => [1, 2, 4, 8, 16]
+                .map(|times| of(format!("x{}", times * times), [80 * times, 60 * times], 16, Passing::Loops(5)))
+                .into(),
+            Family::Labels => [8, 16, 32, 64, 128, 256]
+                .map(|labels| of(labels.to_string(), [240, 180], labels, Passing::Loops(5)))
+                .into(),
+            Family::Loops => [1, 2, 4, 8, 16, 32, 64]
+                .map(|loops| of(loops.to_string(), [320, 240], 16, Passing::Loops(loops)))
+                .into(),
+            Family::SweepPixels => large(Passing::Sweep),
+            Family::HalfStepPixels => large(half_steps),
+            Family::HalfStepLabels => [2, 16, 64, 128, 300, 512]
+                .map(|labels| census(of(labels.to_string(), BABY1, labels, half_steps)))
+                .into(),
+        }
     }
 
-    /// The problems beside it that are alike but for one number.
-    pub(super) fn family(self) -> Option<Family> {
-        self.family
+    fn new(group: &'static str, size: [usize; 2], labels: usize, profile: Profile, passing: Passing) -> Self {
+        Self { name: group.to_owned(), group, family: None, size, labels, profile, passing }
     }
 
-    /// Whether one of these names asks for it.
-    pub(super) fn is_asked(self, names: &[String]) -> bool {
-        names.iter().any(|name| *name == self.family.map_or(self.name, Family::name))
+    /// One of several problems of its group.
+    fn named(self, name: &str) -> Self {
+        Self { name: format!("{}-{name}", self.group), ..self }
     }
 
     /// The algorithm that its settings come from.
-    pub(super) fn algorithm(self) -> Algorithm {
+    pub(super) fn algorithm(&self) -> Algorithm {
         match self.passing {
             Passing::Loops(_) => Algorithm::Bp,
-            Passing::HalfSteps(..) => Algorithm::Cfbp,
+            Passing::Cfcsbp(_) => Algorithm::Cfcsbp,
+            Passing::HalfSteps { .. } => Algorithm::Cfbp,
             Passing::Sweep => Algorithm::Sweep,
         }
     }
 
     /// Its plan for images whose sides are divided by `divisor`, rounded up.
-    pub(crate) fn plan(self, divisor: usize) -> Result<Plan, Error> {
+    pub fn plan(&self, divisor: usize) -> Result<Plan, Error> {
         let [width, height] = self.size.map(|side| side.div_ceil(divisor));
         let size = Size { width, height };
-        let settings = |loops, schedule| self.algorithm().settings(size, loops, 1, schedule);
+        let settings = |loops, z, schedule| self.algorithm().settings(size, loops, z, schedule);
         let settings = match self.passing {
-            Passing::Loops(loops) => settings(loops, Schedule::Sync),
-            Passing::HalfSteps(grids, steps) => Settings { grids, steps, ..settings(1, Schedule::Checkerboard) },
-            Passing::Sweep => settings(1, Schedule::Sweep),
+            Passing::Loops(loops) => settings(loops, 1, Schedule::Sync),
+            Passing::Cfcsbp(loops) => settings(loops, 2, Schedule::Sync),
+            Passing::HalfSteps { grids, steps } => Settings { grids, steps, ..settings(1, 1, Schedule::Checkerboard) },
+            Passing::Sweep => settings(1, 1, Schedule::Sweep),
         };
         Plan::new(size, Model::new(self.profile, self.labels)?, settings)
     }
@@ -130,23 +178,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_problem_has_a_name_of_its_own_and_can_be_asked_for() {
-        let asked = Problem::ASKED.map(str::to_owned);
-        for (i, problem) in Problem::ALL.into_iter().enumerate() {
-            assert!(problem.is_asked(&asked) && problem.plan(3).is_ok(), "{}", problem.name);
-            assert!(Problem::ALL[..i].iter().all(|other| other.name != problem.name), "{}", problem.name);
+    fn every_group_has_problems_and_every_problem_a_name_of_its_own() {
+        let mut names = Vec::new();
+        for group in Problem::ASKED {
+            let problems = Problem::asked(&[group.to_owned()]);
+            assert!(!problems.is_empty() && problems.iter().all(|problem| problem.plan(3).is_ok()), "{group}");
+            names.extend(problems.into_iter().map(|problem| problem.name));
         }
-        for name in asked {
-            assert!(Problem::ALL.into_iter().any(|problem| problem.is_asked(std::slice::from_ref(&name))), "{name}");
+        for name in ["pixels-x256", "labels-8", "loops-64", "peers-cones", "sweep-pixels-0.1mp"] {
+            assert!(names.iter().any(|known| known == name), "{name} is not in {names:?}");
         }
+        let count = names.len();
+        names.sort();
+        names.dedup();
+        assert_eq!((names.len(), Problem::asked(&[]).len()), (count, 23));
     }
 
     /// Times of a slow device: 2.5 ns a message entry.
     #[test]
-    fn a_slow_device_solves_a_family_in_seconds() {
-        for family in Family::ALL {
-            let own = Problem::ALL.into_iter().filter(|problem| problem.family == Some(family));
-            let entries: u64 = own.map(|problem| problem.plan(1).unwrap().message_updates()).sum();
+    fn a_slow_device_solves_a_family_that_runs_by_default_in_seconds() {
+        for family in [Family::Pixels, Family::Labels, Family::Loops] {
+            let own = Problem::family(family);
+            let entries: u64 = own.iter().map(|problem| problem.plan(1).unwrap().message_updates()).sum();
             assert!((1e8..1.5e9).contains(&(entries as f64)), "{}: {entries}", family.name());
         }
     }

@@ -4,15 +4,17 @@ use std::fmt::Write as _;
 
 use bp_core::Stage;
 
-use super::{
-    Chart,
-    charts::{growth, roofline},
-    record::{Contest, Contestant, Entry, Family, Measurement, Outcome, Sample, Speed, StageTime},
-};
-use crate::report::{
-    device_fact,
-    format::{Spread, mebibytes, number, or, whole},
-    lines, machine_fact, program_fact,
+use super::charts::{Chart, growth, roofline};
+use crate::{
+    record::{
+        Outcome, Sample,
+        speed::{Contest, Contestant, Entry, Family, Measurement, Speed, StageTime},
+    },
+    report::{
+        device_fact,
+        format::{Spread, mebibytes, number, or, whole},
+        lines, machine_fact, markdown_escaped, printable, program_fact,
+    },
 };
 
 /// Beneath the heading: how to read the numbers.
@@ -23,10 +25,10 @@ const READING: &str = "Times are medians, with their range from three rounds on.
                        before it has failed.";
 
 /// The whole page.
-pub(crate) fn page(speed: &Speed) -> String {
+pub fn page(speed: &Speed) -> String {
     let quick = if speed.quick { ", a quick run" } else { "" };
-    let mut text = format!("# Devices beside one another, on {}{quick}\n\n", speed.machine.cpu);
-    facts(speed).iter().for_each(|fact| _ = writeln!(text, "* {fact}"));
+    let mut text = format!("# Devices beside one another, on {}{quick}\n\n", markdown_escaped(&speed.machine.cpu));
+    facts(speed).iter().for_each(|fact| _ = writeln!(text, "* {}", markdown_escaped(fact)));
     let _ = writeln!(text, "\n{READING}\n");
     if speed.contests_of(None).next().is_some() {
         text += "## Problems\n\n";
@@ -39,7 +41,7 @@ pub(crate) fn page(speed: &Speed) -> String {
     let beneath = beneath(speed);
     if !beneath.is_empty() {
         text += "## Less than asked for\n\n";
-        beneath.iter().for_each(|line| _ = writeln!(text, "* {line}"));
+        beneath.iter().for_each(|line| _ = writeln!(text, "* {}", markdown_escaped(line)));
     }
     text
 }
@@ -73,15 +75,15 @@ fn contestant(contestant: &Contestant) -> String {
 
 /// A problem in a line.
 fn described(contest: &Contest) -> String {
-    let Contest { problem, width, height, settings, .. } = contest;
+    let Contest { width, height, settings, .. } = contest;
+    let problem = printable(&contest.problem).replace('`', "'");
+    let [profile, schedule] = [&settings.profile, &settings.schedule].map(|text| markdown_escaped(text));
     let steps = if settings.schedule == "checkerboard" { "half-steps" } else { "loops" };
     format!(
-        "`{problem}`: {width}x{height} pixels, {} labels, profile {}, grids: {}, {steps} on each: {} ({}), {} message entries.",
+        "`{problem}`: {width}x{height} pixels, {} labels, profile {profile}, grids: {}, {steps} on each: {} ({schedule}), {} message entries.",
         settings.labels,
-        settings.profile,
         settings.grids,
         settings.steps_per_grid,
-        settings.schedule,
         whole(settings.message_updates)
     )
 }
@@ -91,9 +93,9 @@ fn family_section(speed: &Speed, family: Family) -> String {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
     let (Some(chart), Some(first)) = (growth(speed, family), contests.first()) else { return String::new() };
     let labels = first.entries.iter().map(|entry| format!("{}, ms", speed.label(entry)));
-    let columns: Vec<_> = ["problem", family.name()].map(str::to_owned).into_iter().chain(labels).collect();
+    let columns: Vec<_> = ["problem", family.grows()].map(str::to_owned).into_iter().chain(labels).collect();
     let cell = |entry: &Entry| match &entry.outcome {
-        Outcome::Measured(measured) => spread(Spread::of(measured.samples.iter().map(|sample| sample.total_ms))),
+        Outcome::Measured(measured) => spread(Sample::spread(&measured.samples, |sample| sample.total_ms)),
         other => missing(other).to_owned(),
     };
     let rows = contests.iter().map(|contest| {
@@ -114,9 +116,9 @@ fn entries(contest: &Contest) -> impl Iterator<Item = (&Contest, &Entry)> {
 }
 
 /// What stands in place of numbers.
-fn missing(outcome: &Outcome) -> &'static str {
+fn missing(outcome: &Outcome<Measurement>) -> &'static str {
     match outcome {
-        Outcome::Measured(_) => "",
+        Outcome::Pending | Outcome::Measured(_) => "",
         Outcome::Error(_) => "failed",
         Outcome::Unavailable(_) => "unavailable",
     }
@@ -169,6 +171,7 @@ fn times_of(contest: &Contest, measurement: &Measurement) -> [String; 7] {
 fn beneath(speed: &Speed) -> Vec<String> {
     let line = |(contest, entry): (&Contest, &Entry)| {
         let what = match &entry.outcome {
+            Outcome::Pending => "not run".to_owned(),
             Outcome::Measured(measured) if measured.rounds == speed.rounds => return None,
             Outcome::Measured(measured) => {
                 let seconds = figures(measured.first_ms / 1000.0);
@@ -191,8 +194,10 @@ fn ratios(speed: &Speed) -> String {
         for other in others {
             let Some(measured) = other.outcome.measured() else { continue };
             let own = |sample: &Sample| sample.device_ms().unwrap_or(sample.total_ms);
-            let ratios = [ratio(measured, base, |sample| sample.total_ms), ratio(measured, base, own)];
-            rows.push([&[contest.problem.clone(), speed.label(other)][..], &ratios.map(spread)].concat());
+            let (samples, base) = (&measured.samples, &base.samples);
+            let ratios = [Sample::ratios(samples, base, |sample| sample.total_ms), Sample::ratios(samples, base, own)];
+            let ratios = ratios.map(|ratios| spread(Spread::of(ratios)));
+            rows.push([&[contest.problem.clone(), speed.label(other)][..], &ratios].concat());
         }
     }
     let Some(first) = speed.contests.iter().find_map(|contest| contest.entries.first()) else { return String::new() };
@@ -202,19 +207,10 @@ fn ratios(speed: &Speed) -> String {
     let note = format!(
         "How many times as long as {} the others take: medians of the ratios within a round. Each one's own clock is \
          its device's, or the wall clock where it has none.",
-        speed.label(first)
+        markdown_escaped(&speed.label(first))
     );
     let columns = ["problem", "backend", "by the wall clock", "by each one's own clock"];
     format!("## Ratios\n\n{note}\n\n{}\n", table(&columns, rows.into_iter()))
-}
-
-/// The ratios of samples of the same round.
-fn ratio(measured: &Measurement, base: &Measurement, ms: impl Fn(&Sample) -> f64) -> Option<Spread> {
-    let same_round = |a: &Sample| {
-        let b = base.samples.iter().find(|b| b.round == a.round)?;
-        Some(ms(a) / ms(b))
-    };
-    Spread::of(measured.samples.iter().filter_map(same_round))
 }
 
 /// A table of stages for every problem.
@@ -226,7 +222,7 @@ fn stages(speed: &Speed) -> String {
     let columns = ["backend", "stage", "clock", "ms", "GB/s", "% of copying"];
     for contest in speed.contests_of(None) {
         let rows = contest.entries.iter().flat_map(|entry| stages_of(speed, entry));
-        let _ = writeln!(text, "### {}\n\n{}", contest.problem, table(&columns, rows));
+        let _ = writeln!(text, "### {}\n\n{}", markdown_escaped(&contest.problem), table(&columns, rows));
     }
     text
 }

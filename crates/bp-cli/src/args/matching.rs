@@ -1,0 +1,188 @@
+//! Matching and evaluating.
+
+use std::path::PathBuf;
+
+use bp_core::{Algorithm, MAX_SIDE, MAX_TRUNCATION, MessageStart, Profile, Schedule};
+use bytesize::ByteSize;
+use clap::{Args, builder::NonEmptyStringValueParser};
+
+use bp_io::Limits;
+use bp_stereo::{Labels, devices};
+
+use super::{FinishArgs, ManyArgs, OutputArgs, meaning::labels, named, positive, switch, threads};
+
+/// `bp match`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct MatchArgs {
+    /// The left image.
+    ///
+    /// PNG, PGM, PPM or TIFF with 8 or 16 bits, JPEG, or PFM with values from 0 to 1 or from 0 to 255; grey or colour. An
+    /// orientation that the camera noted (EXIF) is ignored.
+    #[arg(required_unless_present = "many", conflicts_with = "many")]
+    pub(crate) left: Option<PathBuf>,
+    /// The right image of a rectified pair: same size, corresponding rows.
+    #[arg(required_unless_present = "many", conflicts_with = "many")]
+    pub(crate) right: Option<PathBuf>,
+    /// The disparity map to write: .pfm, .tif, .npy or .png; - writes PFM to standard output.
+    ///
+    /// .pfm, .tif and .npy hold disparities in pixels as 32-bit floats. .png holds 256 times the disparity in 16 bits, where 0
+    /// means unknown and a disparity of 0 is stored as 1.
+    #[arg(long, short, value_name = "MAP")]
+    pub(crate) output: PathBuf,
+    /// Print everything as JSON to standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
+    #[arg(long, conflicts_with = "many", hide_short_help = true)]
+    pub(crate) messages_hash: bool,
+    /// Refuse images with more megapixels.
+    #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS, hide_short_help = true)]
+    pub(crate) max_megapixels: u32,
+    /// Stay within this much memory, images and answer included, such as 2GiB. [default: what is free]
+    ///
+    /// Larger pairs are matched in strips or tiles. Takes bytes, or 512M and 2G (powers of 1000), or 512MiB and 2GiB (powers of
+    /// 1024).
+    #[arg(long, value_name = "SIZE", value_parser = memory, hide_short_help = true)]
+    pub(crate) max_memory: Option<ByteSize>,
+    /// Match the pair N times, and report the median time and the range (--json: every time).
+    ///
+    /// The first match is slower than the later ones; a video is like the later ones.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000),
+        conflicts_with = "many", hide_short_help = true)]
+    pub(crate) repeat: u32,
+    /// Ground truth of the left image, to measure errors against.
+    #[arg(long, value_name = "MAP", help_heading = "Ground truth", conflicts_with = "many", hide_short_help = true)]
+    pub(crate) ground_truth: Option<PathBuf>,
+    /// Many pairs with one command.
+    #[command(flatten)]
+    pub(crate) many: ManyArgs,
+    /// What is done to the map after matching.
+    #[command(flatten)]
+    pub(crate) finish: FinishArgs,
+    /// What else is written, and how.
+    #[command(flatten)]
+    pub(crate) outputs: OutputArgs,
+    /// What to run.
+    #[command(flatten)]
+    pub(crate) plan: PlanArgs,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) truth: TruthArgs,
+}
+
+/// What to run.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Plan")]
+pub(crate) struct PlanArgs {
+    /// Number of disparities to search; must exceed the largest one. [default: a quarter of the width]
+    ///
+    /// The largest disparity that can be found is the first one plus labels - 1. auto finds the labels and the first disparity
+    /// by a coarse look at the images. The default is rounded up to a multiple of 16.
+    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = labels)]
+    pub(crate) labels: Option<Labels>,
+    /// First disparity in pixels; may be negative. [default: 0; with --labels auto what the images need]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true,
+        value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
+    pub(crate) min_disparity: Option<i32>,
+    /// Data cost, with the smoothness that goes with it.
+    #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
+    pub(crate) profile: Profile,
+    /// Algorithm: sweep is ours, the others are the thesis's. [default: sweep]
+    ///
+    /// bp is plain belief propagation; cfbp is coarse-to-fine BP; cfcsbp is coarse-to-fine constant-space BP, with fewer loops;
+    /// ctbp is census-transform BP, in four parts; ctcsbp is census-transform constant-space BP, in four parts with fewer loops.
+    #[arg(long, value_parser = named(&Algorithm::ALL, Algorithm::name), hide_short_help = true)]
+    pub(crate) algorithm: Option<Algorithm>,
+    /// Backend: rayon, scalar (CPU), vulkan, wgpu (GPU); see bp devices.
+    ///
+    /// NAME:DEVICE chooses another device than the backend's first.
+    #[arg(long, default_value = devices::DEFAULT, value_name = "NAME")]
+    pub(crate) backend: String,
+    /// Device of the backend: its index, a part of its name or the beginning of its UUID. [default: its first]
+    #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new(), hide_short_help = true)]
+    pub(crate) device: Option<String>,
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one for each core]
+    #[arg(long, value_name = "N", value_parser = threads(), hide_short_help = true)]
+    pub(crate) threads: Option<u16>,
+    /// Loops (k), from which the algorithm derives those of each grid. [default: as many as labels; 1 for sweep]
+    ///
+    /// With --grids, and for sweep, loops on each grid.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), hide_short_help = true)]
+    pub(crate) loops: Option<u32>,
+    /// Half-steps of the schedule checkerboard on each grid.
+    #[arg(long, value_name = "N", conflicts_with = "loops", value_parser = clap::value_parser!(u32).range(1..=2_000_000),
+        hide_short_help = true)]
+    pub(crate) half_steps: Option<u32>,
+    /// Number of grids, coarse to fine. Except for sweep, it needs --loops or --half-steps.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=bp_core::MAX_GRIDS as i64),
+        hide_short_help = true)]
+    pub(crate) grids: Option<u8>,
+    /// What cfcsbp and ctcsbp divide loops by (Z'', Z''''). [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
+    pub(crate) z: Option<u32>,
+    /// Order of message updates. [default: sync; checkerboard with --half-steps; sweep has its own]
+    #[arg(long, value_parser = named(&Schedule::ALL, Schedule::name), hide_short_help = true)]
+    pub(crate) schedule: Option<Schedule>,
+    /// By which side finer grids take over messages. [default: receiver]
+    #[arg(long, value_parser = named(&MessageStart::ALL, MessageStart::name), hide_short_help = true)]
+    pub(crate) message_start: Option<MessageStart>,
+    /// Whether data costs of coarse grids are clipped at K + K div 2. [default: on for sweep, else off]
+    #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
+    pub(crate) coarse_clip: Option<bool>,
+    /// Whether the census match of the centre is a prior (ctbp, ctcsbp). [default: on]
+    #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
+    pub(crate) seed_start: Option<bool>,
+    /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
+    pub(crate) slope: Option<u8>,
+    /// Truncation K of the smoothness cost. [default: the profile's]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true,
+        value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
+    pub(crate) truncation: Option<u8>,
+    /// Let disparities jump where grey values differ by more than N; try 10. [default: off]
+    ///
+    /// At such weak edges, slope and truncation of the smoothness cost are halved.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=254))]
+    pub(crate) edge_threshold: Option<u8>,
+}
+
+fn memory(text: &str) -> Result<ByteSize, String> {
+    let whole_or_with_unit = text.parse().ok().filter(|_| text.starts_with(|c: char| c.is_ascii_digit()));
+    whole_or_with_unit.ok_or_else(|| "must be a number of bytes, or such as 512M, 2G, 512MiB, 2GiB".to_owned())
+}
+
+/// How ground truth is read.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Ground truth")]
+pub(crate) struct TruthArgs {
+    /// Ground truth of the right image, which shows the pixels that both cameras see.
+    #[arg(long, value_name = "MAP", conflicts_with = "mask", hide_short_help = true)]
+    pub(crate) ground_truth_right: Option<PathBuf>,
+    /// Non-occluded pixels, those that both cameras see: an 8-bit image with 255 where they do.
+    #[arg(long, value_name = "MAP", hide_short_help = true)]
+    pub(crate) mask: Option<PathBuf>,
+    /// Stored ground truth divided by N is in pixels; 0 is unknown. [default: 1 for floats and 8 bits, 256 for 16 bits]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive, hide_short_help = true)]
+    pub(crate) scale: Option<f32>,
+}
+
+/// `bp evaluate`.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// The disparity map: PFM, NPY or TIFF floats, or PNG, PGM or TIFF with 8 or 16 bits.
+    pub(crate) map: PathBuf,
+    /// Ground truth, in the same formats.
+    pub(crate) truth: PathBuf,
+    /// The map's stored values divided by N are in pixels; 0 is unanswered. [default: as for --scale]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
+    pub(crate) map_scale: Option<f32>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Refuse images with more megapixels.
+    #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
+    pub(crate) max_megapixels: u32,
+    /// How ground truth is read.
+    #[command(flatten)]
+    pub(crate) options: TruthArgs,
+}

@@ -1,0 +1,252 @@
+//! What the arguments of `bp match` and `bp convert` mean, as the library's options. All checks of arguments against each
+//! other are here.
+
+use std::path::{Path, PathBuf};
+
+use bp_core::{Algorithm as Kind, MessageStart, Schedule};
+use bp_io::{Geometry, Picture};
+use bp_stereo::{
+    Algorithm, Hierarchy, Labels, Loops, Making, Options, Outputs,
+    batch::{Also, BatchOptions},
+    pairs::{self, Source},
+};
+
+use super::{ManyArgs, MatchArgs, OutputArgs, PlanArgs};
+use crate::{colour_bar, failure::Failure};
+
+/// The algorithms that count loops as the thesis does, as messages name them.
+const THESIS: &str = "--algorithm bp, cfbp, cfcsbp, ctbp or ctcsbp";
+
+impl MatchArgs {
+    /// The library's options; of many pairs, those of each.
+    pub(crate) fn options(&self) -> Result<Options, Failure> {
+        let (plan, finish) = (&self.plan, &self.finish);
+        check_finish(self)?;
+        let options = Options {
+            algorithm: plan.meaning()?,
+            profile: plan.profile,
+            slope: plan.slope,
+            truncation: plan.truncation,
+            edge_threshold: plan.edge_threshold,
+            labels: plan.labels.unwrap_or_default(),
+            min_disparity: plan.min_disparity,
+            check: finish.check.is_some(),
+            speckle: finish.speckle.map(|least| least as usize),
+            fill: finish.fill.unwrap_or(true),
+            median: finish.median,
+            subpixel: finish.subpixel,
+            confidence: finish.confidence.is_some() || self.many.also.contains(&Also::Confidence),
+            backend: plan.backend.clone(),
+            device: plan.device.clone(),
+            threads: plan.threads.map(usize::from),
+            max_memory: self.max_memory.map(|limit| limit.as_u64()),
+        };
+        options.check()?;
+        Ok(options)
+    }
+
+    /// Where the files of one pair go.
+    pub(crate) fn outputs(&self) -> Outputs {
+        let map = Some(self.output.as_path()).filter(|_| !self.is_piped());
+        Outputs { confidence: self.finish.confidence.clone(), ..self.outputs.outputs(map) }
+    }
+
+    /// Whether the map goes to standard output.
+    pub(crate) fn is_piped(&self) -> bool {
+        self.output == Path::new("-")
+    }
+
+    /// The batch that the arguments ask for; none for one pair.
+    pub(crate) fn batch(&self) -> Result<Option<BatchOptions>, Failure> {
+        let Some(source) = self.many.source()? else { return Ok(None) };
+        let OutputArgs { picture, depth, points, .. } = &self.outputs;
+        if [picture, depth, points, &self.finish.confidence].into_iter().any(Option::is_some) {
+            let what = "--picture, --depth, --points and --confidence name one file";
+            return Err(Failure::usage(format!("{what}: for many pairs use --also picture,depth,points,confidence")));
+        }
+        Ok(Some(BatchOptions {
+            source,
+            output: self.output.clone(),
+            matching: self.options()?,
+            format: self.many.format.clone(),
+            also: self.many.also.clone(),
+            shard: self.many.shard.unwrap_or_default(),
+            warm_start: self.many.warm_start,
+            force: self.many.force,
+            max_megapixels: self.max_megapixels,
+        }))
+    }
+
+    /// How files are made.
+    pub(crate) fn making(&self) -> Result<Making, Failure> {
+        let also = |what| self.many.also.contains(&what);
+        self.outputs.making(also(Also::Picture), also(Also::Depth) || also(Also::Points))
+    }
+}
+
+fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
+    if args.is_piped() && (args.json || args.many.pairs.is_some() || args.many.video.is_some()) {
+        return Err(Failure::usage("--output - writes one map to standard output: no --json, --pairs or --video"));
+    }
+    let finish = &args.finish;
+    if finish.fill.is_some() && finish.check.is_none() && finish.speckle.is_none() {
+        return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
+    }
+    let truth = &args.truth;
+    let reads_truth = truth.ground_truth_right.is_some() || truth.mask.is_some() || truth.scale.is_some();
+    if args.ground_truth.is_none() && reads_truth {
+        return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
+    }
+    // Clap does not ask for --video where --pairs or two images stand in its place.
+    if args.many.warm_start.is_some() && args.many.video.is_none() {
+        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
+    }
+    Ok(())
+}
+
+impl ManyArgs {
+    /// Where many pairs come from; none for one pair.
+    fn source(&self) -> Result<Option<Source>, Failure> {
+        match (&self.pairs, self.video.as_deref()) {
+            (Some(path), _) if path == Path::new("-") => {
+                let mut bytes = Vec::new();
+                let read = std::io::Read::read_to_end(&mut std::io::stdin().lock(), &mut bytes);
+                read.map_err(|error| Failure::input(format!("standard input: {error}")))?;
+                let name = "standard input".to_owned();
+                Ok(Some(Source::Pairs(pairs::parse(&bytes, &name)?, name)))
+            }
+            (Some(path), _) => Ok(Some(Source::Path(path.clone()))),
+            (None, Some([left, right])) => Ok(Some(Source::Video([left.clone(), right.clone()]))),
+            (None, _) => Ok(None),
+        }
+    }
+}
+
+impl OutputArgs {
+    /// Where files go, beside a map.
+    pub(crate) fn outputs(&self, map: Option<&Path>) -> Outputs {
+        let Self { picture, depth, points, .. } = self.clone();
+        Outputs { map: map.map(Into::into), picture, depth, points, confidence: None }
+    }
+
+    /// How files are made; a picture, and depth or points, may be asked for by other arguments too.
+    pub(crate) fn making(&self, also_picture: bool, also_depth: bool) -> Result<Making, Failure> {
+        let args = &self.making;
+        if self.picture.is_none() && !also_picture && (args.colours.is_some() || args.no_colour_bar) {
+            let what = "--colours and --no-colour-bar are for a picture";
+            return Err(Failure::usage(format!("{what}: give --picture too (for many pairs, --also picture)")));
+        }
+        let has_depth = self.depth.is_some() || self.points.is_some() || also_depth;
+        if !has_depth && (args.calib.is_some() || args.focal.is_some()) {
+            let what = "--calib and --focal are for depth and points";
+            return Err(Failure::usage(format!(
+                "{what}: give --depth or --points too (for many pairs, --also depth,points)"
+            )));
+        }
+        let given = args.focal.zip(args.baseline).map(|(focal, baseline)| Geometry {
+            focal,
+            baseline,
+            doffs: args.doffs.unwrap_or(0.0),
+            principal_point: args.principal_point,
+            file: None,
+        });
+        let read = args.calib.as_deref().map(Geometry::read).transpose()?;
+        let bar = (!args.no_colour_bar).then_some(colour_bar::draw as bp_io::DrawBar);
+        let picture = Picture { colours: args.colours.unwrap_or_default(), bar };
+        Ok(Making { picture, no_sidecar: args.no_sidecar, geometry: read.or(given), ..Making::default() })
+    }
+
+    /// The file of the calibration, which outputs are made of.
+    pub(crate) fn calibration(&self) -> Option<&PathBuf> {
+        self.making.calib.as_ref()
+    }
+}
+
+impl PlanArgs {
+    fn kind(&self) -> Kind {
+        self.algorithm.unwrap_or(Kind::Sweep)
+    }
+
+    /// The algorithm with its own options.
+    fn meaning(&self) -> Result<Algorithm, Failure> {
+        self.check()?;
+        self.check_algorithm()?;
+        let (loops, hierarchy, z) = (self.counted(), self.hierarchy(), self.z);
+        let seed_start = self.seed_start.unwrap_or(true);
+        Ok(match self.kind() {
+            Kind::Sweep => Algorithm::Sweep {
+                grids: self.grids.map(u32::from),
+                loops: self.loops.unwrap_or(1),
+                coarse_clip: self.coarse_clip.unwrap_or(true),
+            },
+            Kind::Bp => Algorithm::Bp { loops },
+            Kind::Cfbp => Algorithm::Cfbp { loops, hierarchy },
+            Kind::Cfcsbp => Algorithm::Cfcsbp { loops, hierarchy, z },
+            Kind::Ctbp => Algorithm::Ctbp { loops, seed_start },
+            Kind::Ctcsbp => Algorithm::Ctcsbp { loops, seed_start, z },
+        })
+    }
+
+    /// How loops are counted.
+    fn counted(&self) -> Loops {
+        let schedule = self.schedule.unwrap_or(Schedule::Sync);
+        match (self.half_steps, self.grids, self.loops) {
+            (Some(half_steps), ..) => Loops::HalfSteps(half_steps),
+            (None, Some(_), Some(loops)) => Loops::OnEachGrid { loops, schedule },
+            (None, _, k) => Loops::Total { k, schedule },
+        }
+    }
+
+    fn hierarchy(&self) -> Hierarchy {
+        Hierarchy {
+            grids: self.grids.map(u32::from),
+            message_start: self.message_start.unwrap_or(MessageStart::Receiver),
+            coarse_clip: self.coarse_clip.unwrap_or(false),
+        }
+    }
+
+    /// Refuses arguments that contradict each other or would do nothing.
+    fn check(&self) -> Result<(), Failure> {
+        let is_swept = self.kind() == Kind::Sweep;
+        let on_each_grid = self.grids.is_some() || self.half_steps.is_some() || is_swept;
+        if self.z.is_some() && self.kind().divides_loops() && on_each_grid {
+            let what = "--z divides loops in all, not those that --grids or --half-steps count on each grid";
+            return Err(Failure::usage(what));
+        }
+        let is_counted = self.loops.is_some() || self.half_steps.is_some() || is_swept;
+        if self.grids.is_some() && self.kind().is_coarse_to_fine() && !is_counted {
+            return Err(Failure::usage("--grids needs --loops or --half-steps, which then count on each grid"));
+        }
+        if self.half_steps.is_some() && self.schedule.is_some_and(|schedule| schedule != Schedule::Checkerboard) {
+            return Err(Failure::usage("--half-steps needs --schedule checkerboard"));
+        }
+        Ok(())
+    }
+
+    /// Refuses arguments of other algorithms.
+    fn check_algorithm(&self) -> Result<(), Failure> {
+        let kind = self.kind();
+        let needs = |given: bool, holds: bool, option: &str, what: &str| {
+            let refused = || Failure::usage(format!("{option} needs {what}, not {}", kind.name()));
+            if given && !holds { Err(refused()) } else { Ok(()) }
+        };
+        let (coarse_to_fine, is_swept) = (kind.is_coarse_to_fine(), kind == Kind::Sweep);
+        needs(self.grids.is_some(), coarse_to_fine, "--grids", "--algorithm cfbp, cfcsbp or sweep")?;
+        needs(self.coarse_clip.is_some(), coarse_to_fine, "--coarse-clip", "--algorithm cfbp, cfcsbp or sweep")?;
+        let has_start = coarse_to_fine && !is_swept;
+        needs(self.message_start.is_some(), has_start, "--message-start", "--algorithm cfbp or cfcsbp")?;
+        needs(self.half_steps.is_some(), !is_swept, "--half-steps", THESIS)?;
+        let other_schedule = self.schedule.is_some_and(|schedule| schedule != Schedule::Sweep);
+        needs(other_schedule, !is_swept, "--schedule sync or checkerboard", THESIS)?;
+        needs(self.z.is_some(), kind.divides_loops(), "--z", "--algorithm cfcsbp or ctcsbp")?;
+        needs(self.seed_start.is_some(), kind.is_cut(), "--seed-start", "--algorithm ctbp or ctcsbp")
+    }
+}
+
+/// What --labels takes.
+pub(super) fn labels(text: &str) -> Result<Labels, String> {
+    let most = bp_core::MAX_LABELS;
+    let count = || text.parse().ok().filter(|count| (1..=most).contains(count));
+    let labels = if text == "auto" { Some(Labels::Auto) } else { count().map(Labels::Count) };
+    labels.ok_or_else(|| format!("must be auto or a number from 1 to {most}"))
+}

@@ -1,0 +1,35 @@
+//! `bp conform`: whether backends answer as the reference does, to the bit.
+
+use std::{io::Write, time::Instant};
+
+use bp_stereo::devices;
+
+use crate::{args::ConformArgs, failure::Failure, notes::tell};
+
+/// Runs the command: all backends, though one may fail.
+pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
+    let chosen: Vec<_> =
+        args.backend.iter().map(|name| Ok(devices::choose(name, None)?)).collect::<Result<_, Failure>>()?;
+    let mut failures = Vec::new();
+    for chosen in chosen {
+        let name = chosen.name.clone();
+        let opened = chosen.open().map_err(|error| Failure::unavailable(devices::reason(error)));
+        let outcome = opened.and_then(|opened| check(&opened));
+        failures.extend(outcome.err().map(|failure| (name, failure)));
+    }
+    let Some((name, failure)) = failures.pop() else { return Ok(()) };
+    failures.iter().for_each(|(name, failure)| tell(&format!("bp: {name}: {failure}")));
+    Err(failure.of(&name))
+}
+
+/// Runs the suite on a device.
+fn check(opened: &devices::Opened) -> Result<(), Failure> {
+    let reference = devices::reference()?;
+    let start = Instant::now();
+    let conforms = bp_testkit::conform(reference.device.as_ref(), opened.device.as_ref());
+    conforms.map_err(|difference| Failure::other(difference.to_string()))?;
+    let (cases, seconds) = (bp_testkit::cases().count(), start.elapsed().as_secs_f64());
+    let what = format!("{cases} cases as {} to the bit, and what comes after another pair", reference.name);
+    writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
+    Ok(())
+}

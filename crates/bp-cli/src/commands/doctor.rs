@@ -1,0 +1,180 @@
+//! `bp doctor`: what this machine has, and what is missing.
+
+use std::io::Write;
+
+use bp_core::{Backend, DeviceInfo, DeviceKind};
+use bp_stereo::Memory;
+use bytesize::ByteSize;
+use serde::Serialize;
+
+use super::{indented, print_json};
+use bp_stereo::devices::{self as listed, device_name};
+use harness::{machine, scenes::Source};
+
+use crate::{
+    args::{DataArgs, DoctorArgs},
+    failure::Failure,
+};
+
+/// Something that was looked at.
+#[derive(Serialize)]
+struct Check {
+    what: String,
+    state: State,
+    found: String,
+    /// What would mend it.
+    advice: Option<String>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum State {
+    Ok,
+    /// Something is missing that the default backend does without.
+    Note,
+    Failed,
+}
+
+impl Check {
+    fn ok(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { what: what.into(), state: State::Ok, found: found.into(), advice: None }
+    }
+
+    fn note(what: impl Into<String>, found: impl Into<String>, advice: impl Into<String>) -> Self {
+        Self { state: State::Note, advice: Some(advice.into()), ..Self::ok(what, found) }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
+    let checks = checks(args);
+    if args.json {
+        print_json(&checks)?;
+    } else {
+        print(&checks)?;
+    }
+    match checks.iter().find(|check| check.state == State::Failed) {
+        None => Ok(()),
+        Some(check) => Err(Failure::unavailable(format!("{} does not work: {}", check.what, check.found))),
+    }
+}
+
+fn print(checks: &[Check]) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    for Check { what, state, found, advice } in checks {
+        let state = match state {
+            State::Ok => "ok",
+            State::Note => "note",
+            State::Failed => "FAILED",
+        };
+        writeln!(out, "{state:<8}{what:<12}{}", indented(found, 20))?;
+        if let Some(advice) = advice {
+            writeln!(out, "{:<20}{}", "", indented(advice, 20))?;
+        }
+    }
+    Ok(())
+}
+
+fn checks(args: &DoctorArgs) -> Vec<Check> {
+    let mut checks = vec![program(), processor(), memory()];
+    let mut kinds = Vec::new();
+    for &backend in listed::ALL {
+        checks.extend(devices(backend, &mut kinds));
+    }
+    checks.push(gpu(&kinds));
+    #[cfg(any(feature = "vulkan", feature = "wgpu"))]
+    checks.push(cache());
+    checks.push(data(args));
+    checks
+}
+
+fn program() -> Check {
+    let names: Vec<_> = listed::ALL.iter().map(|backend| backend.name()).collect();
+    let commit = machine::commit();
+    let commit = commit.get(..8).unwrap_or("unknown");
+    let version = env!("CARGO_PKG_VERSION");
+    Check::ok("program", format!("bp {version}, commit {commit}, backends {}", names.join(", ")))
+}
+
+fn processor() -> Check {
+    let machine = machine::machine(None);
+    Check::ok("processor", format!("{}, {}, {}", machine.cpu, cores(machine.cores), machine.system))
+}
+
+fn cores(count: usize) -> String {
+    if count == 1 { "1 core".to_owned() } else { format!("{count} cores") }
+}
+
+fn memory() -> Check {
+    let iec = |bytes| ByteSize(bytes).display().iec();
+    match Memory::of_machine() {
+        None => Check::note("memory", "the system does not tell", "--max-memory keeps `bp match` within a limit"),
+        Some(memory) => Check::ok("memory", format!("{} available of {}", iec(memory.available), iec(memory.total))),
+    }
+}
+
+/// Opens every device of a backend, which tests it; adds what those that work are to `kinds`.
+fn devices(backend: &dyn Backend, kinds: &mut Vec<DeviceKind>) -> Vec<Check> {
+    let devices = backend.devices();
+    let mut checks = Vec::new();
+    for index in 0..devices.len().max(1) {
+        let name = device_name(backend, index);
+        checks.push(match (backend.open(index), devices.get(index)) {
+            (Ok(_), info) => {
+                kinds.extend(info.map(|info| info.kind));
+                Check::ok(name, info.map_or_else(String::new, described))
+            }
+            (Err(error), _) if backend.name() == listed::DEFAULT && index == 0 => {
+                Check { state: State::Failed, ..Check::ok(name, listed::reason(error)) }
+            }
+            (Err(error), _) => Check { state: State::Note, ..Check::ok(name, listed::reason(error)) },
+        });
+    }
+    checks
+}
+
+fn described(info: &DeviceInfo) -> String {
+    let software = if info.kind == DeviceKind::SoftwareRasteriser { ", a software rasteriser" } else { "" };
+    format!("{}{software}", info.name)
+}
+
+/// Whether there is a GPU among the devices that work.
+fn gpu(kinds: &[DeviceKind]) -> Check {
+    let advice = "everything runs, but GPU times need a GPU and its vendor's Vulkan driver";
+    let software = kinds.contains(&DeviceKind::SoftwareRasteriser);
+    if kinds.iter().any(|kind| !matches!(kind, DeviceKind::Processor | DeviceKind::SoftwareRasteriser)) {
+        Check::ok("GPU", "there is one that works")
+    } else if software {
+        Check::note("GPU", "none: a software rasteriser is all there is; its times are not a GPU's", advice)
+    } else if !cfg!(any(feature = "vulkan", feature = "wgpu")) {
+        Check::note("GPU", "this build has no backend for GPUs", "build with --features vulkan,wgpu")
+    } else {
+        Check::note("GPU", "none", advice)
+    }
+}
+
+/// Whether compiled kernels can be kept.
+#[cfg(any(feature = "vulkan", feature = "wgpu"))]
+fn cache() -> Check {
+    let advice = "without it kernels may be compiled at every start; set XDG_CACHE_HOME to a folder of yours";
+    let Some(folder) = bp_gpu::cache::folder() else {
+        return Check::note("cache", "no folder for compiled kernels: there is no home folder", advice);
+    };
+    let written = std::fs::create_dir_all(&folder).and_then(|()| tempfile::tempfile_in(&folder));
+    let folder = folder.display();
+    match written {
+        Ok(_) => Check::ok("cache", format!("{folder} can be written")),
+        Err(error) => Check::note("cache", format!("{folder} cannot be written: {error}"), advice),
+    }
+}
+
+/// Whether the public images are there.
+fn data(args: &DoctorArgs) -> Check {
+    let advice = "the synthetic scenes run instead; scripts/fetch-middlebury fetches the real images";
+    let source = Source::new(DataArgs { data: args.data.clone(), synthetic: false }.folder(), false);
+    match source.map(|source| (source.folder().map(|folder| folder.display().to_string()), source.set.described)) {
+        Ok((Some(folder), described)) => Check::ok("data", format!("{folder}: {described}")),
+        Ok((None, _)) => Check::note("data", "no folder is named by --data or BP_DATA", advice),
+        Err(failure) => Check::note("data", failure.to_string(), advice),
+    }
+}

@@ -1,0 +1,187 @@
+//! `bp match`: disparity maps of one's own pairs.
+
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use bp_core::{DeviceKind, DisparityMap, GroundTruth, Size, StereoPair, survey::Survey};
+use bp_io::{Limits, MapFormat, Raster, read_image};
+use bp_stereo::{
+    AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Memory, Outputs, Planned, Start, batch,
+};
+
+use super::{
+    evaluate,
+    match_report::{Asked, Report, text},
+    match_summary, print_json,
+};
+use crate::{
+    args::MatchArgs,
+    failure::{Failure, as_options},
+    heap,
+    notes::note,
+    terminal,
+};
+
+/// Runs the command.
+pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
+    heap::return_large_buffers();
+    match (args.batch()?, &args.left, &args.right) {
+        (None, Some(left), Some(right)) => match_one(args, [left, right]),
+        (Some(options), ..) => match_many(args, &options),
+        _ => Err(Failure::usage("give two images, --pairs or --video")),
+    }
+}
+
+fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Failure> {
+    let making = args.making()?;
+    terminal::listen()?;
+    let summary = batch::run(options, &making, &terminal::watch());
+    terminal::finish();
+    let summary = summary?;
+    if args.json {
+        print_json(&summary)?;
+    } else {
+        write!(std::io::stdout(), "{}", match_summary::text(&summary))?;
+    }
+    match summary.failures.len() {
+        0 => Ok(()),
+        failed => {
+            let path = batch::summary_path(&options.output, options.shard);
+            Err(Failure::input(format!("{failed} of {} pairs failed; see {}", summary.pairs, path.display())))
+        }
+    }
+}
+
+/// One pair: its images, and what is made of them.
+struct Job<'a> {
+    args: &'a MatchArgs,
+    files: [&'a PathBuf; 2],
+    pair: StereoPair,
+    truth: Option<GroundTruth>,
+    outputs: Outputs,
+    making: Making,
+}
+
+fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
+    let (options, outputs, making) = (args.options()?, args.outputs(), args.making()?);
+    let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
+    let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
+    outputs.check(&making, &inputs)?;
+    let limits = limits(args.max_megapixels);
+    let pair = read_pair(files, limits)?;
+    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limits)).transpose()?;
+    terminal::listen()?;
+    let whole = args.messages_hash.then_some("messages_hash");
+    let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, whole };
+    let mut matcher = Matcher::new(&options)?.beside(beside);
+    let job = Job { args, files, pair, truth, outputs, making };
+    let report = job.run(&mut matcher)?;
+    match () {
+        () if args.json => print_json(&report),
+        () if args.is_piped() => Ok(()),
+        () => Ok(write!(std::io::stdout(), "{}", text(&report))?),
+    }
+}
+
+impl Job<'_> {
+    /// Plans and matches the pair, and writes its files.
+    fn run(&self, matcher: &mut Matcher) -> Result<Report, Failure> {
+        let planned = self.plan(matcher)?;
+        let warnings = planned.warnings.iter().map(|warning| as_options(&warning.about(&self.name()))).collect();
+        let (answer, times) = self.matched(matcher, planned)?;
+        terminal::finish();
+        let errors = self.truth.as_ref().map(|truth| truth.errors(&answer.map)).transpose()?;
+        let messages_sha256 = self.args.messages_hash.then(|| matcher.messages_sha256()).transpose()?;
+        let content = Content {
+            map: &answer.map,
+            confidence: answer.confidence.as_deref(),
+            image: Some(self.pair.left()),
+            plan: Some(&answer.settings),
+            inputs: &sources(self.args).collect::<Vec<_>>(),
+        };
+        self.outputs.write(&self.making, &content, &terminal::watch())?;
+        if self.args.is_piped() {
+            pipe(&answer.map)?;
+        }
+        let asked = Asked { size: self.pair.size(), warnings, errors, messages_sha256 };
+        Ok(Report::new(matcher, answer, &times, asked, self.outputs.paths(&self.making)))
+    }
+
+    /// The pair's plan, which its outputs can hold. What may be wrong is shown first: exchanged images may be why they cannot.
+    fn plan(&self, matcher: &Matcher) -> Result<Planned, Failure> {
+        let survey = Survey::of(&self.pair)?;
+        let planned = matcher.plan_within(&self.pair, &survey, &|disparity| self.outputs.hold(disparity))?;
+        planned.warnings.iter().for_each(|warning| terminal::warn(&as_options(&warning.about(&self.name()))));
+        self.hint_at_scale(&planned);
+        self.outputs.check_plan(&self.making, &planned.plan)?;
+        if matcher.options().labels == Labels::Auto {
+            let model = planned.plan.model();
+            let labels = model.labels();
+            let (low, high) = (model.min_disparity(), model.disparity(labels as u16 - 1));
+            note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
+        }
+        Ok(planned)
+    }
+
+    /// Ground truth beyond the labels was most likely stored as a multiple of disparities.
+    fn hint_at_scale(&self, Planned { plan, .. }: &Planned) {
+        let last = plan.model().disparity(plan.model().labels() as u16 - 1);
+        let truth = self.truth.as_ref().and_then(|truth| truth.disparities().range());
+        let (Some((_, largest)), Some(path)) = (truth, &self.args.ground_truth) else { return };
+        if largest > last as f32 + 1.0 {
+            let what = format!("disparities up to {largest:.0} px, but the labels end at {last} px");
+            terminal::warn(&format!("{}: {what}; is another --scale needed?", path.display()));
+        }
+    }
+
+    /// The last answer of as many matches as the arguments ask for, and the times of all. Only one answer is in memory at a
+    /// time.
+    fn matched(&self, matcher: &mut Matcher, planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
+        let mut times = Vec::new();
+        loop {
+            let answer = matcher.run(&self.pair, planned.clone(), Start::Cold, &terminal::watch())?;
+            times.push(answer.times);
+            if times.len() >= self.args.repeat as usize {
+                return Ok((answer, times));
+            }
+        }
+    }
+
+    /// Both images, as messages name them.
+    fn name(&self) -> String {
+        let [left, right] = self.files;
+        format!("{} and {}", left.display(), right.display())
+    }
+}
+
+/// Writes a map to standard output.
+fn pipe(map: &DisparityMap) -> Result<(), Failure> {
+    let bytes = Raster::disparities(map).floats(MapFormat::Pfm).unwrap_or_else(|| Ok(Vec::new()));
+    Ok(std::io::stdout().write_all(&bytes.map_err(Failure::other)?)?)
+}
+
+/// The files that the outputs are made of.
+fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
+    [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
+}
+
+/// How much a file may hold, and how much memory reading it may take.
+pub(super) fn limits(megapixels: u32) -> Limits {
+    Limits::megapixels(megapixels).within(Memory::available_to(DeviceKind::Processor))
+}
+
+fn read_pair([left, right]: [&PathBuf; 2], limits: Limits) -> Result<StereoPair, Failure> {
+    let named = |error| Failure::input(format!("{} and {}: {error}", left.display(), right.display()));
+    StereoPair::new(read_image(left, limits)?, read_image(right, limits)?).map_err(named)
+}
+
+fn read_truth(args: &MatchArgs, path: &Path, size: Size, limits: Limits) -> Result<GroundTruth, Failure> {
+    let truth = evaluate::read_truth(path, &args.truth, limits)?;
+    let found = truth.disparities().size();
+    if found == size {
+        return Ok(truth);
+    }
+    Err(Failure::input(format!("{}: {found} pixels, but the images have {size}", path.display())))
+}

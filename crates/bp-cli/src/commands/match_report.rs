@@ -1,0 +1,146 @@
+//! What `bp match` says of a pair, as text or as JSON.
+
+use std::{fmt::Write as _, path::PathBuf};
+
+use bp_core::{Errors, Size, Stage};
+use bp_stereo::{
+    AnswerTimes, Disparity, Matcher, Tiles,
+    description::{self, Clocked, Energy, Settings, clocks, milliseconds},
+};
+use bytesize::ByteSize;
+use serde::Serialize;
+
+use super::evaluate::{self, ErrorReport};
+
+/// Version of what `--json` prints; changes with every change of meaning.
+const SCHEMA_VERSION: u32 = 1;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub(super) struct Report {
+    schema_version: u32,
+    width: usize,
+    height: usize,
+    backend: String,
+    device: description::Device,
+    settings: Settings,
+    /// None where the pair was matched as a whole.
+    tiles: Option<Tiles>,
+    allocated_bytes: u64,
+    /// Most that the program was predicted to hold at a time.
+    peak_bytes: u64,
+    /// Of every match, in order.
+    samples_ms: Vec<f64>,
+    /// The median of these, what of it came after matching, and the stages of that match; of both images' where both
+    /// were matched.
+    total_ms: f64,
+    finishing_ms: f64,
+    clocks: Vec<Clocked>,
+    energy: Energy,
+    errors: Option<ErrorReport>,
+    messages_sha256: Option<String>,
+    /// What may be wrong with the images or the labels, as standard error tells it.
+    warnings: Vec<String>,
+    /// The files, the disparity map first.
+    written: Vec<String>,
+}
+
+/// What a report has beside an answer.
+pub(super) struct Asked {
+    pub(super) size: Size,
+    pub(super) warnings: Vec<String>,
+    pub(super) errors: Option<Errors>,
+    pub(super) messages_sha256: Option<String>,
+}
+
+impl Report {
+    /// The report of the last answer of several, whose times are these.
+    pub(super) fn new(
+        matcher: &Matcher,
+        answer: Disparity,
+        times: &[AnswerTimes],
+        asked: Asked,
+        written: Vec<PathBuf>,
+    ) -> Self {
+        let median = median(times);
+        Self {
+            schema_version: SCHEMA_VERSION,
+            width: asked.size.width,
+            height: asked.size.height,
+            backend: matcher.device_name().to_owned(),
+            device: matcher.device().into(),
+            settings: answer.settings,
+            tiles: answer.tiles,
+            allocated_bytes: answer.allocated_bytes,
+            peak_bytes: answer.peak_bytes,
+            samples_ms: times.iter().map(total_ms).collect(),
+            total_ms: total_ms(&median),
+            finishing_ms: milliseconds(median.finishing),
+            clocks: clocks(&median.matching),
+            energy: answer.energy.into(),
+            errors: asked.errors.map(Into::into),
+            messages_sha256: asked.messages_sha256,
+            warnings: asked.warnings,
+            written: written.iter().map(|path| path.display().to_string()).collect(),
+        }
+    }
+}
+
+/// The sample of median total; of an even number, the lower one of the two in the middle.
+fn median(samples: &[AnswerTimes]) -> AnswerTimes {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by_key(AnswerTimes::total);
+    sorted[(samples.len() - 1) / 2]
+}
+
+fn total_ms(sample: &AnswerTimes) -> f64 {
+    milliseconds(sample.total())
+}
+
+/// The range of several samples.
+fn spread(samples_ms: &[f64]) -> String {
+    let low = samples_ms.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = samples_ms.iter().copied().fold(0.0, f64::max);
+    let count = samples_ms.len();
+    if count > 1 { format!(", median of {count} from {low:.1} to {high:.1} ms") } else { String::new() }
+}
+
+/// The report as text.
+pub(super) fn text(report: &Report) -> String {
+    let mut text = String::new();
+    let Report { width, height, settings, .. } = report;
+    let Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
+    let last = min_disparity + *labels as i32 - 1;
+    let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
+    let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
+    let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
+    let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
+    let _ = writeln!(text, "{:<10}{plan}, on {}: {}{software}", "plan", report.backend, report.device.name);
+    if let Some(Tiles { columns, rows, width, height, answer }) = &report.tiles {
+        let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
+    }
+    let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
+    for Clocked { clock, stages } in &report.clocks {
+        let _ = writeln!(text, "{:<12}{clock:?} clock", "");
+        for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {
+            let _ = writeln!(text, "{:<14}{:<16}{ms:>10.1} ms", "", stage.name());
+        }
+    }
+    if settings.finish.is_some() {
+        let _ = writeln!(text, "{:<14}{:<16}{:>10.1} ms", "", "after matching", report.finishing_ms);
+    }
+    let [planned, allocated, peak] = [settings.planned_bytes, report.allocated_bytes, report.peak_bytes]
+        .map(|bytes| ByteSize(bytes).display().iec());
+    let all = format!("{peak} with images and answer");
+    let _ = writeln!(text, "{:<10}{allocated} allocated, {planned} predicted, {all}", "memory");
+    let Energy { total, data, smoothness } = report.energy;
+    let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
+    if let Some(hash) = &report.messages_sha256 {
+        let _ = writeln!(text, "{:<10}sha256 {hash}", "messages");
+    }
+    if let Some(errors) = &report.errors {
+        text += &evaluate::error_table(errors);
+    }
+    let _ = writeln!(text, "{:<10}{}", "written", report.written.join(", "));
+    text
+}

@@ -1,0 +1,12 @@
+//! `bp report`: the report of a recorded run again, or the part of a page that comes from it.
+
+use crate::{args::ReportArgs, failure::Failure, notes::note};
+
+/// Runs the command.
+pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
+    match &args.readme {
+        None => note(&format!("report: {}", harness::report::renew(&args.run)?.display())),
+        Some(page) => harness::report::renew_page(&args.run, page)?,
+    }
+    Ok(())
+}

@@ -1,0 +1,12 @@
+//! `bp reproduce`: the thesis's experiments.
+
+use harness::{reproduce, threads};
+
+use crate::{args::ReproduceArgs, failure::Failure, terminal};
+
+/// Runs the command.
+pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
+    terminal::listen()?;
+    let run = || terminal::watched(|watch| reproduce::reproduce(&args.options(), watch));
+    Ok(threads::run_on(args.threads, run)?)
+}

@@ -1,0 +1,32 @@
+//! `bp speed`: devices against each other.
+
+use std::io::Write;
+
+use harness::{
+    measure::Asked,
+    speed::{self, Files},
+    threads,
+};
+
+use crate::{args::SpeedArgs, failure::Failure, notes::note, terminal};
+
+/// Runs the command.
+pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
+    let options = args.options();
+    let files = options.output.as_deref().map(Files::new).transpose()?;
+    terminal::listen()?;
+    let measure = || {
+        terminal::watched(|watch| {
+            let asked = Asked::open_all(&args.backend, watch)?;
+            threads::check(args.threads, &args.backend, Asked::opened(&asked).map(|runner| runner.info.workers))?;
+            files.as_ref().map_or(Ok(()), Files::check)?;
+            speed::measure(&options, &asked, watch)
+        })
+    };
+    let measured = threads::run_on(args.threads, measure)?;
+    if let Some(files) = &files {
+        note(&files.write(&measured)?);
+    }
+    write!(std::io::stdout(), "{}", speed::page(&measured))?;
+    Ok(speed::check(&measured)?)
+}

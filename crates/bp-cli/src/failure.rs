@@ -1,0 +1,163 @@
+//! How the program fails: a message that says what to do, and an exit code that says who can mend it.
+
+use std::io;
+
+use bp_stereo::Cause;
+use harness::Kind;
+
+/// Why a command ended without its result.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub(crate) struct Failure {
+    code: u8,
+    message: String,
+}
+
+/// What the exit codes mean, in their order; help, man page and docs/matching.md take it from here.
+pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
+    (0, "done"),
+    (1, "other"),
+    (2, "usage"),
+    (3, "input"),
+    (4, "the gate failed"),
+    (5, "backend or device unavailable or unable to run the plan"),
+    (6, "out of memory"),
+    (130, "interrupted"),
+];
+
+/// The same as a sentence.
+pub(crate) fn exit_codes() -> String {
+    let codes: Vec<String> = EXIT_CODES.iter().map(|(code, what)| format!("{code} {what}")).collect();
+    format!("Exit codes: {}.", codes.join(", "))
+}
+
+impl Failure {
+    fn new(code: u8, message: impl Into<String>) -> Self {
+        Self { code, message: as_options(&message.into()) }
+    }
+
+    /// The fault of none of the below: a full disk, an output that cannot be written.
+    pub(crate) fn other(message: impl Into<String>) -> Self {
+        Self::new(1, message)
+    }
+
+    /// Arguments that contradict each other.
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self::new(2, message)
+    }
+
+    /// A file that is missing, broken or does not fit.
+    pub(crate) fn input(message: impl Into<String>) -> Self {
+        Self::new(3, message)
+    }
+
+    /// Something is worse than a baseline allows.
+    pub(crate) fn gate(message: impl Into<String>) -> Self {
+        Self::new(4, message)
+    }
+
+    /// A backend or device that is not there.
+    pub(crate) fn unavailable(message: impl Into<String>) -> Self {
+        Self::new(5, message)
+    }
+
+    /// Stopped by the user.
+    pub(crate) fn interrupted() -> Self {
+        Self::new(130, "interrupted")
+    }
+
+    /// The same with the name of what it is about.
+    pub(crate) fn of(self, what: &str) -> Self {
+        Self { message: format!("{what}: {}", self.message), ..self }
+    }
+
+    /// The exit code.
+    pub(crate) fn code(&self) -> u8 {
+        self.code
+    }
+}
+
+/// Libraries name options by their fields, as in `` `max_memory` ``; on a command line that is `--max-memory`.
+pub(crate) fn as_options(message: &str) -> String {
+    let is_field = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
+    let parts: Vec<&str> = message.split('`').collect();
+    let mut text = String::new();
+    for (index, part) in parts.iter().enumerate() {
+        let is_quoted = index % 2 == 1 && index + 1 < parts.len();
+        text += &match (is_quoted, is_field(part)) {
+            (true, true) => format!("--{}", part.replace('_', "-")),
+            (true, false) => format!("`{part}`"),
+            (false, _) => (*part).to_owned(),
+        };
+    }
+    text
+}
+
+impl From<bp_stereo::Error> for Failure {
+    fn from(error: bp_stereo::Error) -> Self {
+        let code = match error.cause() {
+            Cause::System => 1,
+            Cause::Options => 2,
+            Cause::Input => 3,
+            Cause::Unavailable | Cause::Unsupported | Cause::DeviceLost => 5,
+            Cause::Memory => 6,
+            Cause::Stopped => 130,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<harness::Failure> for Failure {
+    fn from(failure: harness::Failure) -> Self {
+        let code = match failure.kind() {
+            Kind::Other => 1,
+            Kind::Usage => 2,
+            Kind::Input => 3,
+            Kind::Gate => 4,
+            Kind::Unavailable | Kind::Unsupported | Kind::DeviceLost => 5,
+            Kind::OutOfMemory => 6,
+            Kind::Interrupted => 130,
+        };
+        Self::new(code, failure.to_string())
+    }
+}
+
+impl From<bp_core::Error> for Failure {
+    fn from(error: bp_core::Error) -> Self {
+        bp_stereo::Error::from(error).into()
+    }
+}
+
+impl From<bp_io::Error> for Failure {
+    fn from(error: bp_io::Error) -> Self {
+        bp_stereo::Error::from(error).into()
+    }
+}
+
+impl From<bp_stereo::Stopped> for Failure {
+    fn from(_: bp_stereo::Stopped) -> Self {
+        Self::interrupted()
+    }
+}
+
+/// Standard output that cannot be written to: a full disk, say. A reader that closed its end, as `head` does, has what
+/// it wanted.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        let code = if error.kind() == io::ErrorKind::BrokenPipe { 0 } else { 1 };
+        Self::new(code, format!("cannot write to standard output: {error}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_documentation_lists_the_exit_codes() {
+        let page = include_str!("../../../docs/matching.md");
+        for (code, meaning) in EXIT_CODES {
+            assert!(page.contains(&format!("| {code} | {meaning} |")), "{code} {meaning}");
+        }
+    }
+}

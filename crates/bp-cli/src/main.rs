@@ -1,0 +1,56 @@
+//! The program `bp`.
+//!
+//! `args` reads the command line; `args/meaning` turns it into the libraries' options, in one place. `commands` has one file
+//! for each command, `terminal` shows what the libraries tell, and `failure` knows the exit codes. Only this crate prints.
+
+mod args;
+mod colour_bar;
+mod commands;
+mod failure;
+mod heap;
+mod interrupt;
+mod notes;
+mod terminal;
+
+use std::process::ExitCode;
+
+use args::{Cli, Command};
+use clap::Parser;
+use failure::Failure;
+use harness::threads;
+use notes::tell;
+
+fn main() -> ExitCode {
+    notes::quieten_driver();
+    let cli = Cli::parse();
+    notes::set_up(cli.quiet);
+    match run(&cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if failure.code() != 0 {
+                tell(&format!("bp: {failure}"));
+            }
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn run(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Match(args) => commands::match_pair(args),
+        Command::Convert(args) => commands::convert(args),
+        Command::Evaluate(args) => commands::evaluate(args),
+        Command::Reproduce(args) => commands::reproduce(args),
+        Command::Report(args) => commands::report(args),
+        Command::Scenes(args) => commands::scenes(args),
+        Command::Devices(args) => commands::devices(args),
+        Command::Doctor(args) => threads::run_on(None, || commands::doctor(args)),
+        Command::Conform(args) => threads::run_on(None, || commands::conform(args)),
+        Command::Speed(args) => commands::speed(args),
+        Command::Gate(args) => commands::gate(args),
+        Command::Compare(args) => commands::compare(args),
+        Command::Export(args) => commands::export(args),
+        Command::Completions(args) => commands::completions(args),
+        Command::Man(args) => commands::man(args),
+    }
+}

@@ -1,0 +1,64 @@
+//! What people see while the libraries work: a bar, notes and warnings on standard error.
+
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use bp_stereo::{Event, Stop, Watch};
+
+use crate::{
+    failure::as_options,
+    interrupt::{self, ProgressBar},
+    notes::{self, note, tell},
+};
+
+/// Set by Ctrl-C.
+pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
+
+/// The bar of the work that goes on.
+static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Shows events and obeys Ctrl-C.
+pub(crate) fn watch() -> Watch<'static> {
+    Watch::new(&show, &STOP)
+}
+
+/// Does work whose events are shown, and removes the bar after it.
+pub(crate) fn watched<T>(work: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let outcome = work(&watch());
+    finish();
+    outcome
+}
+
+/// Removes the bar.
+pub(crate) fn finish() {
+    *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
+}
+
+fn show(event: Event<'_>) {
+    match event {
+        Event::Progress { done, total } => {
+            let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
+            let bar = bar.get_or_insert_with(|| ProgressBar::new(total, done));
+            bar.show(done, total);
+        }
+        Event::Task(text) => {
+            if let Some(bar) = BAR.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+                bar.message(text.split_whitespace().collect::<Vec<_>>().join(" "));
+            }
+        }
+        Event::Line(text) if !notes::is_quiet() => tell(text),
+        Event::Note(text) => note(&as_options(text)),
+        Event::Warning(text) => warn(&as_options(text)),
+        Event::Failed(text) => tell(&as_options(text)),
+        _ => {}
+    }
+}
+
+/// Shows a warning.
+pub(crate) fn warn(text: &str) {
+    note(&format!("warning: {text}"));
+}
+
+/// Makes Ctrl-C and SIGTERM stop the work at its next step.
+pub(crate) fn listen() -> Result<(), crate::failure::Failure> {
+    interrupt::listen()
+}

@@ -1,0 +1,149 @@
+//! Recorded runs and what is shown of them.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use harness::record::{Outcome, Record, speed::Speed};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The folders under `results` that hold a record.
+fn runs() -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.join("record.json").exists()).collect()
+}
+
+fn read(run: &Path) -> String {
+    fs::read_to_string(run.join("record.json")).unwrap()
+}
+
+#[test]
+fn the_schema_in_the_repository_is_that_of_the_program() {
+    let current = serde_json::to_value(schemars::schema_for!(Record)).unwrap();
+    let committed = fs::read_to_string(root().join("results/schema.json")).unwrap();
+    let committed: serde_json::Value = serde_json::from_str(&committed).unwrap();
+    assert!(current == committed, "run: cargo run -p harness --example schema > results/schema.json");
+}
+
+#[test]
+fn committed_records_fit_the_schema_and_are_whole() {
+    let schema = fs::read_to_string(root().join("results/schema.json")).unwrap();
+    let validator = jsonschema::validator_for(&serde_json::from_str(&schema).unwrap()).unwrap();
+    let runs = runs();
+    assert!(runs.len() >= 2, "the real and the synthetic scenes are recorded");
+    for run in runs {
+        let text = read(&run);
+        let errors: Vec<_> =
+            validator.iter_errors(&serde_json::from_str(&text).unwrap()).map(|e| e.to_string()).collect();
+        assert!(errors.is_empty(), "{}: {errors:?}", run.display());
+        let record: Record = serde_json::from_str(&text).unwrap();
+        assert!(record.complete && record.program.clean_tree, "{}", run.display());
+        for cell in &record.cells {
+            match &cell.outcome {
+                Outcome::Measured(measured) => {
+                    assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
+                    let planned = cell.settings.planned_bytes;
+                    assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
+                }
+                // A GPU may be too small for a plan, or not there.
+                Outcome::Unavailable(reason) => assert!(!reason.is_empty(), "{} {}", cell.scene, cell.plan),
+                Outcome::Pending | Outcome::Error(_) => panic!("{}: {} {}", run.display(), cell.scene, cell.plan),
+            }
+        }
+    }
+}
+
+/// What is committed beside a record is what the program makes of it now.
+#[test]
+fn reports_are_made_from_their_records() {
+    for run in runs() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("maps")).unwrap();
+        let maps = fs::read_dir(run.join("maps")).unwrap().map(|entry| entry.unwrap().path());
+        for path in maps.chain([run.join("record.json")]) {
+            fs::copy(&path, folder.path().join(path.strip_prefix(&run).unwrap())).unwrap();
+        }
+        let bp = Command::new(env!("CARGO_BIN_EXE_bp")).arg("report").arg(folder.path()).output().unwrap();
+        assert!(bp.status.success());
+        for entry in fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap()).filter(|e| e.path().is_file()) {
+            let committed = run.join(entry.file_name());
+            let same = fs::read(&committed).ok() == Some(fs::read(entry.path()).unwrap());
+            assert!(same, "{}; run: cargo run -- report {}", committed.display(), run.display());
+        }
+    }
+}
+
+/// The same of `bp speed`. The record of a former benchmark has no version of the schema: no program reads it.
+#[test]
+fn pages_of_speed_are_made_from_their_records() {
+    let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
+    let is_ours = |text: String| text.contains("\"schema_version\"");
+    let runs = entries.filter(|path| fs::read_to_string(path.join("speed.json")).is_ok_and(is_ours));
+    let mut read = 0;
+    for run in runs {
+        let speed: Speed = serde_json::from_str(&fs::read_to_string(run.join("speed.json")).unwrap()).unwrap();
+        assert!(speed.contests.iter().all(|contest| !contest.entries.is_empty()), "{}", run.display());
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(run.join("speed.json"), folder.path().join("speed.json")).unwrap();
+        let bp = Command::new(env!("CARGO_BIN_EXE_bp")).arg("report").arg(folder.path()).output().unwrap();
+        assert!(bp.status.success(), "{bp:?}");
+        for entry in fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap()) {
+            let committed = run.join(entry.file_name());
+            let same = fs::read(&committed).ok() == Some(fs::read(entry.path()).unwrap());
+            assert!(same, "{}; run: cargo run -- report {}", committed.display(), run.display());
+        }
+        read += 1;
+    }
+    assert!(read >= 2, "growth and lavapipe are recorded");
+}
+
+/// docs/thesis.md shows what the record says.
+#[test]
+fn the_page_on_the_thesis_is_made_from_a_record() {
+    let page = Path::new("docs/thesis.md");
+    let text = fs::read_to_string(root().join(page)).unwrap();
+    let (_, rest) = text.split_once("--readme docs/thesis.md` from `").expect("the note below the page's table");
+    let (record, _) = rest.split_once('`').unwrap();
+    let run = Path::new(record).parent().unwrap();
+    let renewed = harness::report::renewed_page(&text, &root(), page, run);
+    assert!(renewed.as_deref() == Some(&text), "run: bp report {} --readme {}", run.display(), page.display());
+}
+
+/// Prototypes of the same models in single precision, measured on the same six images at half size: visible pixels and
+/// all pixels wrong by more than 1 px in percent, and the root mean squared error.
+#[test]
+fn recorded_accuracy_is_that_of_the_prototypes() {
+    let expected = [
+        ("bp", [24.0, 32.1, 16.4]),
+        ("cfbp", [23.4, 31.7, 16.4]),
+        ("cfcsbp", [23.4, 31.7, 16.2]),
+        ("ctbp", [24.2, 32.3, 16.4]),
+        ("ctcsbp", [25.1, 33.2, 16.5]),
+        ("census", [5.6, 13.3, 9.5]),
+    ];
+    let records = runs().into_iter().map(|run| serde_json::from_str::<Record>(&read(&run)).unwrap());
+    let real: Vec<Record> = records.filter(|record| record.run.data == "middlebury2006").collect();
+    let mut compared = 0;
+    for (record, (plan, expected)) in real.iter().flat_map(|record| expected.map(|plan| (record, plan))) {
+        for backend in &record.run.backends {
+            let cells = record.cells.iter().filter(|cell| cell.plan == plan && cell.backend == *backend);
+            // Means over some of the scenes are others.
+            let Some(measured) = cells.map(|cell| cell.measured()).collect::<Option<Vec<_>>>() else { continue };
+            let mean = |value: fn(&harness::record::Measurement) -> f64| {
+                measured.iter().map(|measured| value(measured)).sum::<f64>() / measured.len() as f64
+            };
+            let found = [mean(|m| m.visible.bad[1]), mean(|m| m.all.bad[1]), mean(|m| m.all.rmse)];
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 0.1, "{plan}: {found} where prototypes had {expected}");
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 0);
+}

@@ -1,0 +1,87 @@
+//! Disparity maps.
+
+use crate::{Error, Model, Size};
+
+/// A disparity map `[height][width]`. Disparities are in pixels of the map's own size. Unknown pixels hold
+/// [`DisparityMap::UNKNOWN`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct DisparityMap {
+    size: Size,
+    values: Vec<f32>,
+}
+
+impl DisparityMap {
+    /// The value of an unknown pixel, as in Middlebury's PFM files: plus infinity.
+    pub const UNKNOWN: f32 = f32::INFINITY;
+
+    /// A map from its values, `[height][width]`. Values that are not finite count as unknown.
+    ///
+    /// # Errors
+    /// [`Error::PixelCount`] if `values` does not hold one value a pixel.
+    pub fn new(size: Size, mut values: Vec<f32>) -> Result<Self, Error> {
+        if values.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: values.len() });
+        }
+        for value in &mut values {
+            if !value.is_finite() {
+                *value = Self::UNKNOWN;
+            }
+        }
+        Ok(Self { size, values })
+    }
+
+    /// The disparities of labels `[height][width]` of a model.
+    ///
+    /// # Panics
+    /// If `labels` does not hold one label a pixel.
+    #[must_use]
+    pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Self {
+        assert_eq!(labels.len(), size.pixels(), "one label a pixel");
+        Self { size, values: labels.iter().map(|&label| model.disparity(label) as f32).collect() }
+    }
+
+    /// The map mirrored left to right.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        let width = self.size.width;
+        self.replaced(|values| values.chunks_exact_mut(width).for_each(<[f32]>::reverse))
+    }
+
+    /// The map with values changed by `change`, which must set values that are not finite to [`DisparityMap::UNKNOWN`].
+    pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
+        change(&mut self.values);
+        self
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// All values, `[height][width]`.
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The disparity at column `x`, row `y`; `None` if it is unknown.
+    ///
+    /// # Panics
+    /// If (x, y) lies outside the image.
+    #[must_use]
+    pub fn at(&self, x: usize, y: usize) -> Option<f32> {
+        let value = self.values[y * self.size.width + x];
+        value.is_finite().then_some(value)
+    }
+
+    /// The least and the largest known disparity; `None` if no pixel is known.
+    #[must_use]
+    pub fn range(&self) -> Option<(f32, f32)> {
+        let known = self.values.iter().copied().filter(|v| v.is_finite());
+        known.fold(None, |range, v| match range {
+            None => Some((v, v)),
+            Some((low, high)) => Some((v.min(low), v.max(high))),
+        })
+    }
+}

@@ -1,0 +1,96 @@
+//! Operations on disparity maps after matching, the same for all backends: checks, filling, filters and confidence.
+//!
+//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, speckles, fill, median, sub-pixel.
+
+mod check;
+mod confidence;
+mod fill;
+mod median;
+mod speckles;
+mod subpixel;
+mod window;
+
+pub use check::{AGREE, check_left_right};
+pub use confidence::confidence;
+pub use fill::fill;
+pub use median::{MEDIANS, median};
+pub use speckles::remove_speckles;
+pub use subpixel::subpixel;
+
+use crate::{DisparityMap, Error};
+
+/// The operations that a disparity map goes through after matching; by default none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Finish {
+    /// Whether [`check_left_right`] makes pixels unknown that contradict the map of the right image.
+    pub check: bool,
+    /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
+    pub speckles: Option<usize>,
+    /// Whether unknown pixels are filled after the check and the speckles; see [`fill()`].
+    pub fill: bool,
+    /// The side of the window of [`median`], one of [`MEDIANS`].
+    pub median: Option<usize>,
+    /// Whether [`subpixel`] refines disparities to fractions of a pixel.
+    pub subpixel: bool,
+}
+
+impl Finish {
+    /// Applies the selected operations to the left image's map. `right` is the right image's map, for the check.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] where the two maps differ in size, [`Error::Plan`] if a check is asked for without the
+    /// right image's map, or for a median that is none of [`MEDIANS`]; [`Error::OutOfMemory`].
+    pub fn apply(&self, left: DisparityMap, right: Option<&DisparityMap>) -> Result<DisparityMap, Error> {
+        let mut map = match (self.check, right) {
+            (false, _) => left,
+            (true, Some(right)) => check_left_right(left, right)?,
+            (true, None) => return Err(Error::Plan("a left-right check needs the right image's map too")),
+        };
+        if let Some(least) = self.speckles {
+            map = remove_speckles(map, least)?;
+        }
+        if self.fill {
+            map = fill(map);
+        }
+        if let Some(side) = self.median {
+            map = median(&map, side)?;
+        }
+        if self.subpixel { subpixel(&map) } else { Ok(map) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Size;
+
+    const NONE: f32 = DisparityMap::UNKNOWN;
+
+    fn map(width: usize, values: &[f32]) -> DisparityMap {
+        DisparityMap::new(Size { width, height: values.len() / width }, values.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn nothing_is_done_by_default() {
+        let original = map(3, &[1.0, NONE, 7.0]);
+        assert_eq!(Finish::default().apply(original.clone(), None).unwrap(), original);
+    }
+
+    #[test]
+    fn holes_of_the_check_are_filled_before_filters_see_them() {
+        // Pixel 3 claims what the right map contradicts; what is filled in there survives the median.
+        let left = map(5, &[0.0, 0.0, 0.0, 3.0, 0.0]);
+        let right = map(5, &[0.0; 5]);
+        let finish = Finish { check: true, fill: true, median: Some(3), ..Finish::default() };
+        assert_eq!(finish.apply(left.clone(), Some(&right)).unwrap(), map(5, &[0.0; 5]));
+        assert!(finish.apply(left.clone(), None).is_err());
+        assert!(finish.apply(left, Some(&map(1, &[0.0]))).is_err());
+    }
+
+    #[test]
+    fn a_map_of_unknown_pixels_stays_one() {
+        let all = Finish { check: true, speckles: Some(2), fill: true, median: Some(5), subpixel: true };
+        let unknown = map(2, &[NONE; 4]);
+        assert_eq!(all.apply(unknown.clone(), Some(&unknown)).unwrap(), unknown);
+    }
+}

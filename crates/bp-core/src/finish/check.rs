@@ -1,0 +1,63 @@
+//! The left-right check.
+
+use crate::{DisparityMap, Error, metrics::check_size};
+
+/// Two disparities agree, and belong to one surface, if they differ by no more than this many pixels.
+pub const AGREE: f32 = 1.0;
+
+/// Makes every pixel of the left map unknown unless its match in the right image agrees: at column `floor(x - d + 1/2)` the
+/// right map has to be known and to differ by no more than [`AGREE`] (Fua 1993). Occluded pixels fail this check, and so
+/// do most wrong ones.
+///
+/// # Errors
+/// [`Error::WrongSize`] if the maps differ in size.
+pub fn check_left_right(left: DisparityMap, right: &DisparityMap) -> Result<DisparityMap, Error> {
+    check_size("the right image's map", right.size(), left.size())?;
+    let width = left.size().width;
+    Ok(left.replaced(|values| {
+        for (row, right) in values.chunks_exact_mut(width).zip(right.values().chunks_exact(width)) {
+            for (x, disparity) in row.iter_mut().enumerate() {
+                if difference(x, *disparity, right).is_none_or(|difference| difference > AGREE) {
+                    *disparity = DisparityMap::UNKNOWN;
+                }
+            }
+        }
+    }))
+}
+
+/// By how much the disparity of column `x` differs from that of its match in the right map's row; `None` if either
+/// is unknown or the match lies outside.
+pub(super) fn difference(x: usize, disparity: f32, right: &[f32]) -> Option<f32> {
+    let column = (x as f32 - disparity + 0.5).floor();
+    // This comes before the conversion to an index, because unknown disparities are infinite.
+    let inside = column >= 0.0 && column < right.len() as f32;
+    let other = right[inside.then_some(column as usize)?];
+    other.is_finite().then(|| (disparity - other).abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Size;
+
+    const NONE: f32 = DisparityMap::UNKNOWN;
+
+    fn row(values: &[f32]) -> DisparityMap {
+        DisparityMap::new(Size { width: values.len(), height: 1 }, values.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn pixels_have_to_agree_with_their_match() {
+        // Match: outside, column 0 (differs by 1), column 1 (by 2), column 2 (unknown), none, column 3.
+        let left = row(&[1.0, 1.0, 1.0, 1.0, NONE, 2.0]);
+        let right = row(&[2.0, 3.0, NONE, 2.0, 0.0, 0.0]);
+        assert_eq!(check_left_right(left, &right).unwrap(), row(&[NONE, 1.0, NONE, NONE, NONE, 2.0]));
+        assert!(check_left_right(row(&[0.0]), &right).is_err());
+    }
+
+    #[test]
+    fn disparities_may_be_negative() {
+        let left = row(&[-1.0, -1.0, -1.0]);
+        assert_eq!(check_left_right(left, &row(&[5.0, -1.0, -3.0])).unwrap(), row(&[-1.0, NONE, NONE]));
+    }
+}

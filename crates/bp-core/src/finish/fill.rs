@@ -1,0 +1,60 @@
+//! Filling unknown pixels.
+
+use crate::DisparityMap;
+
+/// Fills every unknown pixel with the smaller of the next known disparities to its left and right: a pixel that one camera
+/// does not see belongs to the surface behind. A row without known pixels is copied from the row above, else from below.
+#[must_use]
+pub fn fill(map: DisparityMap) -> DisparityMap {
+    let width = map.size().width;
+    map.replaced(|values| {
+        values.chunks_exact_mut(width).for_each(fill_row);
+        let height = values.len() / width;
+        for y in 1..height {
+            take_over(values, width, y - 1, y);
+        }
+        for y in (1..height).rev() {
+            take_over(values, width, y, y - 1);
+        }
+    })
+}
+
+fn fill_row(row: &mut [f32]) {
+    let mut start = 0;
+    while let Some(first) = row[start..].iter().position(|value| !value.is_finite()) {
+        let first = start + first;
+        let end = row[first..].iter().position(|value| value.is_finite()).map_or(row.len(), |len| first + len);
+        let left = first.checked_sub(1).map_or(DisparityMap::UNKNOWN, |x| row[x]);
+        let right = row.get(end).copied().unwrap_or(DisparityMap::UNKNOWN);
+        row[first..end].fill(left.min(right));
+        start = end;
+    }
+}
+
+/// Copies row `from` to row `to` if that is unknown. By now a row is known or unknown as a whole.
+fn take_over(values: &mut [f32], width: usize, from: usize, to: usize) {
+    if !values[to * width].is_finite() {
+        values.copy_within(from * width..(from + 1) * width, to * width);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Size;
+
+    const NONE: f32 = DisparityMap::UNKNOWN;
+
+    #[test]
+    fn the_smaller_neighbour_fills() {
+        let mut row = [NONE, NONE, 4.0, NONE, 3.0, NONE, -2.0, NONE];
+        fill_row(&mut row);
+        assert_eq!(row, [4.0, 4.0, 4.0, 3.0, 3.0, -2.0, -2.0, -2.0]);
+    }
+
+    #[test]
+    fn rows_without_an_answer_take_over_their_neighbours() {
+        let map = DisparityMap::new(Size { width: 1, height: 5 }, vec![NONE, NONE, 1.0, NONE, 2.0]).unwrap();
+        assert_eq!(fill(map).values(), [1.0, 1.0, 1.0, 1.0, 2.0]);
+    }
+}

@@ -1,7 +1,0 @@
-//! The `bp` program.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    harness::main()
-}

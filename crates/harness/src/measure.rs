@@ -1,0 +1,17 @@
+//! The one way to take a time. Contestants take turns, round after round, so that whatever else the machine does meets
+//! all of them alike. Every comparison is made from their samples.
+//!
+//! * `runner` opens a device on a pool of threads and opens it again after it was lost.
+//! * `solve` prepares a plan on a runner and times it.
+//! * `turns` is the loop. It takes any contestant: a solve, or a closure that returns a sample.
+//! * `meter` reports how far the loop has come and stops it.
+
+mod meter;
+mod runner;
+mod solve;
+mod turns;
+
+pub use meter::Meter;
+pub use runner::{Asked, Runner};
+pub use solve::Solve;
+pub use turns::{Contestant, Entrant, Rules, SLOW_MS, take_turns};

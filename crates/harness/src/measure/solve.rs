@@ -1,0 +1,50 @@
+//! A plan on a runner, prepared and timed.
+
+use std::time::Instant;
+
+use bp_core::{Driver, Plan, StereoPair};
+
+use super::{Meter, Runner};
+use crate::{
+    failure::Failure,
+    machine,
+    record::{Sample, milliseconds},
+};
+
+/// A prepared plan, the device that solves it, and the pair that it is solved for.
+pub struct Solve<'a> {
+    runner: &'a Runner,
+    pair: &'a StereoPair,
+    /// The prepared plan.
+    pub driver: Driver,
+    /// How long it took to allocate everything.
+    pub prepare_ms: f64,
+    /// How much of that was compiling kernels, if the device compiles any.
+    pub compile_ms: Option<f64>,
+}
+
+impl<'a> Solve<'a> {
+    /// Prepares a plan, on a device that is opened again if it was lost.
+    pub fn prepare(runner: &'a Runner, plan: Plan, pair: &'a StereoPair) -> Result<Self, Failure> {
+        runner.on_device(|device| {
+            machine::check_memory(runner.info.kind, device.planned_bytes(&plan), "--quick needs less")?;
+            let start = Instant::now();
+            let driver = Driver::new(device, plan)?;
+            let prepare_ms = milliseconds(start.elapsed());
+            let compile_ms = driver.compile_time().map(milliseconds);
+            Ok(Self { runner, pair, driver, prepare_ms, compile_ms })
+        })
+    }
+
+    /// Solves it once.
+    pub fn sample(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
+        let Self { runner, pair, driver, .. } = self;
+        let times = runner.run(|| Ok(driver.solve_observed(pair, &mut |progress| meter.observe(progress.done))?))?;
+        Ok(Sample::new(round, &times))
+    }
+
+    /// Message entries of a solve.
+    pub fn entries(&self) -> u64 {
+        self.driver.plan().message_updates()
+    }
+}
