@@ -8,6 +8,7 @@ mod doctor;
 pub(crate) mod evaluate;
 mod export;
 mod gate;
+mod limits;
 mod match_pair;
 mod match_report;
 mod match_summary;

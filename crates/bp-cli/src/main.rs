@@ -4,6 +4,7 @@
 //! for each command, `terminal` shows what the libraries tell, and `failure` knows the exit codes. Only this crate prints.
 
 mod args;
+mod bar;
 mod colour_bar;
 mod commands;
 mod failure;

@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use crate::interrupt;
+use crate::bar;
 
 static QUIET: AtomicBool = AtomicBool::new(false);
 static NOTED: Mutex<Option<HashSet<String>>> = Mutex::new(None);
@@ -36,7 +36,7 @@ struct BesideBar;
 impl Write for BesideBar {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let mut written = Ok(0);
-        interrupt::beside_bar(|| written = io::stderr().write(bytes));
+        bar::beside_bar(|| written = io::stderr().write(bytes));
         written
     }
 
@@ -53,7 +53,7 @@ pub(crate) fn is_quiet() -> bool {
 /// Prints an error, above the bar where there is one. Where standard error is full or closed there is nobody left to
 /// tell.
 pub(crate) fn tell(line: &str) {
-    interrupt::beside_bar(|| drop(writeln!(io::stderr(), "{line}")));
+    bar::beside_bar(|| drop(writeln!(io::stderr(), "{line}")));
 }
 
 /// Tells a note, unless only errors are wanted; one that many pairs give rise to only once.

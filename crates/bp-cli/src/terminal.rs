@@ -1,17 +1,15 @@
 //! What people see while the libraries work: a bar, notes and warnings on standard error.
 
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
-use bp_stereo::{Event, Stop, Watch};
+use bp_stereo::{Event, Watch};
 
 use crate::{
+    bar::ProgressBar,
     failure::as_options,
-    interrupt::{self, ProgressBar},
+    interrupt::STOP,
     notes::{self, note, tell},
 };
-
-/// Set by Ctrl-C.
-pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
 
 /// The bar of the work that goes on.
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
@@ -35,7 +33,7 @@ pub(crate) fn finish() {
 
 fn show(event: Event<'_>) {
     match event {
-        Event::Progress { done, total } => {
+        Event::Progress { done, total } if !notes::is_quiet() => {
             let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
             let bar = bar.get_or_insert_with(|| ProgressBar::new(total, done));
             bar.show(done, total);
@@ -56,9 +54,4 @@ fn show(event: Event<'_>) {
 /// Shows a warning.
 pub(crate) fn warn(text: &str) {
     note(&format!("warning: {text}"));
-}
-
-/// Makes Ctrl-C and SIGTERM stop the work at its next step.
-pub(crate) fn listen() -> Result<(), crate::failure::Failure> {
-    interrupt::listen()
 }

@@ -25,16 +25,17 @@ fn the_least_memory_limit_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     pair(folder.path());
     for options in ["", "--picture p.png", "--speckle 20", "--check left-right --median 3 --confidence c.npy"] {
-        let run = |limit: u64| {
+        let run = |limit: &str| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_bp"));
             command.args("match left.ppm right.ppm -o m.pfm --labels 16 --threads 2 --quiet".split(' '));
-            command.args(options.split_whitespace()).args(["--max-memory", &limit.to_string()]);
+            command.args(options.split_whitespace()).args(["--max-memory", limit]);
             command.current_dir(folder.path()).env("RUST_BACKTRACE", "0").output().unwrap()
         };
-        let refused = String::from_utf8(run(1).stderr).unwrap();
+        let refused = String::from_utf8(run("1").stderr).unwrap();
         let words = refused.split("at least ").nth(1).unwrap_or_else(|| panic!("{refused}"));
-        let least: u64 = words.split(' ').next().unwrap().parse().unwrap();
-        let output = run(least);
+        let least = words.split(',').next().unwrap().replace(' ', "");
+        let output = run(&least);
+        let least = (least.strip_suffix("MiB").unwrap().parse::<f64>().unwrap() * f64::from(1 << 20)) as u64;
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         // The peak of the largest child so far: no test runs beside this one.
         let held = getrusage(UsageWho::RUSAGE_CHILDREN).unwrap().max_rss() as u64 * 1024;

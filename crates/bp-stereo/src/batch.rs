@@ -11,7 +11,7 @@ mod run;
 mod shard;
 mod summary;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use job::Job;
 pub use record::PairTimes;
@@ -104,14 +104,8 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let failures =
         match_due(&Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() }, &due)?;
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
-    summary.write(&making.files, &summary_path(&options.output, shard))?;
+    summary.write(&making.files, &shard.summary_path(&options.output))?;
     Ok(summary)
-}
-
-/// Where the summary of a batch is written.
-#[must_use]
-pub fn summary_path(output: &Path, shard: Shard) -> PathBuf {
-    summary::path(output, shard)
 }
 
 /// Matches the jobs that are due, and returns those that failed.

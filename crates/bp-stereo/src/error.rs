@@ -28,7 +28,7 @@ pub enum Error {
     #[error("{0}")]
     Unavailable(String),
     /// More memory needed than allowed or free.
-    #[error("needs at least {}, but only {} is {reason}; {advice}", iec(*needed), iec(*available))]
+    #[error("needs at least {}, but only {} is {reason}; {advice}", iec_or_more(*needed), iec(*available))]
     OutOfMemory {
         /// Bytes needed.
         needed: u64,
@@ -133,4 +133,22 @@ impl From<Stopped> for Error {
 /// Bytes in a unit that people use.
 pub(crate) fn iec(bytes: u64) -> String {
     ByteSize(bytes).display().iec().to_string()
+}
+
+/// The same rounded up to a tenth of the unit, so that what is shown is enough.
+fn iec_or_more(bytes: u64) -> String {
+    let unit = 1024_u64.pow(bytes.max(1).ilog(1024));
+    let tenths = bytes.saturating_mul(10).div_ceil(unit);
+    iec(tenths.saturating_mul(unit).div_ceil(10))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_rounded_up_to_what_is_enough() {
+        let shown = [0, 1, 1023, 1024, 1025, 21_915_239, 21_915_238].map(iec_or_more);
+        assert_eq!(shown, ["0 B", "1 B", "1023 B", "1.0 KiB", "1.1 KiB", "21.0 MiB", "20.9 MiB"]);
+    }
 }

@@ -1,9 +1,9 @@
 //! Tables, charts and pages, made from a record and from nothing else.
 
 mod diagrams;
-mod escape;
 mod figures;
 pub mod format;
+mod grid;
 mod html;
 mod legend;
 mod markdown;
@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 
 use bp_charts::png;
 
-pub use escape::{markdown as markdown_escaped, printable};
-pub use markdown::lines;
+pub use grid::lines;
 pub use opening::headline;
 pub use opening::{device_fact, machine_fact, program_fact};
 pub use tables::of_times as table_of_times;

@@ -6,8 +6,8 @@ use bp_core::{DisparityMap, Image};
 use bp_io::{Limits, read_image, read_map};
 use bp_stereo::Content;
 
-use super::match_pair::limits;
-use crate::{args::ConvertArgs, failure::Failure, terminal};
+use super::limits::limits;
+use crate::{args::ConvertArgs, failure::Failure, interrupt, terminal};
 
 /// Runs the command.
 pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
@@ -22,7 +22,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     if outputs.points.is_none() && args.image.is_some() {
         return Err(Failure::usage("--image is for --points: give --points too"));
     }
-    terminal::listen()?;
+    interrupt::listen()?;
     let calib = args.outputs.calibration();
     let inputs: Vec<&Path> =
         [Some(&args.map), args.image.as_ref(), calib].into_iter().flatten().map(PathBuf::as_path).collect();

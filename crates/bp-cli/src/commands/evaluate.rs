@@ -8,7 +8,7 @@ use serde::Serialize;
 use bp_io::{Error, Limits, Mask, read_map, read_mask};
 use bp_stereo::description as record;
 
-use super::{match_pair::limits, print_json};
+use super::{limits::limits, print_json};
 use crate::{
     args::{EvaluateArgs, TruthArgs},
     failure::Failure,

@@ -7,14 +7,14 @@ use serde::Serialize;
 use super::print_json;
 use harness::{gate, threads};
 
-use crate::{args::GateArgs, failure::Failure, notes::note, terminal};
+use crate::{args::GateArgs, failure::Failure, interrupt, notes::note, terminal};
 
 /// Runs the command.
 pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
     if let Some(solve) = args.counted {
         return Ok(writeln!(std::io::stdout(), "{}", solve.run()?)?);
     }
-    terminal::listen()?;
+    interrupt::listen()?;
     if args.instructions {
         let judgement =
             threads::run_on(None, || terminal::watched(|watch| gate::instructions(&args.baselines, watch)))?;

@@ -5,21 +5,22 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{DeviceKind, DisparityMap, GroundTruth, Size, StereoPair, survey::Survey};
+use bp_core::{DisparityMap, GroundTruth, Size, StereoPair, survey::Survey};
 use bp_io::{Limits, MapFormat, Raster, read_image};
 use bp_stereo::{
-    AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Memory, Outputs, Planned, Start, batch,
+    AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Outputs, Planned, Start, batch,
 };
 
 use super::{
     evaluate,
+    limits::limits,
     match_report::{Asked, Report, text},
     match_summary, print_json,
 };
 use crate::{
     args::MatchArgs,
     failure::{Failure, as_options},
-    heap,
+    heap, interrupt,
     notes::note,
     terminal,
 };
@@ -36,7 +37,7 @@ pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
 
 fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Failure> {
     let making = args.making()?;
-    terminal::listen()?;
+    interrupt::listen()?;
     let summary = batch::run(options, &making, &terminal::watch());
     terminal::finish();
     let summary = summary?;
@@ -48,7 +49,7 @@ fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Fai
     match summary.failures.len() {
         0 => Ok(()),
         failed => {
-            let path = batch::summary_path(&options.output, options.shard);
+            let path = options.shard.summary_path(&options.output);
             Err(Failure::input(format!("{failed} of {} pairs failed; see {}", summary.pairs, path.display())))
         }
     }
@@ -72,7 +73,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let limits = limits(args.max_megapixels);
     let pair = read_pair(files, limits)?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limits)).transpose()?;
-    terminal::listen()?;
+    interrupt::listen()?;
     let whole = args.messages_hash.then_some("messages_hash");
     let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, whole };
     let mut matcher = Matcher::new(&options)?.beside(beside);
@@ -165,11 +166,6 @@ fn pipe(map: &DisparityMap) -> Result<(), Failure> {
 /// The files that the outputs are made of.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
-}
-
-/// How much a file may hold, and how much memory reading it may take.
-pub(super) fn limits(megapixels: u32) -> Limits {
-    Limits::megapixels(megapixels).within(Memory::available_to(DeviceKind::Processor))
 }
 
 fn read_pair([left, right]: [&PathBuf; 2], limits: Limits) -> Result<StereoPair, Failure> {

@@ -8,13 +8,13 @@ use harness::{
     threads,
 };
 
-use crate::{args::SpeedArgs, failure::Failure, notes::note, terminal};
+use crate::{args::SpeedArgs, failure::Failure, interrupt, notes::note, terminal};
 
 /// Runs the command.
 pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
     let options = args.options();
     let files = options.output.as_deref().map(Files::new).transpose()?;
-    terminal::listen()?;
+    interrupt::listen()?;
     let measure = || {
         terminal::watched(|watch| {
             let asked = Asked::open_all(&args.backend, watch)?;

@@ -59,7 +59,7 @@ fn wrong_pairs_and_labels_are_told_with_what_to_do() {
             "a.png b.png --labels 120 --min-disparity -100",
             ["for images 90 pixels wide", "the first ones match nowhere"],
         ),
-        ("a.png other.png --labels auto", ["--labels auto: too little", "the default is taken"]),
+        ("a.png other.png --labels auto", ["--labels auto: too little", "the default is used"]),
     ] {
         let told = warnings(&folder, arguments);
         assert!(words.iter().all(|word| told.contains(word)), "{arguments}: {told}");

@@ -12,7 +12,6 @@ use std::{
 use super::{
     Shard,
     record::{FileState, PairRecord, history},
-    summary,
 };
 use bp_io::{Files, MapFormat, create_folder, resolved};
 
@@ -141,7 +140,7 @@ fn check_apart(options: &BatchOptions, jobs: &[Job]) -> Result<(), Error> {
         let what = format!("{} would be overwritten, which is read", path.display());
         return Err(Error::Options(format!("{what}; choose another `output`")));
     }
-    let summary = summary::path(&options.output, Shard::default());
+    let summary = Shard::default().summary_path(&options.output);
     let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
     for (owner, path) in files() {
         if let Some(other) = owners.insert(key(path), owner.to_string()) {

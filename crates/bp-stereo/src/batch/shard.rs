@@ -3,7 +3,7 @@
 use std::{
     fmt,
     fs::{File, TryLockError},
-    path::Path,
+    path::{Path, PathBuf},
     str::FromStr,
 };
 
@@ -52,6 +52,16 @@ impl Shard {
             // Some file systems have no locks.
             Err(TryLockError::Error(_)) | Ok(()) => Ok(file),
         }
+    }
+
+    /// Where the summary of its pairs is written.
+    #[must_use]
+    pub fn summary_path(self, output: &Path) -> PathBuf {
+        output.join(if self.is_all() {
+            "summary.json".to_owned()
+        } else {
+            format!("summary-{}.json", self.file_part())
+        })
     }
 
     /// Whether there is no other.

@@ -62,11 +62,6 @@ pub struct Failed {
     pub failure: String,
 }
 
-/// The file of a summary.
-pub(super) fn path(output: &Path, shard: Shard) -> PathBuf {
-    output.join(if shard.is_all() { "summary.json".to_owned() } else { format!("summary-{}.json", shard.file_part()) })
-}
-
 impl Summary {
     /// Sums up a shard's jobs, of which these failed just now.
     pub(super) fn of(

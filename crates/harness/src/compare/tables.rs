@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use super::{Comparison, Means, Row, Source, Time, Value, speed_ups};
 use crate::{
+    escape::markdown as markdown_escaped,
     report::{
         device_fact,
         format::{number, or},
-        lines, machine_fact, markdown_escaped, program_fact,
+        lines, machine_fact, program_fact,
     },
     scenes,
 };

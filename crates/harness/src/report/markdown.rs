@@ -3,11 +3,13 @@
 use std::fmt::Write as _;
 
 use super::{
-    Drawing, Report, escape,
+    Drawing, Report,
+    grid::grid,
     opening::{self, Passage},
     results::UNAVAILABLE,
     tables::Table,
 };
+use crate::escape;
 
 /// The heading of the diagrams that the thesis does not have.
 pub(super) const TRADEOFFS: &str = "More diagrams: error, memory and energy against time";
@@ -56,21 +58,6 @@ fn section(report: &Report<'_>, table: &Table) -> String {
     let [heading, notes] = [heading(table), notes(report, table)].map(|text| escape::markdown(&text));
     let beneath = beneath(report, table).map_or(String::new(), |text| format!("{}\n\n", escape::markdown(&text)));
     format!("### {heading}\n\n{notes}\n\n{}\n{beneath}", grid(table))
-}
-
-/// The lines of a table.
-pub(super) fn grid(table: &Table) -> String {
-    lines(&table.columns, &table.rows)
-}
-
-/// The lines of a table of these columns and rows.
-pub fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
-    let line = |cells: &[String]| {
-        let cells: Vec<_> = cells.iter().map(|cell| escape::markdown(cell)).collect();
-        format!("| {} |\n", cells.join(" | "))
-    };
-    let rule = format!("|{}\n", "---|".repeat(columns.len()));
-    line(columns) + &rule + &rows.iter().map(|row| line(row)).collect::<String>()
 }
 
 fn drawing(drawing: &Drawing) -> String {

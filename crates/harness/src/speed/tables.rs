@@ -6,6 +6,7 @@ use bp_core::Stage;
 
 use super::charts::{Chart, growth, roofline};
 use crate::{
+    escape::{markdown as markdown_escaped, printable},
     record::{
         Outcome, Sample,
         speed::{Contest, Contestant, Entry, Family, Measurement, Speed, StageTime},
@@ -13,7 +14,7 @@ use crate::{
     report::{
         device_fact,
         format::{Spread, mebibytes, number, or, whole},
-        lines, machine_fact, markdown_escaped, printable, program_fact,
+        lines, machine_fact, program_fact,
     },
 };
 

@@ -1,7 +1,7 @@
 //! Strings from records where they are shown: a record may be a stranger's, and so may be every name in it.
 
 /// Text for a terminal: what would move its cursor, or the order of its letters, is replaced.
-pub fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     text.chars().map(|c| if is_shown(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
@@ -14,7 +14,7 @@ fn is_shown(c: char) -> bool {
 
 /// Text within a line or a cell of Markdown, where it neither ends the cell nor becomes HTML, a link or emphasis.
 /// Entities, unlike backslashes, mean the same inside and outside tables.
-pub fn markdown(text: &str) -> String {
+pub(crate) fn markdown(text: &str) -> String {
     let text: Vec<char> = printable(text).chars().collect();
     let mut escaped = String::with_capacity(text.len());
     for (i, &c) in text.iter().enumerate() {
