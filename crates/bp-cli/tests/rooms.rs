@@ -17,7 +17,7 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("bp-testkit", &["bp-core"]),
     ("bp-cpu-scalar", &["bp-core"]),
     ("bp-cpu-rayon", &["bp-core"]),
-    ("bp-gpu", &["bp-core", "bp-shaders"]),
+    ("bp-gpu", &["bp-core", "bp-shaders", "bp-testkit"]),
     ("bp-vulkan", &["bp-core", "bp-gpu"]),
     ("bp-wgpu", &["bp-core", "bp-gpu"]),
     ("bp-io", &["bp-core"]),
@@ -89,13 +89,18 @@ fn a_build_without_gpu_backends_has_no_crate_of_theirs() {
     assert!(!tree.lines().any(|line| line.starts_with("resvg") || line.starts_with("harness")), "{tree}");
 }
 
+/// Files of libraries that only tests use.
+const IS_FOR_TESTS: [&str; 2] = ["tests.rs", "conformance.rs"];
+
 /// All lines of a library's sources that are no tests, with their files.
 fn lines(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut lines = Vec::new();
     for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         if path.is_dir() {
             lines.extend(self::lines(&path));
-        } else if path.extension().is_some_and(|ending| ending == "rs") && !path.ends_with("tests.rs") {
+        } else if path.extension().is_some_and(|ending| ending == "rs")
+            && !IS_FOR_TESTS.iter().any(|name| path.ends_with(name))
+        {
             let text = fs::read_to_string(&path).unwrap();
             let tests = text.find("#[cfg(test)]\nmod tests").unwrap_or(text.len());
             lines.extend(text[..tests].lines().map(|line| (path.clone(), line.to_owned())));
