@@ -1,6 +1,6 @@
 //! Backends as the experiments open them.
 
 #[cfg(test)]
-pub mod flaky;
+pub(crate) mod flaky;
 
 pub(crate) use bp_stereo::devices::{ALL, Opened, choose, reason, reference};

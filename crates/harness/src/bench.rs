@@ -5,8 +5,9 @@
 mod list;
 mod settings;
 
-use std::{collections::HashSet, ffi::OsString, path::Path, time::Duration};
+use std::{collections::HashSet, ffi::OsString, path::Path};
 
+pub use list::Bench;
 use list::Of;
 use settings::Settings;
 
@@ -22,30 +23,6 @@ use crate::{
     speed::{self, Files, SpeedOptions},
     threads,
 };
-
-/// One time of one contestant, as criterion is to know it.
-#[derive(Clone, Debug)]
-pub struct Bench {
-    /// The table, or the kernel, that it belongs to.
-    pub group: String,
-    /// Its name in the group.
-    pub name: String,
-    /// Message entries that a sample computes, where the time is that of computing them.
-    pub entries: Option<u64>,
-    /// Bytes that a sample reads and writes at least, where they are counted.
-    pub bytes: Option<u64>,
-    /// Every sample in the order taken; none of what was not asked for or cannot be measured.
-    pub samples: Vec<Duration>,
-    of: Of,
-}
-
-impl Bench {
-    /// The name that criterion gives it, and filters by.
-    #[must_use]
-    pub fn id(&self) -> String {
-        format!("{}/{}", self.group, self.name)
-    }
-}
 
 /// Reads a variable of the environment, by its name.
 pub type Environment<'a> = dyn Fn(&str) -> Option<OsString> + Sync + 'a;

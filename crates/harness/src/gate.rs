@@ -10,24 +10,23 @@ mod judge;
 mod measure;
 mod renew;
 mod runners;
+mod subject;
 mod table;
 #[cfg(test)]
 mod tests;
 mod verdict;
 
-use std::path::PathBuf;
-
 use bp_stereo::Watch;
 
-use crate::{failure::Failure, machine, record::Machine, scenes};
+use crate::{failure::Failure, machine, scenes};
 use baseline::Baselines;
 pub use callgrind::Counted;
-use guarded::Guarded;
 pub use instructions::instructions;
 pub use judge::Judgement;
-use measure::{Measured, Problem, measure};
-pub use renew::Renewal;
+use measure::Problem;
 use runners::Runners;
+use subject::Gate;
+pub use subject::{GateOptions, Renewal};
 pub use table::page;
 
 /// Whether the text of a file holds baselines, of one kind or the other.
@@ -45,19 +44,6 @@ const QUICK: (usize, usize, u32) = (3, 40, 18);
 /// Measurements that a baseline is the median of: each makes everything ready anew, and where memory happens to lie
 /// is a part of the noise.
 const MEASUREMENTS_OF_A_BASELINE: usize = 3;
-
-/// What is measured, and what it is held against.
-#[derive(Debug)]
-pub struct GateOptions {
-    /// A smaller image and fewer loops.
-    pub quick: bool,
-    /// Rounds of a measurement.
-    pub rounds: u32,
-    /// The folder of the baselines.
-    pub baselines: PathBuf,
-    /// Baselines to write anew.
-    pub update: Option<Renewal>,
-}
 
 /// Measures and judges, or renews the baselines if that is asked for.
 pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
@@ -84,24 +70,4 @@ pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failu
 fn problem(quick: bool) -> Result<Problem, Failure> {
     let (divisor, labels, k) = if quick { QUICK } else { FULL };
     Ok(Problem { scene: scenes::made_up(0, divisor)?, labels, k })
-}
-
-/// What is measured, and where.
-struct Gate<'a> {
-    options: &'a GateOptions,
-    guarded: Vec<Guarded>,
-    problem: Problem,
-    runners: Runners,
-    machine: Machine,
-}
-
-impl Gate<'_> {
-    fn measure(&self, watch: &Watch<'_>) -> Result<Measured, Failure> {
-        measure(&self.guarded, &self.runners, &self.problem, self.options.rounds, watch)
-    }
-
-    /// Which of a baseline's runs is like this one.
-    fn setting(&self) -> &'static str {
-        if self.options.quick { "quick" } else { "full" }
-    }
 }

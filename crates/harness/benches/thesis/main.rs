@@ -23,6 +23,7 @@ use std::{
     process::{Command, ExitCode},
 };
 
+use bp_stereo::{Event, Stop, Watch};
 use criterion::Criterion;
 use harness::bench;
 

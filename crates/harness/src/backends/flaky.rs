@@ -8,9 +8,9 @@ use super::Opened;
 
 /// Its device solves one problem, and is lost until it is opened again.
 #[derive(Default)]
-pub struct Flaky {
+pub(crate) struct Flaky {
     /// How often its device was opened.
-    pub opened: AtomicUsize,
+    pub(crate) opened: AtomicUsize,
 }
 
 impl Backend for Flaky {
@@ -43,6 +43,6 @@ impl Device for Once {
 }
 
 /// Its device, open.
-pub fn open(backend: &'static Flaky) -> Result<Opened, Error> {
+pub(crate) fn open(backend: &'static Flaky) -> Result<Opened, Error> {
     Opened::of(backend, 0)
 }

@@ -4,13 +4,36 @@ use std::time::Duration;
 
 use bp_core::Stage;
 
-use super::Bench;
 use crate::{
     record::{Cell, Record, Sample, speed::Speed},
     report::table_of_times,
     reproduce,
     speed::Problem,
 };
+
+/// One time of one contestant, as criterion is to know it.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// The table, or the kernel, that it belongs to.
+    pub group: String,
+    /// Its name in the group.
+    pub name: String,
+    /// Message entries that a sample computes, where the time is that of computing them.
+    pub entries: Option<u64>,
+    /// Bytes that a sample reads and writes at least, where they are counted.
+    pub bytes: Option<u64>,
+    /// Every sample in the order taken; none of what was not asked for or cannot be measured.
+    pub samples: Vec<Duration>,
+    pub(super) of: Of,
+}
+
+impl Bench {
+    /// The name that criterion gives it, and filters by.
+    #[must_use]
+    pub fn id(&self) -> String {
+        format!("{}/{}", self.group, self.name)
+    }
+}
 
 /// What has to be measured for a bench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

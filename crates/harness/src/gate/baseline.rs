@@ -7,7 +7,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{file, renew::Renewal};
+use super::{file, subject::Renewal};
 use crate::{failure::Failure, machine, record::Machine};
 
 /// A file. Which machine it is for, its name tells programs and its fields tell readers.

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::{
-    Gate,
     baseline::{Baseline, Baselines, Expected},
     guarded::Guarded,
     measure::{Fact, Measured},
+    subject::Gate,
     verdict::{Ratio, Verdict},
 };
 use crate::{

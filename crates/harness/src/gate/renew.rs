@@ -1,21 +1,12 @@
 //! New baselines from measurements.
 
 use super::{
-    Gate,
     baseline::{Baseline, Baselines, Expected},
     guarded::Guarded,
     measure::{Fact, Measured},
+    subject::{Gate, Renewal},
 };
 use crate::{failure::Failure, machine, statistics::median};
-
-/// Which baselines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Renewal {
-    /// The file for this kind of machine.
-    Here,
-    /// That and the file for all machines.
-    Everywhere,
-}
 
 impl Gate<'_> {
     /// Puts what was measured into the baselines and writes them; the names of the files.

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{baseline::Baseline, *};
+use super::{baseline::Baseline, measure::Measured, *};
 
 /// The processor's backends on a tiny scene.
 fn gate(options: &GateOptions) -> Gate<'_> {

@@ -23,7 +23,8 @@ pub fn markdown(text: &str) -> String {
         let within_word = is(i.checked_sub(1), char::is_alphanumeric) && is(Some(i + 1), char::is_alphanumeric);
         // An address links itself.
         let of_address = c == ':' && is(Some(i + 1), |next| next == '/');
-        let special = matches!(c, '&' | '<' | '|' | '\\' | '`' | '*' | '[' | ']' | '~' | '@') || of_address;
+        let special = matches!(c, '&' | '<' | '|' | '\\' | '`' | '*' | '[' | ']' | '~') || of_address;
+        let special = special || (c == '@' && !are_threads(&text[i + 1..]));
         if special || (c == '_' && !within_word) {
             escaped += &format!("&#{};", u32::from(c));
         } else {
@@ -31,6 +32,12 @@ pub fn markdown(text: &str) -> String {
         }
     }
     escaped
+}
+
+/// Whether the word after an @ is a number, as in `rayon@2`: then it names no person and no address.
+fn are_threads(text: &[char]) -> bool {
+    let word = || text.iter().take_while(|c| c.is_alphanumeric() || matches!(c, '.' | '-' | '_'));
+    word().count() > 0 && word().all(char::is_ascii_digit)
 }
 
 #[cfg(test)]
@@ -42,12 +49,18 @@ mod tests {
         assert_eq!(markdown("GPU | 9 <b>"), "GPU &#124; 9 &#60;b>");
         assert_eq!(markdown("[a](http://b) `c` *d* \\"), "&#91;a&#93;(http&#58;//b) &#96;c&#96; &#42;d&#42; &#92;");
         assert_eq!(markdown("a\r\n# b\u{1b}[2J\u{202e}c"), "a\u{fffd}\u{fffd}# b\u{fffd}&#91;2J\u{fffd}c");
-        assert_eq!(markdown("_a_ &lt; m@n"), "&#95;a&#95; &#38;lt; m&#64;n");
+        assert_eq!(markdown("_a_ &lt; m@n m@1.n"), "&#95;a&#95; &#38;lt; m&#64;n m&#64;1.n");
     }
 
     #[test]
     fn ordinary_names_stay_as_they_are() {
-        for name in ["llvmpipe (LLVM 15.0.6, 256 bits)", "x86_64-unknown-linux-gnu", "CTCSBP, Z''''=2", "B>1, %: 3.5"] {
+        for name in [
+            "rayon@2, ms",
+            "llvmpipe (LLVM 15.0.6, 256 bits)",
+            "x86_64-unknown-linux-gnu",
+            "CTCSBP, Z''''=2",
+            "B>1, %: 3.5",
+        ] {
             assert_eq!(markdown(name), name);
         }
     }

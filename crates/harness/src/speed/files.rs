@@ -6,7 +6,7 @@ use bp_charts::png;
 
 use super::{
     charts::{self, charts},
-    page,
+    tables::page,
 };
 use crate::{
     failure::Failure,

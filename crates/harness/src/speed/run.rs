@@ -1,18 +1,14 @@
 //! Takes the samples of `bp speed`, one problem after another.
 
-use std::cell::RefCell;
+use std::{cell::RefCell, path::PathBuf};
 
 use bp_core::{Plan, StereoPair};
+use bp_stereo::Watch;
 use bp_testkit::synthetic;
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 
-use super::{
-    SpeedOptions,
-    problems::{self, Problem},
-};
-use bp_stereo::Watch;
-
+use super::problems::{self, Problem};
 use crate::{
     failure::Failure,
     files::hex,
@@ -32,6 +28,19 @@ const SLOW_ROUNDS: u32 = 3;
 
 /// A quick run divides the sides of images by this.
 const QUICK_DIVISOR: usize = 3;
+
+/// What is measured.
+#[derive(Debug, Default)]
+pub struct SpeedOptions {
+    /// The problems, by the names in [`Problem::ASKED`]; none means all but those that take long.
+    pub problems: Vec<String>,
+    /// Rounds, by default nine, or one in a quick run.
+    pub rounds: Option<u32>,
+    /// Images of a third of the width and height.
+    pub quick: bool,
+    /// The folder of the record, the page and the charts.
+    pub output: Option<PathBuf>,
+}
 
 /// Measures what is asked for on these devices, at least one of which is open.
 pub fn measure(options: &SpeedOptions, asked: &[Asked], watch: &Watch<'_>) -> Result<Speed, Failure> {
