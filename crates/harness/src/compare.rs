@@ -10,9 +10,9 @@ use speed_ups::SpeedUps;
 pub use tables::page;
 
 use crate::{
+    escape::printable,
     failure::Failure,
     record::{Cell, Device, Machine, Measurement, Program, Record, Sample, Settings},
-    report::printable,
     summary::{Group, groups, interval, mean, mean_of_medians, ratio_interval, samples},
 };
 

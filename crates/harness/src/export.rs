@@ -5,9 +5,9 @@ mod table;
 mod vega;
 
 use crate::{
+    escape::printable,
     failure::Failure,
     record::{Measurement, Record, Sample},
-    report::printable,
     summary::{Group, groups, interval, mean_of_medians, samples},
 };
 

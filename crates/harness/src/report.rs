@@ -1,7 +1,6 @@
 //! Tables, charts and pages, made from a record and from nothing else.
 
 mod diagrams;
-mod escape;
 mod figures;
 pub mod format;
 mod html;
@@ -18,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use bp_charts::png;
 
-pub use escape::{markdown as markdown_escaped, printable};
+pub use crate::escape::{markdown as markdown_escaped, printable};
 pub use markdown::lines;
 pub use opening::headline;
 pub use opening::{device_fact, machine_fact, program_fact};

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::{
+    escape::printable,
     failure::Failure,
     record::{Cell, Clock, Measurement, Record, Sample},
-    report::printable,
 };
 
 /// A row; its fields are the columns.

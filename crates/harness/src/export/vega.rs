@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{setting, times};
-use crate::{record::Record, report::printable};
+use crate::{escape::printable, record::Record};
 
 /// Total times of every plan and backend, with their intervals and the numbers in it.
 pub(super) fn chart(record: &Record) -> Value {

@@ -15,7 +15,7 @@ use super::{
     Cell, Record, SCHEMA_VERSION,
     speed::{self, Speed},
 };
-use crate::{failure::Failure, report::printable};
+use crate::{escape::printable, failure::Failure};
 
 /// Name of the record in a run's folder.
 pub const RECORD_FILE: &str = "record.json";

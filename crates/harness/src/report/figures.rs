@@ -7,13 +7,14 @@ use bp_core::{DisparityMap, Size};
 use maud::html;
 
 use super::{
-    Drawing, printable,
+    Drawing,
     results::Results,
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, ours::CENSUS},
 };
 use bp_io::{Colours, encode_picture};
 
 use crate::{
+    escape::printable,
     failure::Failure,
     files::{PixelLimit, read_map},
 };

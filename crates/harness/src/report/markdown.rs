@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 
 use super::{
-    Drawing, Report, escape,
+    Drawing, Report,
     opening::{self, Passage},
     results::UNAVAILABLE,
     tables::Table,
 };
+use crate::escape;
 
 /// The heading of the diagrams that the thesis does not have.
 pub(super) const TRADEOFFS: &str = "More diagrams: error, memory and energy against time";

@@ -3,13 +3,15 @@
 use std::path::{Component, Path};
 
 use super::{
-    escape::markdown,
     format::{Spread, mebibytes, number, or},
     markdown::grid,
     results::{Part, Results, Row},
     tables::{Named, Table, ours::all_plans},
 };
-use crate::record::{Device, Measurement};
+use crate::{
+    escape::markdown,
+    record::{Device, Measurement},
+};
 
 /// Marks where the part begins.
 pub(super) const BEGIN: &str = "<!-- results: begin -->";
