@@ -3,9 +3,8 @@
 use super::{
     Report,
     format::number,
-    readme,
     results::{Part, Results},
-    tables::{BP, Named, Table, ours::all_plans, thesis_plans},
+    tables::{BP, Named, Table, means, ours::all_plans, thesis_plans},
 };
 use crate::record::{Device, Machine, Program, Record};
 
@@ -36,7 +35,7 @@ pub(super) fn passages(report: &Report<'_>) -> Vec<Passage> {
     let thesis = format!("The experiment follows this thesis: {AUTHOR}, \"{TITLE}\", {YEAR}.");
     let abbreviations = "In every chart a plan keeps its name and the shape of its marker. BP is belief propagation.";
     vec![
-        Passage { title: "What came out", lines: outcomes(results), table: Some(readme::table(results)) },
+        Passage { title: "What came out", lines: outcomes(results), table: Some(means::table(results)) },
         Passage { title: "What ran", lines: [vec![thesis], what_ran(results)].concat(), table: None },
         Passage { title: "Where it ran", lines: where_it_ran(results), table: None },
         Passage { title: "Why printed and measured numbers differ", lines: WHY.map(str::to_owned).into(), table: None },

@@ -3,15 +3,11 @@
 use std::path::{Component, Path};
 
 use super::{
-    format::{Spread, mebibytes, number, or},
     grid::grid,
-    results::{Part, Results, Row},
-    tables::{Named, Table, ours::all_plans},
+    results::Results,
+    tables::{means, ours::all_plans},
 };
-use crate::{
-    escape::markdown,
-    record::{Device, Measurement},
-};
+use crate::{escape::markdown, record::Device};
 
 /// Marks where the part begins.
 pub(super) const BEGIN: &str = "<!-- results: begin -->";
@@ -52,7 +48,7 @@ pub(super) fn part(page: &Path, run: &Path, results: &Results<'_>) -> String {
         own_plans(results)
     );
     let chart = format!("![Speed-up of all algorithms over BP, printed and measured]({link}/diagram-4.12.svg)");
-    format!("{chart}\n\n{}\n{note}\n", grid(&table(results)))
+    format!("{chart}\n\n{}\n{note}\n", grid(&means::table(results)))
 }
 
 /// What our plans are, in a sentence.
@@ -73,60 +69,6 @@ fn link(page: &Path, run: &Path) -> String {
 /// How many threads share the work, where a device is not asked as one.
 fn workers(device: &Device) -> String {
     if device.api.is_some() { String::new() } else { format!(" (workers: {})", device.workers) }
-}
-
-/// A row for each plan: printed and measured speed-ups over BP, times, and what no backend changes.
-pub(super) fn table(results: &Results<'_>) -> Table {
-    let backends: Vec<&str> = results.devices().into_iter().map(|(backend, _)| backend).collect();
-    let each = |what: &str| backends.iter().map(|backend| format!("{what} {}", results.label(backend))).collect();
-    let columns: Vec<String> = [
-        vec!["plan".to_owned(), "speed-up, %: printed".to_owned()],
-        each("speed-up, %:"),
-        each("ms:"),
-        ["memory, MiB", "wrong by > 1 px, non-occluded, %", "all, %", "RMSE, px"].map(str::to_owned).into(),
-    ]
-    .concat();
-    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
-    Table::new("", "", &columns).rows(all_plans(results).iter().map(|plan| row(results, &backends, plan)))
-}
-
-fn row(results: &Results<'_>, backends: &[&str], plan: &Named) -> Vec<String> {
-    let of_each = |value: &dyn Fn(&Row<'_>) -> Option<f64>, decimals| -> Vec<String> {
-        let cell = |&backend: &&str| {
-            let none = results.missing_mean(backend, plan.plan, "-");
-            or(results.mean(backend, value).map(|mean| number(mean, decimals)), none)
-        };
-        backends.iter().map(cell).collect()
-    };
-    let percent = |row: &Row<'_>| {
-        Some((row.speed_up(plan.plan, Part::Total)?.median - 1.0) * 100.0).filter(|_| plan.plan != "bp")
-    };
-    let printed = |row: &Row<'_>| results.thesis.speed_up_percent(plan.printed?, row.index);
-    let printed = backends.first().and_then(|backend| results.mean(backend, printed));
-    let means = |of: fn(&Measurement) -> f64| {
-        backends.iter().filter_map(move |backend| results.mean(backend, |row| row.measured(plan.plan).map(of)))
-    };
-    let memory = Spread::of(means(|measured| mebibytes(measured.allocated_bytes)));
-    // All backends give the same labels, so the first one with numbers is enough.
-    let error = |of| or(means(of).next().map(|mean| number(mean, 1)), "-");
-    let [bad, all, rmse] = [
-        error(|measured| measured.visible.bad[1]),
-        error(|measured| measured.all.bad[1]),
-        error(|measured| measured.all.rmse),
-    ];
-    [
-        vec![plan.title.to_owned(), or(printed.map(|mean| number(mean, 1)), "-")],
-        of_each(&percent, 0),
-        of_each(&|row| Some(row.time(plan.plan, Part::Total)?.median), 1),
-        vec![or(memory.map(range), "-"), bad, all, rmse],
-    ]
-    .concat()
-}
-
-/// The least and the largest number, or the one where both are shown alike.
-fn range(spread: Spread) -> String {
-    let [low, high] = [spread.low, spread.high].map(|value| number(value, 0));
-    if low == high { low } else { format!("{low} to {high}") }
 }
 
 #[cfg(test)]

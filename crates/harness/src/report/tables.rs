@@ -1,6 +1,7 @@
 //! The tables of the thesis, 3.1 to 3.29, and ours.
 
 mod compared;
+pub(super) mod means;
 mod measured;
 pub(super) mod ours;
 mod setting;
