@@ -54,7 +54,7 @@ pub struct ReproduceOptions {
     pub backends: Vec<String>,
     /// Threads that the devices must work with.
     pub threads: Option<u16>,
-    /// Samples of a cell, by default [`SAMPLES`], or one in a quick run.
+    /// Samples of a cell, by default five, or one in a quick run.
     pub samples: Option<u32>,
     /// The folder of recorded runs.
     pub results: PathBuf,

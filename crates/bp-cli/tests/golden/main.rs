@@ -15,6 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Commands by their names; the empty one is the program itself.
+#[cfg(all(feature = "vulkan", feature = "wgpu"))]
 const COMMANDS: [&str; 16] = [
     "",
     "match",
