@@ -1,5 +1,7 @@
 //! Errors, sorted by who can fix them.
 
+use bytesize::ByteSize;
+
 use crate::{
     limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
     size::Size,
@@ -72,7 +74,7 @@ pub enum Error {
     #[error("{0}")]
     Plan(&'static str),
     /// More memory needed than available.
-    #[error("out of memory: {needed} bytes are needed for {what}{}", available.map_or_else(String::new, |bytes| format!(" and {bytes} are available")))]
+    #[error("out of memory: {} needed for {what}{}", iec(*needed), but_only(*available))]
     OutOfMemory {
         /// The purpose of the memory.
         what: &'static str,
@@ -126,4 +128,13 @@ pub enum Error {
     /// The observer asked to stop.
     #[error("interrupted")]
     Stopped,
+}
+
+/// Bytes in a unit that people use.
+fn iec(bytes: u64) -> String {
+    ByteSize(bytes).display().iec().to_string()
+}
+
+fn but_only(available: Option<u64>) -> String {
+    available.map_or_else(String::new, |bytes| format!(", but only {} is available", iec(bytes)))
 }

@@ -10,8 +10,9 @@ use crate::record::{Device, Machine, Program, Record};
 
 /// The thesis. CITATION.cff names it too.
 const AUTHOR: &str = "Doan Van Tuan";
-const TITLE: &str =
-    "Summary of a PhD thesis on speeding up belief propagation for stereo matching (CFBP, CFCSBP, CTBP, CTCSBP)";
+const TITLE: &str = "Nghiên cứu giải pháp nâng cao tốc độ xử lý tín hiệu trong hệ thống thị giác nổi";
+const ENGLISH: &str = "Research on solutions to speed up signal processing in stereo vision systems";
+const INSTITUTION: &str = "Academy of Military Science and Technology, Hanoi";
 const YEAR: &str = "2019";
 
 const WHY: [&str; 3] = [
@@ -32,7 +33,8 @@ pub(super) struct Passage {
 /// The summary, in order.
 pub(super) fn passages(report: &Report<'_>) -> Vec<Passage> {
     let results = &report.results;
-    let thesis = format!("The experiment follows this thesis: {AUTHOR}, \"{TITLE}\", {YEAR}.");
+    let thesis =
+        format!("The experiment follows this PhD thesis: {AUTHOR}, \"{TITLE}\" ({ENGLISH}), {INSTITUTION}, {YEAR}.");
     let abbreviations = "In every chart a plan keeps its name and the shape of its marker. BP is belief propagation.";
     vec![
         Passage { title: "What came out", lines: outcomes(results), table: Some(means::table(results)) },
@@ -161,7 +163,9 @@ mod tests {
     fn the_thesis_is_named_as_in_the_citation_file() {
         let citation = include_str!("../../../../CITATION.cff");
         let (family, given) = AUTHOR.split_once(' ').unwrap();
-        for part in [TITLE, &format!("\"{family}\", given-names: \"{given}\""), &format!("year: {YEAR}")] {
+        for part in
+            [TITLE, ENGLISH, INSTITUTION, &format!("\"{family}\", given-names: \"{given}\""), &format!("year: {YEAR}")]
+        {
             assert!(citation.contains(part), "{part}");
         }
     }
