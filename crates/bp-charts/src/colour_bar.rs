@@ -1,4 +1,4 @@
-//! A colour bar with numbers: the scale of a picture beside it.
+//! A colour bar with numbers, the scale of the picture that it is drawn next to.
 
 use plotters::{coord::types::RangedCoordf64, prelude::Ranged};
 
@@ -24,7 +24,7 @@ pub struct ColourBar<'a> {
     pub high: f64,
     /// The text above it.
     pub unit: &'a str,
-    /// The height of the picture beside it. The bar has the same height, within bounds.
+    /// The height of the picture that the bar belongs to. The bar gets the same height, within bounds.
     pub height: u32,
 }
 

@@ -8,7 +8,7 @@ use crate::{
     style::{MARKER_UNIT, draw_dashes, draw_line, draw_marker},
 };
 
-/// The look of an entry beside its name.
+/// The marker or line that stands for an entry.
 pub(crate) enum Look<'a> {
     Of(Style),
     Level(&'a Level),

@@ -111,7 +111,7 @@ impl Image {
         Self { size: Size { width, height: rows.len() }, above, below, pixels: pixels.into() }
     }
 
-    /// Copies some columns to an image of its own, those of the apron included. The columns beside them are lost.
+    /// Copies some columns, including those of the apron, to a new image. The other columns are not kept.
     ///
     /// # Panics
     /// If `columns` is empty or lies outside the image.

@@ -24,7 +24,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What stands in the way.
+        /// Why it cannot be written.
         reason: String,
     },
     /// The caller asks for something that this path cannot be: an unknown ending, a value beyond the format, a file that is

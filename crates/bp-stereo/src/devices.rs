@@ -182,7 +182,7 @@ fn no_backend(name: &str) -> Error {
     Error::Unavailable(format!("`backend` {name}: this build has {}{advice}", known.join(", ")))
 }
 
-/// The failure to find one device, with a list of what there is.
+/// The error when a name matches no device, or several. It lists all devices.
 fn not_one(backend: &dyn Backend, devices: &[DeviceInfo], wanted: &str, found: usize) -> Error {
     let line =
         |(index, device): (usize, &DeviceInfo)| format!("\n  {:<12}{}", device_name(backend, index), device.name);

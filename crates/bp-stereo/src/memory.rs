@@ -13,7 +13,7 @@ const PAIR: u64 = 6;
 /// Bytes a pixel of known truth.
 const TRUTH: u64 = 5;
 
-/// Bytes a pixel of the map, and of what is made of it at a time to be written: most for a picture with a bar beside it.
+/// Bytes per pixel of the map, and of the largest output made from it: a picture with a colour bar.
 const MAP: u64 = 4;
 const WRITING: u64 = 8;
 

@@ -66,7 +66,7 @@ pub(super) struct Run<'a> {
     pub(super) warned: Warned,
 }
 
-/// How many pairs had each warning. The first one is told at once, the others in one sentence at the end.
+/// Counts the pairs with each warning. The first is reported at once; one sentence at the end counts the others.
 #[derive(Default)]
 pub(super) struct Warned(Mutex<BTreeMap<&'static str, usize>>);
 
