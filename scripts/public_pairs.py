@@ -1,4 +1,4 @@
-"""What scripts share that run `bp`: the program, the public pairs, runs, errors, tables."""
+"""Shared code of the scripts that run `bp`: the program, the public pairs, runs, errors, tables."""
 import argparse, datetime, importlib.util, json, os, pathlib, platform, statistics, subprocess, sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -7,14 +7,14 @@ BP = TARGET / "release" / "bp"
 VENV = TARGET / "opencv-venv"
 BESIDE = ROOT.parent / "shared" / "data"
 DATA = pathlib.Path(os.environ.get("BP_DATA") or (BESIDE if BESIDE.is_dir() else "data"))
-TIMED = 3  # matches of each round, after one that is not timed
+TIMED = 3  # timed matches per round, after one warm-up
 
-# Pair: labels, then left, right, truth, and what tells the visible pixels, in the data folder.
+# Pair: labels, folder, and files: left, right, truth, and the option and file that define the non-occluded pixels.
 OLD, NEW = "middlebury2001-2003", "middlebury2006"
 OLD_FILES = ("imL.png", "imR.png", "groundtruth.png", "--mask", "nonocc.png")
 NEW_FILES = ("view1.png", "view5.png", "disp1.png", "--ground-truth-right", "disp5.png")
 OLD_PAIRS = {"tsukuba": (16, f"{OLD}/tsukuba", OLD_FILES), "cones": (64, f"{OLD}/cones", OLD_FILES)}
-# The thesis's six, at half size, and at a third.
+# The thesis's six pairs, at half size and at third size.
 NAMES = ("Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books")
 SIX = {name: (112, f"{NEW}/{name}", NEW_FILES) for name in NAMES}
 THIRDS = {name: (80, f"{NEW}-thirdsize/{name}", NEW_FILES) for name in NAMES}
@@ -28,7 +28,7 @@ def parser(description):
 
 
 def enter_venv(folder):
-    """Goes on in the virtual environment, made where it is missing."""
+    """Restarts the script in the virtual environment, and creates that if it is missing."""
     python = folder / "bin" / "python"
     if pathlib.Path(sys.prefix).resolve() != folder.resolve():
         if not python.exists():
@@ -56,7 +56,7 @@ class Pair:
         self.truth = [data / folder / truth, "--scale", scale, option, data / folder / visible]
         missing = [path for path in (*self.images, data / folder / truth) if not path.exists()]
         if missing:
-            raise SystemExit(f"--data {data}: there is no {missing[0]}; see scripts/fetch-middlebury")
+            raise SystemExit(f"--data {data}: {missing[0]} is missing; see scripts/fetch-middlebury")
 
     def errors(self, path):
         report = bp("evaluate", path, *self.truth)

@@ -1,6 +1,6 @@
 // Data costs of a coarser grid. A node sums the costs of its children, four at most, label by label.
 
-// The nodes of the finer grid of colour 0 and 1: their sums, and their stored costs, which serve if they were never clipped.
+// The finer grid's nodes of colour 0 and 1: their stored costs, which are read if never clipped, and their sums.
 @group(0) @binding(3) var<storage, read> even_costs: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> odd_costs: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read> even_sums: array<vec2<u32>>;
@@ -9,12 +9,12 @@
 // The bytes of the finer grid's sums; 0 to read its stored costs instead.
 override FINE_SUM_BYTES: u32 = 0;
 
-// Two of a word's four 16-bit sums, those of the nodes 2 apart from `parity`.
+// Two of a word's four 16-bit sums: those of nodes `parity` and `parity + 2`.
 fn halves(word: vec2<u32>, parity: u32) -> vec2<u32> {
     return (word >> vec2(16 * parity)) & vec2(0xffffu);
 }
 
-// Costs of one of the quad's labels at two nodes of a finer word, those 2 apart from `parity`; index in vectors.
+// Costs of one label of a quad at nodes `parity` and `parity + 2` of a finer word. `index` counts vectors.
 fn fine_sums(colour: u32, index: u32, label: u32, parity: u32) -> vec2<u32> {
     let at = 4 * index + label;
     if FINE_SUM_BYTES == 2 {
@@ -29,7 +29,7 @@ fn fine_sums(colour: u32, index: u32, label: u32, parity: u32) -> vec2<u32> {
     return vec2(odd_sums[2 * at][parity], odd_sums[2 * at + 1][parity]);
 }
 
-// Costs of a quad of labels at the two nodes: a vector of labels for each.
+// Costs of a quad of labels at these two nodes, one vector of labels per node.
 struct Pair {
     first: vec4<u32>,
     second: vec4<u32>,
@@ -53,13 +53,13 @@ fn fine_pair(colour: u32, index: u32, parity: u32) -> Pair {
     return Pair(vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y));
 }
 
-// Coarse column X has the fine columns 2 X and 2 X + 1. In an even row the first has colour 0, in an odd row colour 1;
-// both are node X of their row and colour. So the children of the coarse nodes 2 i + parity of a word lie in two words,
-// at bytes parity and parity + 2.
+// Coarse column X has the fine columns 2 X and 2 X + 1. The first has colour 0 in an even row and colour 1 in an odd
+// row. Both are node X of their row and colour. So the children of the coarse nodes 2 i + parity of a word lie in two
+// words, at bytes parity and parity + 2.
 fn children(nodes: Nodes, quad: u32) -> array<vec4<u32>, 4> {
     var at: array<vec4<u32>, 4>;
     for (var child_row = 0u; child_row < 2; child_row++) {
-        // Below the last row lie zeros.
+        // The row below the last one holds zeros.
         let row = 2 * nodes.y + child_row - parameters.other_first_row;
         for (var half = 0u; half < 2; half++) {
             let word = 2 * nodes.word + half;
@@ -76,7 +76,7 @@ fn children(nodes: Nodes, quad: u32) -> array<vec4<u32>, 4> {
     return at;
 }
 
-// Costs of four labels at four nodes, a vector of nodes for each label.
+// Costs of four labels at four nodes, one vector of nodes per label.
 fn by_label(at: array<vec4<u32>, 4>) -> array<vec4<u32>, 4> {
     return array(
         vec4(at[0].x, at[1].x, at[2].x, at[3].x),

@@ -1,4 +1,4 @@
-// Grey values of a coarser grid, for the nodes of one colour. A node has the rounded mean of its children, four at most.
+// Grey values of a coarser grid, for the nodes of one colour: the rounded mean of a node's children, at most four.
 
 // The grey values of the finer grid, in the layout of `greys`.
 @group(0) @binding(1) var<storage, read> fine: array<u32>;

@@ -1,8 +1,8 @@
 // Stores the data costs of four nodes, for match_cost and coarsen: normalised by each node's least cost, then clipped. Also
-// stores the unclipped costs if the next coarser grid sums those.
+// stores the unclipped costs if the next coarser grid needs them for its sums.
 
 @group(0) @binding(1) var<storage, read_write> cost: array<vec4<u32>>;
-// [row][quad][word][label of the quad], of 2 or 4 bytes for each of the four nodes.
+// [row][quad][word][label of the quad], with 2 or 4 bytes for each of the four nodes.
 @group(0) @binding(2) var<storage, read_write> sums: array<vec2<u32>>;
 
 // The bytes of a stored sum; 0 if none is stored.

@@ -1,9 +1,9 @@
-// The features of every pixel of one image, which the profile compares: its grey value, its census code or those of its
-// channels, its colour, or its grey value with those beside it.
+// The features that the profile compares, for every pixel of one image: its grey value, its census code or those of its
+// channels, its colour, or its grey value and values derived from its neighbours.
 
 @group(0) @binding(2) var<storage, read_write> values: array<u32>;
 
-// The column dx columns aside. Border columns repeat outward.
+// The column dx columns away. Border columns repeat outward.
 fn aside(x: u32, dx: i32) -> u32 {
     return u32(clamp(i32(x) + dx, 0, i32(parameters.width) - 1));
 }
@@ -21,7 +21,7 @@ fn lightness(x: u32, row: u32) -> vec3<u32> {
 }
 
 // One bit for each neighbour within reach, in row order from the highest bit: 1 if it is lighter (Zabih and Woodfill 1994).
-// The codes of several channels follow each other.
+// The codes of several channels are concatenated.
 fn census(x: u32, row: u32, reach: i32) -> u32 {
     let centre = lightness(x, row);
     var codes = vec3(0u);
@@ -41,7 +41,7 @@ fn gradient(x: u32, row: u32) -> u32 {
     return grey(x, row) | (gradient << 8);
 }
 
-// Grey value, the least and the greatest one up to half a pixel away.
+// Grey value, and the least and the greatest value within half a pixel.
 fn half_samples(x: u32, row: u32) -> u32 {
     let centre = grey(x, row);
     let left = (centre + grey_aside(x, -1, row) + 1) / 2;

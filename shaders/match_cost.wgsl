@@ -1,6 +1,6 @@
 // Data costs of the image, for the nodes of one colour.
 
-// A known match: the point where the cuts cross, its label, and whether there is one.
+// A known match: the point where the cuts cross, its label, and whether it exists.
 struct Seed {
     x: u32,
     y: u32,
@@ -13,7 +13,7 @@ struct Seed {
 @group(0) @binding(4) var<storage, read> right: array<u32>;
 @group(0) @binding(5) var<storage, read> seed: Seed;
 
-// Numbers of the profile.
+// Constants of the profile.
 override LARGEST_COST: u32 = 0;
 override OUT_OF_RANGE_COST: u32 = 0;
 
@@ -37,7 +37,7 @@ fn gradient_difference(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
     return (3 * grey + 35 * gradient + 5) / 10;
 }
 
-// How far the grey value of a lies outside the range around b.
+// By how much the grey value of a lies outside the range around b.
 fn outside(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
     let value = channel(a, 0);
     let least = channel(b, 1);

@@ -1,5 +1,5 @@
-// The data costs of the nodes of one colour, and the messages they received from the other colour, for update_messages and
-// select_labels.
+// Reads the data costs of the nodes of one colour and the messages that they received from the other colour, for
+// update_messages and select_labels.
 
 @group(0) @binding(1) var<storage, read> cost: array<vec4<u32>>;
 // The messages that all nodes of the other colour sent to their left, right, upper and lower neighbours.
@@ -8,8 +8,9 @@
 @group(0) @binding(4) var<storage, read> sent_up: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read> sent_down: array<vec4<u32>>;
 
-// The messages from each side, for a quad of labels. In even columns the left neighbour has the index before the node's own
-// in its row and colour; in odd columns the right neighbour has the next index. All other neighbours have the same index.
+// The messages from each side, for a quad of labels. In its row and colour, a neighbour has the same index as the node,
+// with two exceptions: the left neighbour of an even column has the previous index, and the right neighbour of an odd
+// column has the next one.
 
 fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
     let aligned = sent_right[index];

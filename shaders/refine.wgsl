@@ -1,7 +1,7 @@
 // First messages of a grid: those from the nodes of one colour to one side, copied from the next coarser grid.
 //
-// A node starts with the messages that its parent received last or, under the other rule, with those that its sender's
-// parent sent last. Buffers keep messages with their senders, so this looks for the coarse sender. Under the first rule
+// A node starts with the messages that its parent received last (RECEIVER), or with those that its sender's parent sent
+// last (SENDER). Buffers keep messages with their senders, so this kernel looks for the coarse sender. Under RECEIVER
 // that is the neighbour of the receiver's parent.
 
 @group(0) @binding(1) var<storage, read_write> fine: array<vec4<u32>>;
@@ -11,7 +11,7 @@
 
 const RECEIVER: u32 = 0;
 const SENDER: u32 = 1;
-// Under the schedule `sweep` coarse messages to left and right hold only where the sender is odd.
+// Under the schedule `sweep`, coarse messages to the left and right are valid only if the sender is odd.
 const SWEEP: u32 = 2;
 override START: u32 = RECEIVER;
 
@@ -28,7 +28,7 @@ fn coarse_x(x: u32, y: i32) -> i32 {
     if START == SENDER || parameters.side == UP || parameters.side == DOWN {
         return i32(x / 2);
     }
-    // The sender to the right is left of the receiver's parent, and the other way round.
+    // The sender of a message to the right lies left of the receiver's parent, and vice versa.
     let inward = select(1, -1, parameters.side == RIGHT);
     var sender = i32(x + 1) / 2 + select(0, -1, parameters.side == RIGHT);
     if START == SWEEP && ((sender + y) & 1) == 0 {
@@ -37,9 +37,9 @@ fn coarse_x(x: u32, y: i32) -> i32 {
     return sender;
 }
 
-// Four consecutive nodes of a coarse row and colour, for a quad of labels. Beyond the borders lie zeros.
+// Four consecutive nodes of a coarse row and colour, for a quad of labels. Nodes beyond the borders are zeros.
 fn coarse_nodes(colour: i32, row: u32, first: i32, quad: u32) -> vec4<u32> {
-    // Rounds down also left of the border.
+    // The shift also rounds down left of the border.
     let word = first >> 2;
     let aside = u32(first & 3);
     if aside == 0 {
@@ -49,7 +49,7 @@ fn coarse_nodes(colour: i32, row: u32, first: i32, quad: u32) -> vec4<u32> {
     return (coarse_quad(colour, row, word, quad) >> vec4(8 * aside)) | behind;
 }
 
-// Two bytes of each word, the first ones of two pairs.
+// Moves the two low bytes of each word to bytes 0 and 2.
 fn apart(bytes: vec4<u32>) -> vec4<u32> {
     return (bytes & vec4(0xffu)) | ((bytes & vec4(0xff00u)) << vec4(8u));
 }
@@ -65,7 +65,7 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     return odd[index];
 }
 
-// Which nodes send anything at first.
+// A mask of the nodes that have a neighbour on this side and so a first message.
 fn starting(nodes: Nodes) -> u32 {
     let x = columns(nodes);
     var start = x < vec4(parameters.width);
@@ -86,7 +86,7 @@ fn starting(nodes: Nodes) -> u32 {
     return bytes_where(start);
 }
 
-// Two words of the finer row.
+// An invocation computes two words of a fine row.
 @compute @workgroup_size(64)
 fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let row_pairs = (parameters.words + 1) / 2;
@@ -99,7 +99,7 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let is_pair = nodes.word + 1 < parameters.words;
     let y = coarse_y(nodes.y);
     let row = u32(y + 1 - i32(parameters.other_first_row));
-    // The senders of every second node are neighbours in their row and colour.
+    // The senders of every second node are consecutive in their row and colour.
     let x = columns(nodes);
     let a = coarse_x(x[0], y);
     let b = coarse_x(x[1], y);

@@ -1,17 +1,17 @@
-// Labels of the nodes of one colour: by the lowest belief or, under the schedule `sweep`, one after another.
+// Labels of the nodes of one colour: those with the lowest belief or, under the schedule `sweep`, decided in sequence.
 
 // [colour][row of the grid][word], two bytes for each of the four nodes.
 @group(0) @binding(6) var<storage, read_write> labels: array<vec2<u32>>;
 // Grey values; see weak_edges.wgsl.
 @group(0) @binding(7) var<storage, read> greys: array<u32>;
 
-// Enough for 1024 labels and those that fill the last quad.
+// Enough for 1024 labels and the padding of the last quad.
 const LABEL_BITS: u32 = 11;
 
 override SWEEP: bool = false;
 override BAND_ROWS: u32 = 32;
 
-// Data cost and the messages that count, for a quad of labels.
+// Data cost plus the messages that count, for a quad of labels.
 fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
     var total = sum(cost[index], from_below(index));
     if !SWEEP || parameters.colour == 0 {
@@ -23,7 +23,7 @@ fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
     return total;
 }
 
-// Labels of four nodes of a row and colour, from node 4 word + shift on, where shift is -1, 0 or 1.
+// Labels of four nodes of a row and colour, starting at node 4 word + shift, where shift is -1, 0 or 1.
 fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
     let first = grid_index(colour, y, 0);
     var found: vec4<u32>;
@@ -35,7 +35,7 @@ fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
     return found;
 }
 
-// Neighbours on one side whose labels are decided already: those, where there are any, and where the edges to them are weak.
+// Neighbours on one side with decided labels: the labels, which neighbours exist, and which edges are weak.
 struct Beside {
     labels: vec4<u32>,
     exist: vec4<bool>,
@@ -48,7 +48,7 @@ struct Decided {
     up: Beside,
 }
 
-// The smoothness cost of a label beside these.
+// The smoothness cost of a label next to these neighbours.
 fn smoothness(label: u32, beside: Beside) -> vec4<u32> {
     let apart = max(vec4(label), beside.labels) - min(vec4(label), beside.labels);
     var cost = min(parameters.slope * apart, vec4(parameters.truncation));
@@ -88,7 +88,8 @@ fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
         known = decided_neighbours(nodes);
     }
     let first = plane_index(nodes.row, nodes.word);
-    // The total above the label: the least of these is the least total, and of equal ones the smallest label.
+    // Each entry holds the total in the high bits and the label in the low bits. So the least entry has the least total
+    // and, among equal totals, the smallest label.
     var best = vec4(0xffffffffu);
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let packed = belief(first + quad * parameters.words, nodes);

@@ -1,16 +1,17 @@
-// What all kernels share: the parameters of a dispatch, where values lie, and arithmetic on four bytes at a time.
+// Shared by all kernels: the parameters of a dispatch, the layout of values, and arithmetic on four bytes at a time.
 //
-// The nodes of a grid are split by colour, x + y even (colour 0) or odd (colour 1): one half-step of the schedule
-// `checkerboard` computes what the nodes of one colour send from what those of the other colour sent. Node i of a row and
-// colour is the one at column x = 2 i + parity, where parity = (y + colour) mod 2.
+// The nodes of a grid are split by colour: x + y is even (colour 0) or odd (colour 1). One half-step of the schedule
+// `checkerboard` computes the messages that the nodes of one colour send from those that the other colour sent. Node i
+// of a row and colour has the column x = 2 i + parity, where parity = (y + colour) mod 2.
 //
-// A plane holds a byte for each label of each node of one colour: [row][quad][word] vec4<u32>. A component of a vector is
-// one of four labels in a row (a quad), its four bytes are four nodes in a row (a word). So neighbouring invocations read
-// neighbouring vectors, all four neighbours of a node lie in the plane of the other colour, at most one byte aside, and
-// one operation works on 16 values. The row above the first and the one below the last hold zeros, or the next strip's.
+// A plane holds a byte for each label of each node of one colour: [row][quad][word] vec4<u32>. Each component of a
+// vector is one of four consecutive labels (a quad). Its four bytes are four consecutive nodes (a word). So
+// neighbouring invocations read neighbouring vectors, and one operation works on 16 values. All four neighbours of a
+// node lie in the plane of the other colour, at most one byte away. The rows above the first and below the last row
+// hold zeros, or a row of the adjacent strip.
 //
-// Bytes of nodes beyond the image's right border are zero in all planes. Labels beyond the last one, up to a whole quad,
-// have data costs so high that they change no message.
+// Bytes of nodes beyond the image's right border are zero in all planes. Labels that pad the last quad have data costs
+// so high that they change no message.
 
 struct Parameters {
     // The grid: its size in nodes, words in a row of a plane, labels and quads of labels.
@@ -19,35 +20,35 @@ struct Parameters {
     words: u32,
     labels: u32,
     quads: u32,
-    // The strip: row of the grid that its row 0 is.
+    // The strip: the row of the grid that is its row 0.
     first_row: u32,
-    // The dispatch: nodes of which colour, in rows row, row + row_step, ... of the strip, so many.
+    // The dispatch: the colour of its nodes, and its rows of the strip (row, row + row_step, ...) and their number.
     colour: u32,
     row: u32,
     row_step: u32,
     rows: u32,
-    // The model: smoothness slope and truncation, the least of both, what data costs are clipped at, and the disparity
-    // of label 0.
+    // The model: slope and truncation of the smoothness cost, the smaller of the two, the value at which data costs are
+    // clipped, and the disparity of label 0.
     slope: u32,
     truncation: u32,
     step: u32,
     clip: u32,
     min_disparity: i32,
-    // What labels beyond the last one cost.
+    // The data cost of labels beyond the last one.
     padding_cost: u32,
-    // First column and row behind a cut, 0 where there is none.
+    // The first column right of a cut and the first row below it; 0 without a cut.
     cut_x: u32,
     cut_y: u32,
-    // update_messages under the schedule `sweep`: which sides to send to, bit 0 left, 1 right, 2 up, 3 down.
+    // update_messages under the schedule `sweep`: the sides to send to; bit 0 left, 1 right, 2 up, 3 down.
     sends: u32,
-    // refine: the side that the messages are sent to, numbered likewise.
+    // refine: the side that the messages are sent to, with the same numbering.
     side: u32,
     // coarsen, coarsen_greys and refine: size, words and strip of the grid that is read.
     other_width: u32,
     other_height: u32,
     other_words: u32,
     other_first_row: u32,
-    // Weak edges: slope, truncation, the least of both, and the grey difference above which edges are weak.
+    // Weak edges: slope, truncation, the smaller of the two, and the grey difference above which edges are weak.
     weak_slope: u32,
     weak_truncation: u32,
     weak_step: u32,
@@ -56,7 +57,7 @@ struct Parameters {
 
 @group(0) @binding(0) var<storage, read> parameters: Parameters;
 
-// What the data cost compares.
+// The profile of the data cost.
 const THESIS: u32 = 0;
 const CENSUS: u32 = 1;
 const MRF: u32 = 2;
@@ -71,15 +72,15 @@ const RIGHT: u32 = 1;
 const UP: u32 = 2;
 const DOWN: u32 = 3;
 
-// Four nodes of one colour in a row.
+// Four consecutive nodes of one colour in a row.
 struct Nodes {
-    // Row in the strip, and in the grid.
+    // The row in the strip and in the grid.
     row: u32,
     y: u32,
-    // Which word of the row, and which column is 2 i + parity.
+    // The word in the row, and the parity of its columns.
     word: u32,
     parity: u32,
-    // Whether this invocation has any.
+    // Whether this invocation has any nodes.
     exist: bool,
 }
 
@@ -88,24 +89,24 @@ fn nodes(invocation: u32) -> Nodes {
     return nodes_at(line, invocation - line * parameters.words);
 }
 
-// Those of a word of one of the dispatch's rows.
+// The nodes of a word in row `line` of the dispatch.
 fn nodes_at(line: u32, word: u32) -> Nodes {
     let row = parameters.row + line * parameters.row_step;
     let y = parameters.first_row + row;
     return Nodes(row, y, word, (y + parameters.colour) & 1, line < parameters.rows);
 }
 
-// Columns of the four.
+// The columns of the four nodes.
 fn columns(nodes: Nodes) -> vec4<u32> {
     return 8 * nodes.word + nodes.parity + vec4(0u, 2u, 4u, 6u);
 }
 
-// Index of a node's first quad in a plane; further quads follow at distances of `words`.
+// Index of a node's first quad in a plane. Further quads follow every `words` vectors.
 fn plane_index(row: u32, word: u32) -> u32 {
     return (row + 1) * parameters.quads * parameters.words + word;
 }
 
-// Index of a word of what is kept of the whole grid: [colour][row][word].
+// Index of a word in a buffer of the whole grid: [colour][row][word].
 fn grid_index(colour: u32, y: u32, word: u32) -> u32 {
     return (colour * parameters.height + y) * parameters.words + word;
 }
@@ -145,7 +146,7 @@ fn minimum(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
     return (a & ~not_less) | (b & not_less);
 }
 
-// Whether sums of bytes may pass 255 and have to stay there.
+// Whether sums of bytes may exceed 255 and must then saturate.
 override SATURATING: bool = true;
 
 // The sum of two bytes, for all 16.

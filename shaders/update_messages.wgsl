@@ -1,21 +1,21 @@
-// Message passing: what the nodes of one colour send, from what those of the other colour sent last.
+// Message passing: computes the messages that the nodes of one colour send from those that the other colour sent last.
 //
-// A message is the lower envelope of h(a) + min(s |a - d|, K) over labels a, where h is the data cost plus what came from
-// the three other sides, less its least value. A pass up the labels and a pass down make it (Felzenszwalb and Huttenlocher
-// 2006). The first pass leaves its envelope in the messages' own place, the second reads it from there.
+// A message is the lower envelope of h(a) + min(s |a - d|, K) over labels a, less its least value. Here h is the data
+// cost plus the messages from the three other sides. A pass up the labels and a pass down compute it (Felzenszwalb and
+// Huttenlocher 2006). The first pass stores its envelope where the messages go, and the second reads it from there.
 
-// What these nodes send.
+// The messages that these nodes send.
 @group(0) @binding(6) var<storage, read_write> to_left: array<vec4<u32>>;
 @group(0) @binding(7) var<storage, read_write> to_right: array<vec4<u32>>;
 @group(0) @binding(8) var<storage, read_write> to_up: array<vec4<u32>>;
 @group(0) @binding(9) var<storage, read_write> to_down: array<vec4<u32>>;
-// Grey values, see weak_edges.wgsl.
+// Grey values; see weak_edges.wgsl.
 @group(0) @binding(10) var<storage, read> greys: array<u32>;
 
-// Whether only some sides are sent to, as under the schedule `sweep`.
+// Whether messages go only to some sides, as under the schedule `sweep`.
 override SELECTIVE: bool = false;
 
-// Four labels of what is sent left, right, up and down: a vector of sides for each label.
+// Four labels of the messages sent left, right, up and down: one vector of sides per label.
 struct Quad {
     a: vec4<u32>,
     b: vec4<u32>,
@@ -23,7 +23,7 @@ struct Quad {
     d: vec4<u32>,
 }
 
-// From a vector of labels for each side.
+// Transposes one vector of labels per side.
 fn by_label(left: vec4<u32>, right: vec4<u32>, up: vec4<u32>, down: vec4<u32>) -> Quad {
     return Quad(
         vec4(left.x, right.x, up.x, down.x),
@@ -37,7 +37,7 @@ fn is_sent(side: u32) -> bool {
     return !SELECTIVE || ((parameters.sends >> side) & 1) != 0;
 }
 
-// What the first pass left.
+// Reads the envelope of the first pass.
 fn load_quad(index: u32) -> Quad {
     var left: vec4<u32>;
     var right: vec4<u32>;
@@ -73,8 +73,8 @@ fn store_quad(index: u32, quad: Quad) {
     }
 }
 
-// Which nodes have a neighbour to send to on each side. Those beyond the right border cost nothing and receive zeros, so
-// that they send zeros.
+// A mask of the nodes that have a neighbour to send to, for each side. Nodes beyond the right border need no mask: they
+// cost nothing and receive zeros, so they send zeros.
 fn receivers(nodes: Nodes) -> vec4<u32> {
     let x = columns(nodes);
     let left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
@@ -85,7 +85,7 @@ fn receivers(nodes: Nodes) -> vec4<u32> {
     return vec4(bytes_where(left), bytes_where(right), select(vec2(0u), all, vec2(up, down)));
 }
 
-// Data cost plus what came from all sides but the one sent to.
+// Data cost plus the messages from all sides but the one sent to.
 fn gather(index: u32, nodes: Nodes) -> Quad {
     let data = cost[index];
     let left = from_left(index, nodes);
@@ -108,7 +108,7 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     let step = of_edges(weak, parameters.step, parameters.weak_step);
 
     var least = vec4(0xffffffffu);
-    // What the labels below offer to the next one.
+    // The envelope at the previous label plus one step.
     var offer = vec4(0xffffffffu);
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let index = first + quad * parameters.words;

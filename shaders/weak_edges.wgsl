@@ -1,12 +1,11 @@
 // Finds weak edges, for update_messages and select_labels: edges between nodes whose grey values differ by more than a
-// threshold. The kernel's `greys` has the grey values of the whole grid: [colour][row][word], one byte for each of the four
-// nodes.
+// threshold. The kernel's `greys` holds the grey values of the whole grid: [colour][row][word], one byte per node.
 
 // Whether the model has weak edges.
 override WEAK: bool = false;
 
-// The grey values of the left, right, upper and lower neighbours, with the indices of their messages. Missing neighbours
-// have arbitrary values.
+// The grey values of the left, right, upper and lower neighbours, indexed like their messages. Missing neighbours have
+// arbitrary values.
 fn neighbour_greys(nodes: Nodes) -> vec4<u32> {
     let other = 1 - parameters.colour;
     let aligned = greys[grid_index(other, nodes.y, nodes.word)];
@@ -31,12 +30,12 @@ fn weak_edges(nodes: Nodes) -> vec4<u32> {
     let others = neighbour_greys(nodes);
     let smaller = minimum(own, others);
     let difference = (own ^ others ^ smaller) - smaller;
-    // What is left above the threshold; the eighth bit of each byte, where anything is.
+    // The excess over the threshold. The result has the eighth bit of each byte set where the excess is not zero.
     let excess = difference - minimum(difference, splat(parameters.edge_threshold));
     return spread((((excess & ~HIGH) + ~HIGH) | excess) & HIGH);
 }
 
-// One of two values for the edges to each side: the second where they are weak.
+// One of two values for the edge to each side: the second if it is weak.
 fn of_edges(weak_edges: vec4<u32>, usual: u32, weak: u32) -> vec4<u32> {
     if !WEAK {
         return splat(usual);

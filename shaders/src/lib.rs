@@ -1,7 +1,7 @@
 //! The WGSL text of the GPU kernels.
 //!
-//! Each kernel has a file of its own, named after it. Some text is shared by several kernels; `bp_gpu::Kernel::source`
-//! puts the parts of a kernel together.
+//! Each kernel has its own file, named after it. Several kernels share some of the files; `bp_gpu::Kernel::source`
+//! assembles the parts of a kernel.
 
 macro_rules! wgsl {
     ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
@@ -11,7 +11,7 @@ macro_rules! wgsl {
 
 // The kernels.
 wgsl! {
-    /// Computes what the profile compares, for every pixel of one image.
+    /// Computes the features that the profile compares, for every pixel of one image.
     FEATURES = "features.wgsl";
     /// Computes the grey values of the left image.
     GREYS = "greys.wgsl";
@@ -29,16 +29,16 @@ wgsl! {
     SELECT_LABELS = "select_labels.wgsl";
 }
 
-// What several kernels share.
+// Shared by several kernels.
 wgsl! {
     /// The parameters and helpers of all kernels.
     SHARED = "shared.wgsl";
-    /// Reading the pixels of an image.
+    /// Reads the pixels of an image.
     IMAGE = "image.wgsl";
-    /// Writing data costs.
+    /// Writes data costs.
     COSTS = "costs.wgsl";
-    /// Reading messages and summing them.
+    /// Reads data costs and messages.
     MESSAGES = "messages.wgsl";
-    /// Finding the edges whose smoothness cost is lower.
+    /// Finds the edges whose smoothness cost is lower.
     WEAK_EDGES = "weak_edges.wgsl";
 }

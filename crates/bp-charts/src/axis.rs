@@ -14,12 +14,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis with chosen ticks.
+    /// A linear axis. The chart chooses its ticks.
     pub fn linear(name: impl Into<String>) -> Self {
         Self { name: name.into(), logarithmic: false, ticks: Vec::new() }
     }
 
-    /// A logarithmic axis with chosen ticks.
+    /// A logarithmic axis. The chart chooses its ticks.
     pub fn logarithmic(name: impl Into<String>) -> Self {
         Self { logarithmic: true, ..Self::linear(name) }
     }
@@ -43,7 +43,7 @@ impl Axis {
     }
 }
 
-/// Where an axis begins and ends, as heights, and the values of its ticks.
+/// The ends of an axis, as logarithms if it is logarithmic, and the values of its ticks.
 pub(crate) struct Scale {
     logarithmic: bool,
     low: f64,
@@ -55,7 +55,7 @@ impl Scale {
     fn new(axis: &Axis, low: f64, high: f64) -> Self {
         let logarithmic = axis.logarithmic;
         let (low, high) = if logarithmic { (low.log10(), high.log10()) } else { (low.min(0.0), high.max(0.0)) };
-        // One value alone has no span to take a share of.
+        // A single value has no span, so its margin is fixed.
         let margin = if high - low < 1e-9 { 1.0 } else { 0.06 * (high - low) };
         let (low, high) = (if logarithmic || low < 0.0 { low - margin } else { 0.0 }, high + margin);
         let mut scale = Self { logarithmic, low, high, ticks: Vec::new() };
@@ -68,7 +68,7 @@ impl Scale {
     }
 
     fn height(&self, value: f64) -> f64 {
-        // No logarithm of a number below 0: it is not a number, and so would be the place.
+        // The logarithm of a negative number is NaN, and so would be its position.
         if self.logarithmic { value.max(0.0).log10() } else { value }
     }
 
@@ -82,8 +82,8 @@ impl Scale {
     }
 }
 
-/// Ticks at 1, 2 and 5 times the powers of ten between two heights. If those are not 4 to 12, it uses more or fewer digits.
-/// If the range is too narrow for that, it uses equal steps.
+/// Ticks at 1, 2 and 5 times the powers of ten, between two values given as logarithms. If those are not 4 to 12 ticks,
+/// it uses more or fewer digits. If the range is too narrow for that, it uses equal steps.
 fn decade_ticks(low: f64, high: f64) -> Vec<f64> {
     const DIGITS: [(&[f64], usize); 4] =
         [(&[1.0, 2.0, 5.0], 1), (&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1), (&[1.0], 1), (&[1.0], 3)];

@@ -1,4 +1,4 @@
-//! The canvas of charts, and texts on it.
+//! The canvas of charts, and text on it.
 
 use plotters::{
     coord::types::RangedCoordf64,

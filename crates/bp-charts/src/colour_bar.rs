@@ -9,7 +9,7 @@ use crate::{
     picture::{Colour, Pixels, pixels},
 };
 
-/// The range of heights of bars in pixels. Numbers would not fit a lower bar, and a higher one shows no more.
+/// The least and the largest height of a bar in pixels. Numbers do not fit a lower bar, and a higher one shows no more.
 const HEIGHTS: (u32, u32) = (72, 4096);
 
 /// The least and the largest size of text in pixels.
@@ -29,8 +29,8 @@ pub struct ColourBar<'a> {
 }
 
 impl ColourBar<'_> {
-    /// Draws the bar on white, about a seventh as wide as high. `colour` gives the colour at a position from 0, the lower end,
-    /// to 1. A bar of a single value has the colour of the middle.
+    /// Draws the bar and its numbers on white. `colour` gives the colour at a position, from 0 at the lower end to 1 at
+    /// the upper end. A bar of a single value has the colour of the middle.
     ///
     /// # Errors
     ///

@@ -42,7 +42,7 @@ pub struct Key {
     pub style: Style,
 }
 
-/// What a legend names: the keys or, where there are none, the series.
+/// The entries of a legend: the keys, or the series if there are no keys.
 pub(crate) fn entries<'a, P: 'a>(
     keys: &'a [Key],
     series: impl Iterator<Item = &'a Series<P>>,

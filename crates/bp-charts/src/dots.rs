@@ -21,12 +21,12 @@ pub struct DotChart {
     pub axis: Axis,
     /// Values to compare with.
     pub levels: Vec<Level>,
-    /// The entries of the legend besides the levels. If empty, the series.
+    /// The entries of the legend besides the levels. If empty, the legend lists the series.
     pub keys: Vec<Key>,
     /// The names along the horizontal axis.
     pub categories: Vec<String>,
     /// Groups of series, from left to right within each category, with a gap between groups. A series has one point for
-    /// each category, or `None` where there is no value. Lines are not drawn.
+    /// each category, or `None` if it has no value there. Lines are not drawn.
     pub groups: Vec<Vec<Series<Option<Value>>>>,
 }
 
@@ -118,7 +118,7 @@ impl DotChart {
     }
 }
 
-/// A marker so far from the left, and the whisker of its interval.
+/// Draws a marker at column `x`, and the whisker of its interval.
 fn draw_value(canvas: &Canvas<'_>, sheet: &Sheet<'_>, (x, value): (f64, Value), style: Style, unit: f64) -> Drawn {
     let Value { value, low, high } = value;
     if high > low {

@@ -1,4 +1,4 @@
-//! Why charts fail.
+//! The error of a chart.
 
 /// Why a chart could not be drawn, in words.
 #[derive(Debug, thiserror::Error)]

@@ -23,7 +23,7 @@ pub(crate) struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// The legend of these in this width.
+    /// Lays out these entries within a width.
     pub(crate) fn new(entries: impl IntoIterator<Item = (&'a str, Look<'a>)>, width: f64) -> Self {
         let entries: Vec<_> = entries.into_iter().collect();
         let entry = widest(entries.iter().map(|(name, _)| name)) + 50.0;

@@ -1,8 +1,8 @@
 //! Charts as SVG: [`DotChart`] draws markers in categories, [`Plot`] points and lines between two numeric axes, and
 //! [`ColourBar`] the colour scale beside a picture.
 //!
-//! A chart scales with its page, has a title and a description for screen readers, and has a white background, so that it can
-//! be read on a dark page. [`png()`] renders a chart to the same pixels on every machine.
+//! A chart scales with its page, and has a title and a description for screen readers. Its white background keeps it
+//! readable on a dark page. [`png()`] renders a chart to the same pixels on every machine.
 
 mod axis;
 mod canvas;
@@ -63,7 +63,7 @@ mod tests {
         Plot { title, description, x, y: axis, levels, keys: vec![], series }
     }
 
-    /// The SVG, every tag of which must be closed, and every number a number.
+    /// Checks that every tag is closed and every number is finite. Returns the SVG.
     fn well_formed(svg: &str) -> &str {
         let mut open = Vec::new();
         for tag in svg.split('<').skip(1).map(|part| part.split_once('>').unwrap().0) {
@@ -121,7 +121,7 @@ mod tests {
         assert!(svg.contains(">Speed &amp; &lt;memory&gt;</title>") && svg.contains("\"All\" &gt; none</desc>"));
     }
 
-    /// Each row of the legend makes the sheet higher, and leaves the plot as it is.
+    /// Each row of the legend makes the sheet higher and leaves the plot unchanged.
     #[test]
     fn long_legends_do_not_press_the_plot() {
         let height = |count: usize| {
@@ -134,7 +134,7 @@ mod tests {
         assert!((height(30) - height(10) - 20.0 * canvas::ROW).abs() < 1e-9);
     }
 
-    /// Words are drawn in twice the chart's size, whatever fonts the machine has, and whatever is in a stranger's names.
+    /// Text is drawn at twice the chart's size, whatever fonts the machine has and whatever names are in a record.
     #[test]
     fn pictures_show_the_words_too() {
         let picture = |title: &str| {

@@ -1,6 +1,6 @@
-//! Numbers as text, and how wide text is.
+//! Numbers as text.
 
-/// A number with so many decimals and commas between thousands.
+/// A number with this many decimals, and commas between thousands.
 #[must_use]
 pub fn number(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
@@ -12,7 +12,7 @@ pub fn number(value: f64, decimals: usize) -> String {
     format!("{sign}{}{fraction}", groups.join(","))
 }
 
-/// A number in full, but for rounding errors.
+/// A number with up to nine decimals, which hides rounding errors.
 pub(crate) fn in_full(value: f64) -> String {
     let text = number(value, 9);
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,4 +1,4 @@
-//! Charts as pictures of pixels.
+//! Charts as raster images.
 
 use std::{
     cmp::Reverse,
@@ -15,13 +15,13 @@ use resvg::{
 
 use crate::Error;
 
-/// Pixels of the picture for one of the chart.
+/// Pixels of the picture per pixel of the chart, in each direction.
 const SCALE: u32 = 2;
 
-/// The family that stands for sans-serif.
+/// The font family used for sans-serif.
 const FAMILY: &str = "Noto Sans";
 
-/// The only fonts that are used, so that the picture does not depend on those of the machine.
+/// The only fonts used, so that pictures do not depend on the machine's fonts.
 static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     let mut fonts = Database::new();
     [notosans::REGULAR_TTF, notosans::BOLD_TTF].into_iter().for_each(|font| fonts.load_font_data(font.to_vec()));
@@ -35,7 +35,7 @@ pub type Colour = [u8; 3];
 /// An opaque picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Pixels a row.
+    /// Pixels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
@@ -47,14 +47,14 @@ pub struct Pixels {
 ///
 /// # Errors
 ///
-/// When the text is none that a chart gives.
+/// If the text is not an SVG of a chart.
 pub fn png(svg: &str) -> Result<Vec<u8>, Error> {
     let mut file = Vec::new();
     encode(&mut file, &pixels(svg, SCALE)?).map_err(|error| failed(&error))?;
     Ok(file)
 }
 
-/// An SVG text, which must cover all of itself, in so many times its width and height.
+/// Renders an SVG, which must be opaque everywhere, at `scale` times its width and height.
 pub(crate) fn pixels(svg: &str, scale: u32) -> Result<Pixels, Error> {
     let options = Options { fontdb: Arc::clone(&FONTS), font_family: FAMILY.to_owned(), ..Options::default() };
     let tree = Tree::from_str(svg, &options).map_err(|error| failed(&error))?;
@@ -69,7 +69,7 @@ fn failed(error: &dyn std::fmt::Display) -> Error {
     Error(format!("no picture can be made of the chart: {error}"))
 }
 
-/// Writes a PNG of 256 colours: a third of the bytes, as charts have few colours and the edges of shapes between them.
+/// Writes a PNG with 256 colours, which takes a third of the bytes. Charts have few colours besides those at edges.
 fn encode(file: &mut Vec<u8>, pixels: &Pixels) -> Result<(), EncodingError> {
     let (palette, indices) = palette(&pixels.colours);
     let mut encoder = Encoder::new(file, pixels.width, pixels.height);
@@ -84,12 +84,12 @@ fn encode(file: &mut Vec<u8>, pixels: &Pixels) -> Result<(), EncodingError> {
     writer.finish()
 }
 
-/// Neighbours of one colour, which most pixels are: few colours are looked up.
+/// Runs of neighbours of one colour. Most pixels are in long runs, so few colours are looked up.
 fn runs(pixels: &[Colour]) -> impl Iterator<Item = &[Colour]> {
     pixels.chunk_by(|a, b| a == b)
 }
 
-/// The 256 most frequent of some colours, and where in them each of the colours, or the one most like it, is.
+/// The 256 most frequent of some colours, and for each colour the index of the nearest one among them.
 fn palette(pixels: &[Colour]) -> (Vec<Colour>, BTreeMap<Colour, u8>) {
     let mut counts: BTreeMap<Colour, usize> = BTreeMap::new();
     runs(pixels).for_each(|run| *counts.entry(run[0]).or_default() += run.len());

@@ -12,22 +12,22 @@ use crate::{
     style::{MARKER_UNIT, colour, draw_line, draw_marker, draw_path, draw_whisker},
 };
 
-/// Values against values.
+/// A plot: points and lines between two numeric axes.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// The heading; the ids in the SVG derive from it, so no two charts of a page may share it.
+    /// The heading. The ids in the SVG derive from it, so all charts of a page need different headings.
     pub title: String,
-    /// What the chart shows, for those who cannot see it.
+    /// A description of the chart for screen readers.
     pub description: String,
-    /// The horizontal axis; its name stands below it.
+    /// The horizontal axis. Its name is written below it.
     pub x: Axis,
-    /// The vertical axis; its name stands above it.
+    /// The vertical axis. Its name is written above it.
     pub y: Axis,
     /// Values to compare with.
     pub levels: Vec<Level>,
-    /// What the legend holds besides the levels; where empty, the series.
+    /// The entries of the legend besides the levels. If empty, the legend lists the series.
     pub keys: Vec<Key>,
-    /// In the order in which they are drawn.
+    /// The series, in the order in which they are drawn.
     pub series: Vec<Series<Point>>,
 }
 
@@ -41,13 +41,13 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point; a number has no interval.
+    /// A point. A plain number has no interval.
     pub fn new(x: impl Into<Value>, y: impl Into<Value>) -> Self {
         Self { x: x.into(), y: y.into() }
     }
 }
 
-/// Room for half of a mark at the right end of the axis.
+/// The plot's right edge, which leaves room for half of the last tick's number.
 const RIGHT: f64 = WIDTH - 2.0 * MARGIN;
 
 impl Plot {
@@ -72,7 +72,7 @@ impl Plot {
             levels: &self.levels,
             entries: entries(&self.keys, self.series.iter()),
         };
-        // The marks of the horizontal axis and its name.
+        // Two rows below the plot: the numbers of the horizontal axis, and its name.
         let sheet = Sheet::new(parts, Room { right: RIGHT, plot_height: 380.0 }, |_| 2);
         let places = Places { sheet: &sheet, x };
         sheet.svg(|canvas| places.draw_axes(canvas, &self.x), |canvas| self.draw_values(canvas, &places))
@@ -102,10 +102,10 @@ impl Plot {
     }
 }
 
-/// Where values lie, in pixels.
+/// The positions of values, in pixels.
 struct Places<'a> {
     sheet: &'a Sheet<'a>,
-    /// None where there are no values.
+    /// `None` if there are no values.
     x: Option<Scale>,
 }
 
@@ -119,7 +119,7 @@ impl Places<'_> {
         (self.x(point.x.value), self.sheet.y(point.y.value))
     }
 
-    /// The stairs over some points, from the plot's top to its right edge.
+    /// The path of stairs through some points, from the plot's top to its right edge.
     fn stairs(&self, points: &[At]) -> Vec<At> {
         let mut path = Vec::new();
         let mut y = self.sheet.top;
@@ -131,10 +131,10 @@ impl Places<'_> {
         path
     }
 
-    /// The frame, and the horizontal axis with its marks and its name.
+    /// Draws the frame, and the horizontal axis with its ticks and its name.
     fn draw_axes(&self, canvas: &Canvas<'_>, axis: &Axis) -> Drawn {
         let Sheet { left, right, top, bottom, .. } = *self.sheet;
-        // Marks that would touch the one before them have a line, but no number.
+        // A tick whose number would touch the one before it has a line only.
         let mut free = 0.0;
         for &tick in self.x.iter().flat_map(|scale| &scale.ticks) {
             let (x, name) = (self.x(tick), in_full(tick));
@@ -149,7 +149,7 @@ impl Places<'_> {
         text(canvas, (f64::midpoint(left, right), bottom + 1.7 * ROW), &axis.label(), TEXT_SIZE, HPos::Center)
     }
 
-    /// The intervals of a point, where they are longer than a pixel.
+    /// Draws those intervals of a point that are longer than a pixel.
     fn draw_whiskers(&self, canvas: &Canvas<'_>, point: &Point, number: usize) -> Drawn {
         let (x, y) = self.at(point);
         let (left, right) = (self.x(point.x.low), self.x(point.x.high));

@@ -15,15 +15,15 @@ use crate::{
 const HEIGHT: f64 = 480.0;
 const TITLE_SIZE: f64 = 17.0;
 
-/// What stands on a sheet besides its values.
+/// The parts of a sheet besides its values.
 pub(crate) struct Parts<'a> {
     pub(crate) title: &'a str,
     pub(crate) description: &'a str,
     pub(crate) axis: &'a Axis,
-    /// None where there are no values.
+    /// `None` if there are no values.
     pub(crate) scale: Option<Scale>,
     pub(crate) levels: &'a [Level],
-    /// What the legend holds besides the levels.
+    /// The entries of the legend besides the levels.
     pub(crate) entries: Vec<(&'a str, Style)>,
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct Parts<'a> {
 pub(crate) struct Room {
     /// The plot's right edge.
     pub(crate) right: f64,
-    /// What a long legend leaves to the plot: the sheet grows instead.
+    /// The least height of the plot. A long legend makes the sheet grow instead.
     pub(crate) plot_height: f64,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    /// Lays out a chart; `rows` tells how many rows of text stand right below a plot that begins so far from the left.
+    /// Lays out a chart. `rows` gives the number of rows of text right below the plot, given the plot's left edge.
     pub(crate) fn new(parts: Parts<'a>, Room { right, plot_height }: Room, rows: impl Fn(f64) -> usize) -> Self {
         let levels: Vec<_> = parts.levels.iter().filter(|level| parts.axis.shows(level.value)).collect();
         let left = MARGIN + widest(parts.scale.iter().flat_map(|scale| &scale.ticks).map(|&tick| in_full(tick))) + 8.0;
@@ -66,7 +66,7 @@ impl<'a> Sheet<'a> {
         Self { parts, levels, legend, left, right, top, bottom, legend_top: bottom + rows, height }
     }
 
-    /// The chart as SVG; `draw` adds what differs between the kinds, which stands below the values of `values`.
+    /// The chart as SVG. `draw` draws the parts that depend on the kind of chart. `values` draws the values over them.
     pub(crate) fn svg(
         &self,
         draw: impl FnOnce(&Canvas<'_>) -> Drawn,
@@ -82,7 +82,7 @@ impl<'a> Sheet<'a> {
         Ok(self.with_head(&drawn, (wide, high)))
     }
 
-    /// Plotters' own head names nothing, and shows the chart in the size of the units that it is drawn in.
+    /// Replaces plotters' head, which has no title and gives the chart's size in drawing units instead of pixels.
     fn with_head(&self, drawn: &str, (wide, high): (u32, u32)) -> String {
         let body = drawn.split_once('>').map_or("", |(_, body)| body);
         let Parts { title, description, .. } = self.parts;
@@ -114,7 +114,7 @@ impl<'a> Sheet<'a> {
         values(canvas)
     }
 
-    /// The title and the name of the vertical axis; beyond 100 letters they grow smaller than the other texts.
+    /// Draws the title and the name of the vertical axis. Long ones get a smaller size, so that they fit the width.
     fn draw_heading(&self, canvas: &Canvas<'_>) -> Drawn {
         let name = self.parts.axis.label();
         for (row, (line, size)) in [(self.parts.title, TITLE_SIZE), (&name, TEXT_SIZE)].into_iter().enumerate() {
@@ -124,7 +124,7 @@ impl<'a> Sheet<'a> {
         Ok(())
     }
 
-    /// The marks of the vertical axis and the levels.
+    /// Draws the ticks of the vertical axis, and the levels.
     fn draw_axis(&self, canvas: &Canvas<'_>, ticks: &[f64]) -> Drawn {
         for &tick in ticks {
             let y = self.y(tick);
@@ -137,7 +137,7 @@ impl<'a> Sheet<'a> {
         Ok(())
     }
 
-    /// How far from the top a value lies.
+    /// The distance of a value from the top.
     pub(crate) fn y(&self, value: f64) -> f64 {
         let fraction = self.parts.scale.as_ref().map_or(0.0, |scale| scale.fraction(value));
         self.bottom - (self.bottom - self.top) * fraction

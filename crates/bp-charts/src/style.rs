@@ -9,7 +9,7 @@ use crate::canvas::{At, Canvas, Drawn, FINE};
 /// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Style {
-    /// The number of its colour; after the last, the first follows.
+    /// The number of its colour. After the last colour, the first follows.
     pub colour: usize,
     /// The marker at its points.
     pub marker: Option<Marker>,
@@ -20,9 +20,9 @@ pub struct Style {
 /// The marker of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Marker {
-    /// The number of its shape; after the last, the first follows.
+    /// The number of its shape. After the last shape, the first follows.
     pub shape: usize,
-    /// How its inside looks.
+    /// The look of its inside.
     pub fill: Fill,
 }
 
@@ -56,14 +56,14 @@ pub enum Line {
     Dashes,
     /// The same, dotted.
     Dots,
-    /// From the plot's top down to the first point, on to the right, down to the next, and from the last to the right
-    /// edge: what lies above it is no better, in both values, than one of the points.
+    /// From the plot's top down to the first point, right, down to the next, and from the last to the right edge. For
+    /// any place above the stairs, a point exists that is at least as good in both values.
     Stairs,
 }
 
 impl Style {
-    /// A marker whose colour and shape no other number has for long: after each 8, the same colours take the shapes
-    /// that follow.
+    /// The marker of a number. It repeats only after many numbers: each further 8 numbers have the same colours, but
+    /// other shapes.
     #[must_use]
     pub fn numbered(number: usize) -> Self {
         Self::marked(number, number + number / COLOURS.len())
@@ -94,7 +94,7 @@ impl Style {
     }
 }
 
-/// The colours of Okabe and Ito, which the colour-blind tell apart, with grey for yellow, too pale on white.
+/// The colours of Okabe and Ito, which colour-blind people can tell apart. Grey replaces yellow, too pale on white.
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -106,15 +106,15 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(153, 153, 153),
 ];
 
-/// The number of black, for what belongs to no series.
+/// The number of black, for things that belong to no series.
 pub const BLACK: usize = 4;
 
 /// The outline of a marker: its number of equal arms and the corners of the first of them, as degrees (clockwise from
 /// the right) and radii.
 type Shape = (u32, &'static [At]);
 
-/// Shapes of about one area: circle, square, triangle, diamond, plus, triangle downwards, cross, star, triangle to the
-/// right, pentagon, triangle to the left and needle star.
+/// Shapes of about equal area: circle, square, triangle, diamond, plus, triangle downwards, cross, star, triangle to
+/// the right, pentagon, triangle to the left and needle star.
 const SHAPES: [Shape; 12] = [
     (24, &[(0.0, 1.0)]),
     (4, &[(45.0, 1.25)]),
@@ -130,7 +130,7 @@ const SHAPES: [Shape; 12] = [
     (4, &[(0.0, 2.0), (45.0, 0.6)]),
 ];
 
-/// The pixels of a marker's radius of 1 where there is room.
+/// The pixels per unit of a marker's radius, if there is room.
 pub(crate) const MARKER_UNIT: f64 = 4.8;
 
 /// The colour of a number.
@@ -138,7 +138,7 @@ pub(crate) fn colour(number: usize) -> RGBColor {
     COLOURS[number % COLOURS.len()]
 }
 
-/// A series' marker, whose radius of 1 is so many pixels; nothing where it has none.
+/// Draws a series' marker, if it has one. A radius of 1 is `unit` pixels.
 pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f64) -> Drawn {
     let Some(Marker { shape, fill }) = style.marker else { return Ok(()) };
     let ((arms, corners), colour) = (SHAPES[shape % SHAPES.len()], colour(style.colour));
@@ -146,15 +146,15 @@ pub(crate) fn draw_marker(canvas: &Canvas<'_>, (x, y): At, style: Style, unit: f
         let (sin, cos) = (angle.to_radians() + TAU * f64::from(arm) / f64::from(arms)).sin_cos();
         (x + unit * radius * cos, y + unit * radius * sin)
     };
-    // One arm more than there are closes the line, with a join instead of two ends.
+    // Repeating the first arm closes the outline with a join instead of two ends.
     let outline: Vec<At> = (0..=arms).flat_map(|arm| corners.iter().map(move |&c| corner(arm, c))).collect();
     canvas.draw(&Polygon::new(outline.as_slice(), colour.mix(fill.opacity())))?;
-    // Small markers have a thinner outline, which would fill them else.
+    // Small markers have a thinner outline, which would otherwise fill them.
     let width = f64::from(THIN) * (unit / MARKER_UNIT).min(1.0);
     canvas.draw(&PathElement::new(outline, colour.stroke_width(width as u32)))
 }
 
-/// A series' line along a path; nothing where it has none.
+/// Draws a series' line, if it has one, along a path.
 pub(crate) fn draw_line(canvas: &Canvas<'_>, path: Vec<At>, style: Style) -> Drawn {
     let stroke = colour(style.colour).stroke_width(20);
     match style.line {
@@ -165,12 +165,12 @@ pub(crate) fn draw_line(canvas: &Canvas<'_>, path: Vec<At>, style: Style) -> Dra
     }
 }
 
-/// A thin line, as of outlines, whiskers and axes.
+/// Draws a thin line, as used for whiskers and axes.
 pub(crate) fn draw_path(canvas: &Canvas<'_>, points: &[At], colour: RGBColor) -> Drawn {
     canvas.draw(&PathElement::new(points, colour.stroke_width(THIN)))
 }
 
-/// The whisker between the ends of an interval, which lie side by side or one above the other.
+/// Draws the whisker between the ends of an interval, which is horizontal or vertical.
 pub(crate) fn draw_whisker(canvas: &Canvas<'_>, [from, to]: [At; 2], colour: RGBColor) -> Drawn {
     let (across, down) = if from.0 == to.0 { (3.0, 0.0) } else { (0.0, 3.0) };
     let cap = |(x, y): At| [(x - across, y - down), (x + across, y + down)];
@@ -178,7 +178,7 @@ pub(crate) fn draw_whisker(canvas: &Canvas<'_>, [from, to]: [At; 2], colour: RGB
     draw_path(canvas, &[a, b, from, to, c, d], colour)
 }
 
-/// A thin dashed line from left to right.
+/// Draws a thin dashed line from left to right.
 pub(crate) fn draw_dashes(canvas: &Canvas<'_>, left: f64, right: f64, y: f64, colour: RGBColor) -> Drawn {
     canvas.draw(&DashedPathElement::new([(left, y), (right, y)], DASH, GAP, colour.stroke_width(THIN)))
 }
@@ -186,6 +186,6 @@ pub(crate) fn draw_dashes(canvas: &Canvas<'_>, left: f64, right: f64, y: f64, co
 /// Width of thin lines.
 const THIN: u32 = 15;
 
-/// Lengths of dashes and of what is between them.
+/// Lengths of dashes and of the gaps between them.
 const DASH: u32 = 6 * FINE as u32;
 const GAP: u32 = 4 * FINE as u32;

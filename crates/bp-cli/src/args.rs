@@ -27,10 +27,10 @@ pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 #[derive(Debug, Parser)]
 #[command(name = "bp", version, max_term_width = 110, after_help = examples::program())]
 pub(crate) struct Cli {
-    /// Tell errors only: no progress, notes or warnings.
+    /// Print only errors: no progress, notes or warnings.
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -41,43 +41,43 @@ pub(crate) enum Command {
     /// Compute the disparity map of a rectified pair.
     #[command(after_help = examples::MATCH)]
     Match(Box<MatchArgs>),
-    /// Make depth, points, a picture or another format of a disparity map that is there.
+    /// Convert a disparity map to depth, points, a picture or another format.
     #[command(after_help = examples::CONVERT)]
     Convert(Box<ConvertArgs>),
     /// Measure the errors of a disparity map against ground truth.
     #[command(after_help = examples::EVALUATE)]
     Evaluate(EvaluateArgs),
-    /// Run all algorithms on six scenes and write every table, chart and figure of the thesis beside its numbers.
+    /// Repeat the thesis's experiments on six scenes: every table, chart and figure, with its numbers beside ours.
     #[command(after_help = examples::REPRODUCE)]
     Reproduce(ReproduceArgs),
-    /// Write the report of a recorded run again, or the part of a README that comes from it.
+    /// Rewrite the report of a recorded run, or the part of a page that is generated from it.
     #[command(after_help = examples::REPORT)]
     Report(ReportArgs),
     /// List the scenes and check the files of a data folder.
     #[command(after_help = examples::SCENES)]
     Scenes(ScenesArgs),
-    /// List every device of every backend, by the names that --backend takes.
+    /// List the devices of all backends, by the names that --backend accepts.
     #[command(after_help = examples::DEVICES)]
     Devices(DevicesArgs),
-    /// Check what this machine has, and tell what is missing and which package brings it.
+    /// Check this machine, and report what is missing and which package provides it.
     #[command(after_help = examples::DOCTOR)]
     Doctor(DoctorArgs),
-    /// Check that backends give the reference's labels and messages, to the bit.
+    /// Check that backends give the same labels and messages as the reference, to the bit.
     #[command(after_help = examples::CONFORM)]
     Conform(ConformArgs),
-    /// Time devices against each other on fixed problems, in turns and in one process.
+    /// Compare the speed of devices on fixed problems, in turns and in one process.
     #[command(after_help = examples::SPEED)]
     Speed(SpeedArgs),
-    /// Check that speed-ups, accuracy, energy and memory are still what committed baselines say; exit code 4 where not.
+    /// Check speed-ups, accuracy, energy and memory against committed baselines; exit code 4 if the check fails.
     #[command(after_help = examples::GATE)]
     Gate(GateArgs),
-    /// Set recorded runs of several machines, commits or backends beside one another.
+    /// Compare recorded runs of several machines, commits or backends.
     #[command(after_help = examples::COMPARE)]
     Compare(CompareArgs),
     /// Write a recorded run in the format of another program.
     #[command(after_help = examples::EXPORT)]
     Export(ExportArgs),
-    /// Print what makes a shell complete commands and options.
+    /// Print a shell's completion script for commands and options.
     #[command(after_help = examples::COMPLETIONS)]
     Completions(CompletionsArgs),
     /// Write man pages.
@@ -85,14 +85,14 @@ pub(crate) enum Command {
     Man(ManArgs),
 }
 
-/// Which scenes.
+/// The scenes.
 #[derive(Debug, Args)]
 pub(crate) struct DataArgs {
-    /// Folder of the public data sets (see scripts/fetch-middlebury); without it the synthetic scenes run.
-    // An empty variable means none, so it must not be refused as clap's own parser of paths would.
+    /// Folder of the public data sets (see scripts/fetch-middlebury). Without it, the synthetic scenes are used.
+    // An empty variable means no folder. Clap's own parser of paths would refuse it.
     #[arg(long, env = "BP_DATA", value_name = "DIR", value_parser = OsStringValueParser::new().map(PathBuf::from))]
     pub(crate) data: Option<PathBuf>,
-    /// Run the synthetic scenes although there is a data folder.
+    /// Use the synthetic scenes even if a data folder is given.
     #[arg(long)]
     pub(crate) synthetic: bool,
 }
@@ -107,7 +107,7 @@ impl DataArgs {
 /// `bp scenes`.
 #[derive(Debug, Args)]
 pub(crate) struct ScenesArgs {
-    /// Which scenes.
+    /// The scenes.
     #[command(flatten)]
     pub(crate) data: DataArgs,
 }
@@ -122,7 +122,7 @@ pub(crate) struct CompletionsArgs {
 /// `bp man`.
 #[derive(Debug, Args)]
 pub(crate) struct ManArgs {
-    /// The folder that bp.1, bp-match.1 and so on are written into.
+    /// The folder to write bp.1, bp-match.1 and so on into.
     pub(crate) folder: PathBuf,
 }
 
@@ -156,7 +156,7 @@ fn positive(text: &str) -> Result<f32, String> {
     }
 }
 
-/// A parser of the names of `all`.
+/// A parser that accepts the names of `all`.
 fn named<T: Copy + Send + Sync>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T> {
     let names = PossibleValuesParser::new(all.iter().map(|&value| name(value)));
     names.try_map(move |text| all.iter().copied().find(|&value| name(value) == text).ok_or("not one of the names"))

@@ -1,4 +1,4 @@
-//! The progress bar on standard error, and lines above it.
+//! The progress bar on standard error, and the lines above it.
 
 use std::{
     sync::{Mutex, PoisonError},
@@ -7,16 +7,16 @@ use std::{
 
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 
-/// The bar that is drawn. Only one is.
+/// The visible progress bar. Only one is drawn at a time.
 static SHOWN: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
 
-/// Writes to standard error where a bar may be shown.
+/// Runs `write`, which writes to standard error, without disturbing the bar.
 pub(crate) fn beside_bar(write: impl FnOnce()) {
     let bar = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     bar.unwrap_or_else(indicatif::ProgressBar::hidden).suspend(write);
 }
 
-/// A bar on standard error, with the time left; not drawn where that is no terminal, or where another
+/// A bar on standard error with the remaining time. It is hidden if standard error is not a terminal, or if another bar
 /// is shown.
 pub(crate) struct ProgressBar {
     bar: indicatif::ProgressBar,
@@ -24,7 +24,7 @@ pub(crate) struct ProgressBar {
 }
 
 impl ProgressBar {
-    /// A bar for so much work, of which so much was done before: that says nothing about the time left.
+    /// A bar for `total` units of work. The units in `done` were done earlier and do not count for the remaining time.
     pub(crate) fn new(total: u64, done: u64) -> Self {
         let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
         if shown.is_some() {
@@ -40,7 +40,7 @@ impl ProgressBar {
         Self { bar, is_shown: true }
     }
 
-    /// Shows how much is done of how much.
+    /// Shows the progress.
     pub(crate) fn show(&self, done: u64, total: u64) {
         self.bar.set_length(total);
         self.bar.set_position(done);
@@ -49,7 +49,7 @@ impl ProgressBar {
         }
     }
 
-    /// Shows what is being done.
+    /// Shows the current task.
     pub(crate) fn message(&self, message: String) {
         self.bar.set_message(message);
     }

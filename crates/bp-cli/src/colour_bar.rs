@@ -1,4 +1,4 @@
-//! The bar beside a coloured picture.
+//! The colour bar beside a coloured picture.
 
 use bp_io::{ColourBar, Pixels};
 

@@ -1,4 +1,4 @@
-//! One file a command.
+//! The commands, one file each.
 
 mod compare;
 mod conform;
@@ -37,17 +37,17 @@ pub(crate) use speed::speed;
 
 use crate::failure::Failure;
 
-/// Prints what `--json` asks for.
+/// Prints a report as JSON.
 pub(crate) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, report).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)
 }
 
-/// Columns of text for people.
+/// Width of printed text in columns.
 const COLUMNS: usize = 110;
 
-/// Words in lines, all but the first of which begin with so many spaces.
+/// Wraps a text. All lines but the first are indented by `indent` spaces.
 fn indented(text: &str, indent: usize) -> String {
     let (mut lines, mut column) = (String::new(), indent);
     for word in text.split_whitespace() {

@@ -1,4 +1,4 @@
-//! How the program fails: a message that says what to do, and an exit code that says who can mend it.
+//! Failures of the program. The message says what to do, and the exit code says who can fix it.
 
 use std::io;
 
@@ -13,7 +13,7 @@ pub(crate) struct Failure {
     message: String,
 }
 
-/// What the exit codes mean, in their order; help, man page and docs/matching.md take it from here.
+/// The exit codes and their meanings. The help, the man page and docs/matching.md use this list.
 pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
     (0, "done"),
     (1, "other"),
@@ -25,7 +25,7 @@ pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
     (130, "interrupted"),
 ];
 
-/// The same as a sentence.
+/// The exit codes as a sentence.
 pub(crate) fn exit_codes() -> String {
     let codes: Vec<String> = EXIT_CODES.iter().map(|(code, what)| format!("{code} {what}")).collect();
     format!("Exit codes: {}.", codes.join(", "))
@@ -36,7 +36,7 @@ impl Failure {
         Self { code, message: as_options(&message.into()) }
     }
 
-    /// The fault of none of the below: a full disk, an output that cannot be written.
+    /// Any other cause: a full disk, an output that cannot be written.
     pub(crate) fn other(message: impl Into<String>) -> Self {
         Self::new(1, message)
     }
@@ -46,7 +46,7 @@ impl Failure {
         Self::new(2, message)
     }
 
-    /// A file that is missing, broken or does not fit.
+    /// A file that is missing, broken or unsuitable.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::new(3, message)
     }
@@ -56,7 +56,7 @@ impl Failure {
         Self::new(4, message)
     }
 
-    /// A backend or device that is not there.
+    /// A backend or device that is unavailable.
     pub(crate) fn unavailable(message: impl Into<String>) -> Self {
         Self::new(5, message)
     }
@@ -66,7 +66,7 @@ impl Failure {
         Self::new(130, "interrupted")
     }
 
-    /// The same with the name of what it is about.
+    /// The same failure with the name of its subject.
     pub(crate) fn of(self, what: &str) -> Self {
         Self { message: format!("{what}: {}", self.message), ..self }
     }
@@ -77,7 +77,7 @@ impl Failure {
     }
 }
 
-/// Libraries name options by their fields, as in `` `max_memory` ``; on a command line that is `--max-memory`.
+/// Replaces the field names with which libraries refer to options, such as `` `max_memory` ``, by `--max-memory`.
 pub(crate) fn as_options(message: &str) -> String {
     let is_field = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
     let parts: Vec<&str> = message.split('`').collect();
@@ -140,8 +140,8 @@ impl From<bp_stereo::Stopped> for Failure {
     }
 }
 
-/// Standard output that cannot be written to: a full disk, say. A reader that closed its end, as `head` does, has what
-/// it wanted.
+/// Standard output cannot be written to, for example because a disk is full. If the reader closed its end, as `head`
+/// does, this is not an error.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         let code = if error.kind() == io::ErrorKind::BrokenPipe { 0 } else { 1 };

@@ -1,20 +1,19 @@
 //! The C library's heap.
 
-/// Bytes of the buffers that the system gets back as soon as they are freed: above, a page's first touch is nothing
-/// beside what is done with it; below, they are too few to matter.
+/// Buffers of at least this many bytes go back to the system as soon as they are freed. Mapping their pages anew costs
+/// little compared with the work on them. Smaller buffers are too small to matter.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LARGE: i32 = 4 << 20;
 
-/// Makes memory that is freed go back to the system: glibc keeps buffers of up to 32 MiB once it has seen such freed, so
-/// that a program that is told how much it may hold would hold more.
+/// Makes freed memory go back to the system. By default, glibc keeps buffers of up to 32 MiB once it has seen one
+/// freed, so the program would exceed its memory limit.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "only the C library can set its own allocator")]
 pub(crate) fn return_large_buffers() {
-    // SAFETY: a setting of the allocator, which takes two numbers and may be changed at any time. Where it is refused,
-    // all stays as it was.
+    // SAFETY: `mallopt` takes two numbers and may be called at any time. If it fails, the setting does not change.
     let _ = unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE) };
 }
 
-/// Other C libraries do by themselves.
+/// Other C libraries return large buffers by themselves.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn return_large_buffers() {}

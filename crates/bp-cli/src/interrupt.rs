@@ -1,4 +1,4 @@
-//! Ctrl-C: work is stopped between two steps, so that nothing is left half done.
+//! Ctrl-C stops work between two steps, so that nothing is left half done.
 
 use std::sync::LazyLock;
 
@@ -9,8 +9,8 @@ use crate::failure::Failure;
 /// Set by Ctrl-C and SIGTERM.
 pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
 
-/// Makes Ctrl-C and SIGTERM stop the program at the next step, and a second one at once. For commands that take steps;
-/// others are stopped by the system.
+/// Makes Ctrl-C and SIGTERM stop the program at the next step. A second signal stops it at once. Commands without steps
+/// do not call this; the system stops them.
 pub(crate) fn listen() -> Result<(), Failure> {
     let stop = || {
         if STOP.stop() {

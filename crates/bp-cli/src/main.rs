@@ -1,7 +1,7 @@
 //! The program `bp`.
 //!
-//! `args` reads the command line; `args/meaning` turns it into the libraries' options, in one place. `commands` has one file
-//! for each command, `terminal` shows what the libraries tell, and `failure` knows the exit codes. Only this crate prints.
+//! `args` reads the command line, and `args/meaning` turns it into the libraries' options. `commands` has one file for
+//! each command, `terminal` shows the libraries' events, and `failure` defines the exit codes. Only this crate prints.
 
 mod args;
 mod bar;

@@ -1,4 +1,4 @@
-//! What people are told on standard error.
+//! Messages and logs on standard error.
 
 use std::{
     collections::HashSet,
@@ -14,14 +14,15 @@ use crate::bar;
 static QUIET: AtomicBool = AtomicBool::new(false);
 static NOTED: Mutex<Option<HashSet<String>>> = Mutex::new(None);
 
-/// Tells nothing but errors where `quiet`; logs what the environment variable RUST_LOG asks for, by default nothing.
+/// Sets up messages and logs. If `quiet`, only errors are printed. The environment variable RUST_LOG selects the log,
+/// by default none.
 pub(crate) fn set_up(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
     let env = env_logger::Env::default().default_filter_or("off");
     let target = env_logger::Target::Pipe(Box::new(BesideBar));
-    // Another program that calls this one as a library may log by itself.
+    // Ignored if a logger is already set.
     let _ = env_logger::Builder::from_env(env).target(target).try_init();
-    // Panics that a reader of files turns into an error need no words of their own.
+    // A panic that a file reader turns into an error must not print anything.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |about| {
         if !bp_io::is_caught() {
@@ -30,7 +31,7 @@ pub(crate) fn set_up(quiet: bool) {
     }));
 }
 
-/// Standard error, above the bar where there is one.
+/// Standard error, above the progress bar if one is shown.
 struct BesideBar;
 
 impl Write for BesideBar {
@@ -45,18 +46,18 @@ impl Write for BesideBar {
     }
 }
 
-/// Whether only errors are told.
+/// Whether only errors are printed.
 pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// Prints an error, above the bar where there is one. Where standard error is full or closed there is nobody left to
-/// tell.
+/// Prints a line to standard error, above the progress bar if one is shown. Ignores errors: if standard error is full
+/// or closed, nobody can read them.
 pub(crate) fn tell(line: &str) {
     bar::beside_bar(|| drop(writeln!(io::stderr(), "{line}")));
 }
 
-/// Tells a note, unless only errors are wanted; one that many pairs give rise to only once.
+/// Prints a note, unless only errors are wanted. A note that several pairs cause is printed once.
 pub(crate) fn note(line: &str) {
     let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
     if !is_quiet() && noted.get_or_insert_default().insert(line.to_owned()) {
@@ -64,12 +65,12 @@ pub(crate) fn note(line: &str) {
     }
 }
 
-/// Keeps a layer of Mesa's Vulkan drivers from complaining on standard error where no desktop runs. All that the layer does is
-/// to sort the list of devices.
+/// Disables a layer of Mesa's Vulkan drivers that prints complaints to standard error if no desktop runs. The layer
+/// only sorts the list of devices.
 #[expect(unsafe_code, reason = "the layer takes nothing but a variable of the environment")]
 pub(crate) fn quieten_driver() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // SAFETY: called first of all, before there is another thread.
+        // SAFETY: called first in `main`, before any other thread starts.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
 }

@@ -1,4 +1,4 @@
-//! What people see while the libraries work: a bar, notes and warnings on standard error.
+//! Shows the work of the libraries: a progress bar, notes and warnings on standard error.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,15 +11,15 @@ use crate::{
     notes::{self, note, tell},
 };
 
-/// The bar of the work that goes on.
+/// The progress bar of the current work.
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Shows events and obeys Ctrl-C.
+/// A watch that shows events and obeys Ctrl-C.
 pub(crate) fn watch() -> Watch<'static> {
     Watch::new(&show, &STOP)
 }
 
-/// Does work whose events are shown, and removes the bar after it.
+/// Does work while showing its events, and then removes the bar.
 pub(crate) fn watched<T>(work: impl FnOnce(&Watch<'_>) -> T) -> T {
     let outcome = work(&watch());
     finish();

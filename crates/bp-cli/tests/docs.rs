@@ -1,4 +1,4 @@
-//! The documentation: its links lead somewhere, and its index leads everywhere.
+//! The documentation: its links work, and its index reaches every page.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
@@ -35,7 +35,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     below.flatten().collect()
 }
 
-/// The text without code blocks and `code`, where brackets are no links and `#` begins no heading.
+/// The text without code blocks and `code`, in which brackets are not links and `#` does not begin a heading.
 fn prose(text: &str) -> String {
     let mut fenced = false;
     let lines = text.lines().filter(|line| {
@@ -49,7 +49,7 @@ fn prose(text: &str) -> String {
 /// A link within the project.
 #[derive(Debug)]
 struct Link {
-    /// From the root.
+    /// The path from the root.
     file: PathBuf,
     anchor: Option<String>,
 }
@@ -84,7 +84,7 @@ fn anchors(page: &Path) -> Vec<String> {
         let kept = heading.to_lowercase().replace(' ', "-");
         kept.chars().filter(|c| c.is_alphanumeric() || "-_".contains(*c)).collect()
     };
-    // Code in a heading is a part of its anchor.
+    // Code in a heading is part of its anchor.
     let text = read(page).replace('`', "");
     prose(&text).lines().filter(|line| line.starts_with('#')).map(|line| slug(line.trim_matches(['#', ' ']))).collect()
 }

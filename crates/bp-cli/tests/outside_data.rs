@@ -1,5 +1,5 @@
-//! Against public data and labellings that others computed. Needs `BP_DATA`: without it these tests do nothing and say
-//! so; with it, missing data is a failure.
+//! Tests against public data and labellings by other programs. They need `BP_DATA`: without it they are skipped with a
+//! message; with it, missing data is a failure.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
@@ -26,7 +26,8 @@ fn bp(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Every energy of `energies.csv` (total, data, smoothness), from labellings by other programs under the same definition.
+/// Every energy of `energies.csv` (total, data, smoothness), from labellings by other programs under the same
+/// definition.
 #[test]
 fn outside_energies_are_reproduced_and_bp_is_no_worse() {
     let Some(data) = data() else { return };
@@ -50,8 +51,8 @@ fn outside_energies_are_reproduced_and_bp_is_no_worse() {
     assert!(tsukuba.energy.total <= 1_144_352, "BP-M reached 1144352, we {}", tsukuba.energy.total);
 }
 
-/// Prototypes in single precision gave 4.5 % visible and 11.7 % of all pixels wrong by more than 1 px and an error of
-/// 6.0 px, means of the six scenes: an independent implementation of the same model.
+/// Single-precision prototypes, an independent implementation of the same model, had 4.5 % of non-occluded and 11.7 %
+/// of all pixels wrong by more than 1 px, and a root mean squared error of 6.0 px (means over the six scenes).
 #[test]
 fn census_costs_are_as_accurate_as_the_prototypes() {
     let Some(data) = data() else { return };
@@ -99,7 +100,7 @@ fn census_costs_are_as_accurate_as_the_prototypes() {
     }
 }
 
-/// Sets that nothing here runs on may be missing.
+/// Data sets that no test uses may be missing.
 #[test]
 fn no_data_file_is_wrong_and_none_that_is_run_on_is_missing() {
     let Some(data) = data() else { return };
@@ -117,13 +118,13 @@ fn no_data_file_is_wrong_and_none_that_is_run_on_is_missing() {
     assert!(lines.iter().all(|line| line.ends_with("as listed")), "{lines:#?}");
 }
 
-/// No alarm about any real pair, and one about each that is exchanged or whose right image lies a row too high.
+/// Real pairs cause no warning. Each of them does if it is exchanged, or if its right image is one row too high.
 #[test]
 fn wrong_pairs_are_told_and_no_others() {
     let Some(data) = data() else { return };
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    // What is recorded of all pairs.
+    // The records of all pairs.
     let matched = |pairs: &Path, output: &str| -> Vec<Value> {
         let mut match_all = Command::new(env!("CARGO_BIN_EXE_bp"));
         match_all.args(["match", "--labels", "auto", "--quiet", "--pairs"]).arg(pairs).arg("--output").arg(at(output));

@@ -1,4 +1,4 @@
-//! What `bp match` holds at its peak, measured by the system.
+//! The peak memory of `bp match`, measured by the system.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
@@ -6,7 +6,7 @@ use std::{fs, path::Path, process::Command};
 
 use nix::sys::resource::{UsageWho, getrusage};
 
-/// Images large enough for buffers that allocators treat as large, and small enough for ones that they keep.
+/// A size whose buffers include both kinds: those that allocators treat as large, and those that they keep.
 const SIZE: (usize, usize) = (2500, 2000);
 
 fn pair(folder: &Path) {
@@ -19,7 +19,8 @@ fn pair(folder: &Path) {
     }
 }
 
-/// The smallest limit that is not refused, as the refusal of a smaller one tells, is kept whatever is made of the map.
+/// The refusal of a tiny limit names the smallest possible one. The program keeps to that limit with all kinds of
+/// outputs.
 #[test]
 fn the_least_memory_limit_is_kept() {
     let folder = tempfile::tempdir().unwrap();
@@ -37,7 +38,7 @@ fn the_least_memory_limit_is_kept() {
         let output = run(&least);
         let least = (least.strip_suffix("MiB").unwrap().parse::<f64>().unwrap() * f64::from(1 << 20)) as u64;
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        // The peak of the largest child so far: no test runs beside this one.
+        // The peak of the largest child process so far. No other test runs at the same time.
         let held = getrusage(UsageWho::RUSAGE_CHILDREN).unwrap().max_rss() as u64 * 1024;
         assert!(held <= least, "{options:?}: {held} bytes held, {least} allowed");
     }

@@ -1,4 +1,4 @@
-//! Recorded runs and what is shown of them.
+//! Recorded runs and the pages generated from them.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
@@ -51,7 +51,7 @@ fn committed_records_fit_the_schema_and_are_whole() {
                     let planned = cell.settings.planned_bytes;
                     assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
                 }
-                // A GPU may be too small for a plan, or not there.
+                // A GPU may be too small for a plan, or missing.
                 Outcome::Unavailable(reason) => assert!(!reason.is_empty(), "{} {}", cell.scene, cell.plan),
                 Outcome::Pending | Outcome::Error(_) => panic!("{}: {} {}", run.display(), cell.scene, cell.plan),
             }
@@ -59,7 +59,7 @@ fn committed_records_fit_the_schema_and_are_whole() {
     }
 }
 
-/// What is committed beside a record is what the program makes of it now.
+/// The committed files beside a record are those that the program makes from it now.
 #[test]
 fn reports_are_made_from_their_records() {
     for run in runs() {
@@ -79,7 +79,7 @@ fn reports_are_made_from_their_records() {
     }
 }
 
-/// The same of `bp speed`. The record of a former benchmark has no version of the schema: no program reads it.
+/// The same for `bp speed`. The record of a former benchmark has no schema version, and no program reads it.
 #[test]
 fn pages_of_speed_are_made_from_their_records() {
     let entries = fs::read_dir(root().join("results")).unwrap().map(|entry| entry.unwrap().path());
@@ -103,7 +103,7 @@ fn pages_of_speed_are_made_from_their_records() {
     assert!(read >= 2, "growth and lavapipe are recorded");
 }
 
-/// docs/thesis.md shows what the record says.
+/// docs/thesis.md agrees with its record.
 #[test]
 fn the_page_on_the_thesis_is_made_from_a_record() {
     let page = Path::new("docs/thesis.md");
@@ -115,8 +115,8 @@ fn the_page_on_the_thesis_is_made_from_a_record() {
     assert!(renewed.as_deref() == Some(&text), "run: bp report {} --readme {}", run.display(), page.display());
 }
 
-/// Prototypes of the same models in single precision, measured on the same six images at half size: visible pixels and
-/// all pixels wrong by more than 1 px in percent, and the root mean squared error.
+/// Single-precision prototypes of the same models, measured on the same six images at half size: the percentages of
+/// non-occluded and of all pixels that are wrong by more than 1 px, and the root mean squared error.
 #[test]
 fn recorded_accuracy_is_that_of_the_prototypes() {
     let expected = [
@@ -133,7 +133,7 @@ fn recorded_accuracy_is_that_of_the_prototypes() {
     for (record, (plan, expected)) in real.iter().flat_map(|record| expected.map(|plan| (record, plan))) {
         for backend in &record.run.backends {
             let cells = record.cells.iter().filter(|cell| cell.plan == plan && cell.backend == *backend);
-            // Means over some of the scenes are others.
+            // If a scene is missing, the mean is not comparable.
             let Some(measured) = cells.map(|cell| cell.measured()).collect::<Option<Vec<_>>>() else { continue };
             let mean = |value: fn(&harness::record::Measurement) -> f64| {
                 measured.iter().map(|measured| value(measured)).sum::<f64>() / measured.len() as f64

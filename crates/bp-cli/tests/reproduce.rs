@@ -1,4 +1,4 @@
-//! A whole quick run on the synthetic scenes: interrupted, killed, gone on with, and complete in the end.
+//! A quick run on the synthetic scenes that is interrupted, killed, resumed and completed.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
@@ -11,7 +11,7 @@ use std::{
 
 use harness::record::{Outcome, Record};
 
-/// One has no device, which hinders no other.
+/// One of them has no device, which must not affect the others.
 const BACKENDS: &str = if cfg!(feature = "vulkan") { "scalar,vulkan,rayon" } else { "scalar,rayon" };
 
 fn start(results: &Path) -> Child {
@@ -83,7 +83,7 @@ fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
 
     assert!(start(results).wait().unwrap().success());
     let folders = run_folders(results);
-    assert_eq!(folders.len(), 1, "an interrupted run is gone on with, not begun anew");
+    assert_eq!(folders.len(), 1, "an interrupted run is resumed, not started again");
     let complete = record(&folders[0]);
     let unavailable = complete.cells.iter().filter(|cell| matches!(cell.outcome, Outcome::Unavailable(_))).count();
     assert_eq!(unavailable > 0, BACKENDS.contains("vulkan"));
@@ -117,7 +117,7 @@ fn check_report(folder: &Path) {
         assert!(markdown.contains(&format!("### Table {number}: ")), "Table {number}");
         assert!(html.contains(&format!("Table {number}: ")), "Table {number}");
     }
-    // Ours are error, memory, and the energies of two profiles.
+    // The diagrams A.1 to A.4 are our own: error, memory, and the energies of two profiles.
     let diagrams = (1..=14).map(|i| format!("diagram-4.{i}")).chain((1..=4).map(|i| format!("diagram-A.{i}")));
     let diagrams: Vec<_> = diagrams.collect();
     for name in &diagrams {

@@ -1,4 +1,4 @@
-//! The house: which crate may depend on which, and what only the program does.
+//! The architecture: which crates may depend on each other, and what only the program may do.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::{
@@ -10,7 +10,7 @@ use std::{
 
 use serde_json::Value;
 
-/// Every crate with the crates of ours that it may depend on. Arrows point up this list only.
+/// Every crate, with the crates of the workspace that it may depend on. These come earlier in the list.
 const ROOMS: [(&str, &[&str]); 13] = [
     ("bp-shaders", &[]),
     ("bp-core", &[]),
@@ -27,7 +27,7 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("bp-cli", &["bp-core", "bp-testkit", "bp-gpu", "bp-io", "bp-stereo", "bp-charts", "harness"]),
 ];
 
-/// What is for a program with a command line alone.
+/// Dependencies that only a program with a command line may have.
 const OF_PROGRAMS: [&str; 6] = ["clap", "clap_complete", "clap_mangen", "ctrlc", "env_logger", "indicatif"];
 
 fn root() -> PathBuf {
@@ -92,7 +92,7 @@ fn a_build_without_gpu_backends_has_no_crate_of_theirs() {
 /// Files of libraries that only tests use.
 const IS_FOR_TESTS: [&str; 2] = ["tests.rs", "conformance.rs"];
 
-/// All lines of a library's sources that are no tests, with their files.
+/// All lines of a library's sources outside of tests, with their files.
 fn lines(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut lines = Vec::new();
     for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {

@@ -1,7 +1,8 @@
 //! The traits of a backend: it lists devices, opens one, prepares a plan on it and solves pairs.
 //!
-//! A backend owns the buffers and the five kernels. [`crate::Driver`] calls them in order, takes times and stops. It checks
-//! everything that needs no device, so a [`Solver`] may rely on a valid plan and on pairs of its size.
+//! A backend owns the buffers and the five kernels. [`crate::Driver`] calls the kernels in order, measures their times
+//! and can stop a solve. It checks everything that needs no device, so a [`Solver`] may rely on a valid plan and on
+//! pairs of its size.
 
 use std::{ops::Range, time::Duration};
 
@@ -12,8 +13,8 @@ pub trait Backend: Sync {
     /// The name used in options and records.
     fn name(&self) -> &'static str;
 
-    /// Lists the devices, the probably fastest first (see [`DeviceKind`]). It never fails: without devices the list is
-    /// empty, and [`Backend::open`] says why.
+    /// Lists the devices, starting with the probably fastest one (see [`DeviceKind`]). Never fails: if there are no
+    /// devices, the list is empty, and [`Backend::open`] reports the reason.
     fn devices(&self) -> Vec<DeviceInfo>;
 
     /// Opens a device by its index in [`Backend::devices`].
@@ -23,22 +24,22 @@ pub trait Backend: Sync {
     fn open(&self, device: usize) -> Result<Box<dyn Device>, Error>;
 }
 
-/// What a device is known to be before it is opened.
+/// What is known about a device before it is opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceInfo {
     /// The name of the device.
     pub name: String,
     /// The kind of device.
     pub kind: DeviceKind,
-    /// The API that reaches it, with the version, if there is one.
+    /// The API used to access it, with the version, if any.
     pub api: Option<String>,
-    /// Its driver, with the version, if there is one.
+    /// Its driver, with the version, if any.
     pub driver: Option<String>,
-    /// The bytes of its own memory, if it has any. A CPU shares the machine's memory.
+    /// The size of its own memory in bytes, if it has any. A CPU shares the machine's memory.
     pub memory_bytes: Option<u64>,
     /// The UUID that its driver reports, in lower-case hexadecimal with hyphens.
     pub uuid: Option<String>,
-    /// How many threads work at the same time; 1 for a GPU.
+    /// How many threads run at the same time; 1 for a GPU.
     pub workers: usize,
 }
 
@@ -47,13 +48,13 @@ pub struct DeviceInfo {
 pub enum DeviceKind {
     /// The machine's CPU, without an API in between.
     Processor,
-    /// A GPU with memory of its own.
+    /// A GPU with its own memory.
     DiscreteGpu,
     /// A GPU that shares the machine's memory.
     IntegratedGpu,
-    /// A GPU lent by a virtual machine.
+    /// A GPU provided by a virtual machine.
     VirtualGpu,
-    /// Some other device that computes.
+    /// Any other compute device.
     Other,
     /// A GPU driver that runs on the CPU. Its times say nothing about GPUs.
     SoftwareRasteriser,
@@ -89,10 +90,10 @@ pub trait Device: Send + Sync {
     /// Allocates everything that solving `plan` needs.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] and [`Error::Unsupported`], if possible before it allocates anything, and errors of the device.
+    /// [`Error::OutOfMemory`] and [`Error::Unsupported`], if possible before any allocation, and errors of the device.
     fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
 
-    /// Checks that the device can run a plan, without allocating anything. By default it can.
+    /// Checks that the device can run a plan, without allocating anything. The default accepts every plan.
     ///
     /// # Errors
     /// [`Error::Unsupported`] and [`Error::OutOfMemory`], as [`Device::prepare`] would report.
@@ -101,14 +102,13 @@ pub trait Device: Send + Sync {
         Ok(())
     }
 
-    /// The bytes that [`Device::prepare`] will allocate: by default [`Plan::bytes`]. A device may pad buffers or do without
-    /// some of them.
+    /// The bytes that [`Device::prepare`] will allocate, by default [`Plan::bytes`]. Devices may pad or omit buffers.
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         plan.bytes()
     }
 
-    /// Measures how many bytes a second the device reads and writes, together, while it copies its own memory: an upper
-    /// bound for its kernels. `None` if that says nothing.
+    /// Measures the total bytes per second that the device reads and writes while it copies its own memory. This is an
+    /// upper bound for its kernels. `None` if the rate is not meaningful.
     ///
     /// # Errors
     /// Errors of the device.
@@ -119,8 +119,8 @@ pub trait Device: Send + Sync {
 
 /// The five kernels, and the buffers of one plan. It allocates nothing after [`Device::prepare`].
 ///
-/// A kernel may just enqueue its work, in the order of the calls. [`Solver::select_labels`] waits for all of it. A device
-/// that works so reports the real time of each stage by [`Solver::device_times`].
+/// A kernel may only enqueue its work, in the order of the calls; [`Solver::select_labels`] then waits for all of it.
+/// Such a device reports the actual time of each stage through [`Solver::device_times`].
 pub trait Solver: Send {
     /// Computes the data costs of grid 0 from a pair. A `seed` sets the costs around the cut.
     ///
@@ -134,14 +134,14 @@ pub trait Solver: Send {
     /// Errors of the device.
     fn coarsen(&mut self, grid: usize) -> Result<(), Error>;
 
-    /// Sets the first messages of `grid`: zeros on the coarsest grid, else copies from the next coarser grid.
+    /// Sets the first messages of `grid`: zeros on the coarsest grid, otherwise copies from the next coarser grid.
     ///
     /// # Errors
     /// Errors of the device.
     fn refine(&mut self, grid: usize) -> Result<(), Error>;
 
-    /// Starts grid 0 with the messages that it holds. Called instead of [`Solver::refine`], after a solve that was not
-    /// stopped and before any coarser grid is refined again, but never under [`crate::Schedule::Sweep`]. See
+    /// Starts grid 0 with the messages that it already holds. Called instead of [`Solver::refine`], only after a solve
+    /// that was not stopped, before any coarser grid is refined again, and never under [`crate::Schedule::Sweep`]. See
     /// [`crate::Driver::solve_warm_observed`].
     ///
     /// # Errors
@@ -154,23 +154,23 @@ pub trait Solver: Send {
     /// Errors of the device.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error>;
 
-    /// Writes the label of the lowest belief of every pixel, `[height][width]`; the smallest label wins a tie. Under
+    /// Writes the label with the lowest belief of every pixel, `[height][width]`; the smallest label wins a tie. Under
     /// [`crate::Schedule::Sweep`] labels are decided one after another, as described there.
     ///
     /// # Errors
     /// Errors of the device.
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error>;
 
-    /// Copies the last message that every node of grid 0 received from `side`, `[height][width][labels]`. It is zeros where
-    /// no message comes from there, or where under [`crate::Schedule::Sweep`] the edge holds the opposite message. This is
-    /// no kernel; it serves to compare backends.
+    /// Copies the last message that every node of grid 0 received from `side`, `[height][width][labels]`. Writes zeros
+    /// where no message comes from that side, or where the edge holds the opposite message under
+    /// [`crate::Schedule::Sweep`]. This is not a kernel: it is used to compare backends.
     ///
     /// # Errors
     /// Errors of the device.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error>;
 
-    /// Preferred number of steps per call, at least 1. A backend that fuses steps says how many, or `u32::MAX` if it runs
-    /// all steps on a grid together. A solve reports progress and can stop only between calls.
+    /// Preferred number of steps per call, at least 1. A backend that fuses steps returns how many, or `u32::MAX` if it
+    /// runs all steps on a grid together. A solve reports progress and can stop only between calls.
     fn fused_steps(&self) -> u32 {
         1
     }
@@ -181,8 +181,8 @@ pub trait Solver: Send {
         None
     }
 
-    /// The bytes that each stage had to read and write at least since the last [`Solver::match_cost`], in the order of
-    /// [`Stage::ALL`]. It counts each value once per step. `None` if the device does not count.
+    /// The minimum number of bytes that each stage has read and written since the last [`Solver::match_cost`], in the
+    /// order of [`Stage::ALL`]. Each value counts once per step. `None` if the device does not count.
     fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         None
     }
@@ -192,6 +192,6 @@ pub trait Solver: Send {
         None
     }
 
-    /// The bytes that this solver allocated, counted.
+    /// The bytes that this solver has actually allocated.
     fn allocated_bytes(&self) -> u64;
 }

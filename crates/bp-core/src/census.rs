@@ -35,16 +35,16 @@ pub fn code(image: &Image, x: usize, y: usize) -> u8 {
     compare_window(image, Node { x, y }, 1, grey) as u8
 }
 
-/// The same code by a colour channel, 0 for red to 2 for blue, instead of grey values.
+/// The census code computed from a colour channel (0 red, 1 green, 2 blue) instead of grey values.
 ///
 /// # Panics
-/// If (x, y) lies outside, or `channel` is above 2.
+/// If (x, y) lies outside the image, or `channel` is above 2.
 #[must_use]
 pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
     compare_window(image, Node { x, y }, 1, |colour| colour[channel]) as u8
 }
 
-/// The same code with the 24 neighbours in a window of 5x5 pixels, in 24 bits.
+/// The census code of the 24 neighbours in a 5x5 window, in 24 bits.
 ///
 /// # Panics
 /// If (x, y) lies outside the image.
@@ -53,7 +53,7 @@ pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
     compare_window(image, Node { x, y }, 2, grey)
 }
 
-/// One bit for each neighbour at most `reach` columns and rows away. `value` turns colours into the compared values.
+/// One bit for each neighbour at most `reach` columns and rows away. `value` converts colours to the values compared.
 fn compare_window(image: &Image, node: Node, reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
     let Node { x, y } = node;
     let centre = value(image.rgb(x, y));

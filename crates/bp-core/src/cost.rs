@@ -2,7 +2,7 @@
 
 use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, features, memory};
 
-/// The features of every pixel that a profile compares, `[height][width]`, of both images.
+/// The per-pixel features that a profile compares, `[height][width]`, of both images.
 #[derive(Clone, Debug)]
 enum Planes {
     Thesis([Vec<u8>; 2]),
@@ -54,7 +54,7 @@ impl DataCost {
     /// Loads a pair. A seed sets the costs around it.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the pair is of another size.
+    /// [`Error::WrongSize`] if the pair has another size.
     pub fn load(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         if pair.size() != self.size {
             return Err(Error::WrongSize { what: "the pair", found: pair.size(), expected: self.size });
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(found, [(3, 9), (0, 0), (6, 18), (3, 9), (3, 9)]);
     }
 
-    /// What strips of an image are matched by.
+    /// Matching an image in strips relies on this.
     #[test]
     fn costs_of_a_strip_are_those_of_the_whole_image() {
         let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);

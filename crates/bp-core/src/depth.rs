@@ -1,8 +1,8 @@
-//! Depth and points from disparities, by the geometry of a rectified pair.
+//! Depth and 3D points from disparities and the geometry of a rectified pair.
 //!
-//! A point at depth Z in front of the left camera has the disparity `d = f B / Z - doffs`. Here f is the focal length in
-//! pixels, B the baseline (the distance between the cameras), and doffs says how many pixels the right principal point
-//! lies to the right of the left one. These names come from `calib.txt` of Scharstein et al. (2014).
+//! A point at depth Z in front of the left camera has the disparity `d = f B / Z - doffs`. Here f is the focal length
+//! in pixels, B the baseline (the distance between the cameras), and doffs the number of pixels by which the right
+//! principal point lies to the right of the left one. These names come from `calib.txt` of Scharstein et al. (2014).
 
 use crate::{DisparityMap, Error, Image};
 
@@ -88,7 +88,7 @@ pub fn depth_map(map: &DisparityMap, calibration: &Calibration) -> Vec<f32> {
 /// A point that the left image shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// As [`Calibration::position`] gives it.
+    /// As returned by [`Calibration::position`].
     pub position: [f32; 3],
     /// The colour of its pixel.
     pub colour: [u8; 3],

@@ -17,7 +17,7 @@ impl DisparityMap {
     /// A map from its values, `[height][width]`. Values that are not finite count as unknown.
     ///
     /// # Errors
-    /// [`Error::PixelCount`] if `values` does not hold one value a pixel.
+    /// [`Error::PixelCount`] if `values` does not hold one value per pixel.
     pub fn new(size: Size, mut values: Vec<f32>) -> Result<Self, Error> {
         if values.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: values.len() });
@@ -30,10 +30,10 @@ impl DisparityMap {
         Ok(Self { size, values })
     }
 
-    /// The disparities of labels `[height][width]` of a model.
+    /// The disparities of a model's labels, `[height][width]`.
     ///
     /// # Panics
-    /// If `labels` does not hold one label a pixel.
+    /// If `labels` does not hold one label per pixel.
     #[must_use]
     pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Self {
         assert_eq!(labels.len(), size.pixels(), "one label a pixel");
@@ -47,7 +47,7 @@ impl DisparityMap {
         self.replaced(|values| values.chunks_exact_mut(width).for_each(<[f32]>::reverse))
     }
 
-    /// The map with values changed by `change`, which must set values that are not finite to [`DisparityMap::UNKNOWN`].
+    /// The map after `change` has edited its values. `change` must set non-finite values to [`DisparityMap::UNKNOWN`].
     pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
         change(&mut self.values);
         self
@@ -75,7 +75,7 @@ impl DisparityMap {
         value.is_finite().then_some(value)
     }
 
-    /// The least and the largest known disparity; `None` if no pixel is known.
+    /// The smallest and the largest known disparity; `None` if no pixel is known.
     #[must_use]
     pub fn range(&self) -> Option<(f32, f32)> {
         let known = self.values.iter().copied().filter(|v| v.is_finite());

@@ -1,4 +1,4 @@
-//! The driver: runs a prepared plan on one pair after another, calls the kernels in order, and takes their times.
+//! The driver: runs a prepared plan on one pair after another, calls the kernels in order, and measures their times.
 
 use std::{
     ops::{AddAssign, ControlFlow},
@@ -12,14 +12,14 @@ use crate::{Device, DisparityMap, Error, Node, Plan, Schedule, Side, Solver, Sta
 pub struct Times {
     /// The wall-clock time of each stage over all grids, in the order of [`Stage::ALL`].
     pub wall: [Duration; Stage::ALL.len()],
-    /// The same by the device's clock, if it has one; see [`Solver::device_times`].
+    /// The time of each stage by the device's clock, if it has one; see [`Solver::device_times`].
     pub device: Option<[Duration; Stage::ALL.len()]>,
     /// The wall-clock time from images in memory to labels in memory. It includes the census search of a cut plan, which
     /// belongs to no stage.
     pub total: Duration,
 }
 
-/// Adds stage by stage. If only one of them has device times, it keeps those.
+/// Adds stage by stage. If only one operand has device times, the sum keeps those.
 impl AddAssign for Times {
     fn add_assign(&mut self, other: Self) {
         let sum = |a: [Duration; 5], b: [Duration; 5]| std::array::from_fn(|stage| a[stage] + b[stage]);
@@ -41,7 +41,7 @@ pub struct Progress {
     pub total: u64,
 }
 
-/// A function that is called after every [`Solver::update_messages`]. If it breaks, the solve stops.
+/// A function called after every [`Solver::update_messages`]. If it returns [`ControlFlow::Break`], the solve stops.
 pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
 /// A plan prepared on a device, ready to match one pair of its size after another.
@@ -49,12 +49,12 @@ pub struct Driver {
     plan: Plan,
     solver: Box<dyn Solver>,
     labels: Vec<u16>,
-    /// Whether the last solve was completed.
+    /// Whether the last solve finished.
     has_answer: bool,
 }
 
 impl Driver {
-    /// Prepares `plan` on `device`. It allocates everything.
+    /// Prepares `plan` on `device` and allocates everything it needs.
     ///
     /// # Errors
     /// Those of [`Device::prepare`].
@@ -73,7 +73,7 @@ impl Driver {
         &self.plan
     }
 
-    /// The bytes allocated for the plan, counted.
+    /// The bytes actually allocated for the plan.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
         self.solver.allocated_bytes() + memory::bytes(&self.labels)
@@ -85,8 +85,8 @@ impl Driver {
         self.solver.compile_time()
     }
 
-    /// The bytes that each stage of the last solve had to read and write at least, in the order of [`Stage::ALL`], if the
-    /// device counts them; see [`Solver::moved_bytes`].
+    /// The minimum number of bytes that each stage of the last solve read and wrote, in the order of [`Stage::ALL`], if
+    /// the device counts them; see [`Solver::moved_bytes`].
     #[must_use]
     pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         self.solver.moved_bytes()
@@ -95,12 +95,12 @@ impl Driver {
     /// Matches a pair. [`Driver::labels`] and [`Driver::disparities`] hold the result until the next solve.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the pair is not of the plan's size, and those of the device.
+    /// [`Error::WrongSize`] if the pair does not have the plan's size, and errors of the device.
     pub fn solve(&mut self, pair: &StereoPair) -> Result<Times, Error> {
         self.solve_observed(pair, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same with an observer, which receives the progress and may stop the solve.
+    /// [`Driver::solve`] with an observer, which receives the progress and may stop the solve.
     ///
     /// # Errors
     /// As [`Driver::solve`], and [`Error::Stopped`].
@@ -108,10 +108,10 @@ impl Driver {
         self.solve_from(pair, Start::Cold, observer)
     }
 
-    /// Matches the next frame of a video, starting from the messages of the frame before. The last messages of grid 0 become
-    /// its first ones, and the plan's steps run on grid 0 alone, counted from 0. Without coarser grids such a solve is
-    /// faster, but as good only where little has moved. The first solve of a driver, and one after a solve that was stopped
-    /// or failed, is a [`Driver::solve_observed`].
+    /// Matches the next frame of a video, starting from the messages of the previous frame. The last messages of grid 0
+    /// become its first ones, and the plan's steps run on grid 0 only, counted from 0. Without coarser grids such a
+    /// solve is faster, but its result is as good only where little has moved. The first solve of a driver, and any
+    /// solve after one that stopped or failed, runs as [`Driver::solve_observed`].
     ///
     /// # Errors
     /// As [`Driver::solve_observed`]; [`Error::Plan`] under [`Schedule::Sweep`], whose bands hold messages only while
@@ -153,16 +153,16 @@ impl Driver {
         &self.labels
     }
 
-    /// The disparity map of the last solve. It allocates the map.
+    /// The disparity map of the last solve. Allocates the map.
     #[must_use]
     pub fn disparities(&self) -> DisparityMap {
         DisparityMap::from_labels(self.plan.image_size(), self.plan.model(), &self.labels)
     }
 
-    /// The last messages received from `side`; see [`Solver::read_messages`]. It allocates their volume.
+    /// The last messages received from `side`; see [`Solver::read_messages`]. Allocates room for them.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], and those of the device.
+    /// [`Error::OutOfMemory`], and errors of the device.
     pub fn messages(&mut self, side: Side) -> Result<Vec<u8>, Error> {
         let mut messages = memory::filled("a copy of the messages", self.plan.volume(0), 0)?;
         self.solver.read_messages(side, &mut messages)?;
@@ -175,7 +175,7 @@ impl Driver {
 enum Start {
     /// Zeros on the coarsest grid.
     Cold,
-    /// Those that grid 0 holds.
+    /// The messages that grid 0 already holds.
     Warm,
 }
 

@@ -13,10 +13,10 @@ pub struct Energy {
 
 impl Energy {
     /// The energy of `labels` `[height][width]`. It uses data costs without a seed and all edges of the image, even those
-    /// across a cut, so that energies of all plans can be compared.
+    /// across a cut, so that the energies of all plans are comparable.
     ///
     /// # Errors
-    /// [`Error::PixelCount`] if `labels` does not hold one label a pixel, [`Error::OutOfMemory`].
+    /// [`Error::PixelCount`] if `labels` does not hold one label per pixel, [`Error::OutOfMemory`].
     pub fn of(pair: &StereoPair, model: &Model, labels: &[u16]) -> Result<Self, Error> {
         let size = pair.size();
         if labels.len() != size.pixels() {
@@ -44,8 +44,8 @@ impl Energy {
     }
 }
 
-/// The label of the lowest data cost of every pixel, `[height][width]`: matching without smoothness. The smallest label
-/// wins a tie.
+/// The label with the lowest data cost of every pixel, `[height][width]`: matching without smoothness. The smallest
+/// label wins a tie.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
@@ -73,7 +73,7 @@ mod tests {
         assert_eq!(energy, Energy { data: 30, smoothness: 0 });
         let energy = Energy::of(&pair, &model, &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy, Energy { data: 765 + 30 + 765, smoothness: 20 + 20 + 40 });
-        // Across there are 10 grey values between neighbours, down 20.
+        // Horizontal neighbours differ by 10 grey values, vertical ones by 20.
         let energy = Energy::of(&pair, &model.with_weak_edges(Some(10)), &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy.smoothness, 10 + 10 + 40);
         assert!(Energy::of(&pair, &model, &[0; 3]).is_err());

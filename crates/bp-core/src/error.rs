@@ -14,21 +14,21 @@ pub enum Error {
     /// An image without pixels.
     #[error("an image of {size} pixels is empty")]
     Empty {
-        /// The size asked for.
+        /// The requested size.
         size: Size,
     },
     /// An image with a side longer than [`MAX_SIDE`].
     #[error("an image of {size} pixels is too large: a side holds at most {MAX_SIDE}")]
     TooLarge {
-        /// The size asked for.
+        /// The requested size.
         size: Size,
     },
     /// Too few or too many values for an image.
     #[error("{found} values for {size} pixels")]
     PixelCount {
-        /// The size asked for.
+        /// The requested size.
         size: Size,
-        /// How many values there were.
+        /// How many values were given.
         found: usize,
     },
     /// Two images of a pair that differ in size.
@@ -39,41 +39,41 @@ pub enum Error {
         /// Size of the right image.
         right: Size,
     },
-    /// Something that has another size than expected.
+    /// Something whose size differs from the expected one.
     #[error("{what} has {found} pixels where {expected} were expected")]
     WrongSize {
-        /// What has the size.
+        /// The thing that has the wrong size.
         what: &'static str,
         /// Its size.
         found: Size,
-        /// The size it should have.
+        /// The expected size.
         expected: Size,
     },
     /// No labels, or more than [`MAX_LABELS`].
     #[error("{labels} labels: from 1 to {MAX_LABELS} are possible")]
     Labels {
-        /// How many were asked for.
+        /// The requested number of labels.
         labels: usize,
     },
     /// A least disparity with which no pixel of any image could match.
     #[error("a least disparity of {min_disparity} px is beyond any image: from {low} to {high} are possible", low = -(MAX_SIDE as i64), high = MAX_SIDE)]
     MinDisparity {
-        /// What was asked for.
+        /// The requested least disparity.
         min_disparity: i32,
     },
-    /// A truncation K with which messages of 8 bits would not be exact.
+    /// A truncation K above the largest with which 8-bit messages are exact.
     #[error("a truncation of {truncation} is above {MAX_TRUNCATION}, the most with which 8-bit messages are exact")]
     Truncation {
-        /// What was asked for.
+        /// The requested truncation.
         truncation: u8,
     },
-    /// A calibration that no pair of cameras has.
+    /// A calibration that no pair of cameras can have.
     #[error("{0}")]
     Calibration(&'static str),
     /// Settings that contradict each other.
     #[error("{0}")]
     Plan(&'static str),
-    /// More memory needed than available.
+    /// More memory is needed than is available.
     #[error("out of memory: {} needed for {what}{}", iec(*needed), but_only(*available))]
     OutOfMemory {
         /// The purpose of the memory.
@@ -90,10 +90,10 @@ pub enum Error {
         backend: &'static str,
         /// Index of the device.
         device: usize,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// A plan beyond the limits of a device, although its memory would do.
+    /// A plan that exceeds the limits of a device, although its memory would suffice.
     #[error("{device} cannot run this plan: {reason}")]
     Unsupported {
         /// Name of the device.
@@ -101,7 +101,7 @@ pub enum Error {
         /// The limit, and what exceeds it.
         reason: String,
     },
-    /// A device that went away or was reset while it worked. Everything prepared on it is lost.
+    /// A device that disappeared or was reset while it was working. Everything prepared on it is lost.
     #[error("{device} was lost: {reason}")]
     DeviceLost {
         /// Name of the device.
@@ -122,7 +122,7 @@ pub enum Error {
     Device {
         /// Name of the device.
         device: String,
-        /// What failed.
+        /// A description of the failure.
         reason: String,
     },
     /// The observer asked to stop.
@@ -130,7 +130,7 @@ pub enum Error {
     Stopped,
 }
 
-/// Bytes in a unit that people use.
+/// Formats a number of bytes with a readable unit.
 fn iec(bytes: u64) -> String {
     ByteSize(bytes).display().iec().to_string()
 }

@@ -13,13 +13,13 @@ pub(crate) fn census_rgb(image: &Image, x: usize, y: usize) -> [u8; 3] {
     [0, 1, 2].map(|channel| census::code_of_channel(image, x, y, channel))
 }
 
-/// Grey value and horizontal gradient, half the difference of the neighbours, 128 where they are equal.
+/// Grey value and horizontal gradient: half the difference of the two neighbours, offset so that 128 means equal.
 pub(crate) fn gradient(image: &Image, x: usize, y: usize) -> [u8; 2] {
     let beside = |dx| u16::from(image.grey_near(x as isize + dx, y as isize));
     [image.grey(x, y), ((256 + beside(1) - beside(-1)) / 2) as u8]
 }
 
-/// Grey value, and the least and greatest value around, half a pixel to both sides.
+/// Grey value, and the least and greatest value within half a pixel to the left and right.
 pub(crate) fn half_samples(image: &Image, x: usize, y: usize) -> [u8; 3] {
     let centre = image.grey(x, y);
     let half = |dx| (u16::from(centre) + u16::from(image.grey_near(x as isize + dx, y as isize))).div_ceil(2) as u8;
@@ -27,27 +27,27 @@ pub(crate) fn half_samples(image: &Image, x: usize, y: usize) -> [u8; 3] {
     [centre, centre.min(left).min(right), centre.max(left).max(right)]
 }
 
-/// The cost under [`crate::Profile::Thesis`] of two grey values.
+/// The cost of two grey values under [`crate::Profile::Thesis`].
 pub(crate) fn truncated_difference(left: u8, right: u8) -> u16 {
     (7 * difference(left, right).min(15) + 5) / 10
 }
 
-/// The same under [`crate::Profile::Mrf`] of two colours.
+/// The cost of two colours under [`crate::Profile::Mrf`].
 pub(crate) fn sum_of_differences(left: [u8; 3], right: [u8; 3]) -> u16 {
     left.into_iter().zip(right).map(|(left, right)| difference(left, right)).sum()
 }
 
-/// Bits in which two of [`census_5x5`] differ, or of [`census_rgb`].
+/// The number of bits in which two codes of [`census_5x5`] or [`census_rgb`] differ.
 pub(crate) fn hamming_distance([a, b, c]: [u8; 3], [d, e, f]: [u8; 3]) -> u16 {
     (u32::from_be_bytes([0, a, b, c]) ^ u32::from_be_bytes([0, d, e, f])).count_ones() as u16
 }
 
-/// The cost under [`crate::Profile::Gradient`] of two of [`gradient`].
+/// The cost of two features of [`gradient`] under [`crate::Profile::Gradient`].
 pub(crate) fn gradient_difference([left, left_gradient]: [u8; 2], [right, right_gradient]: [u8; 2]) -> u16 {
     (3 * difference(left, right).min(20) + 35 * difference(left_gradient, right_gradient).min(4) + 5) / 10
 }
 
-/// The cost under [`crate::Profile::BirchfieldTomasi`] of two of [`half_samples`].
+/// The cost of two features of [`half_samples`] under [`crate::Profile::BirchfieldTomasi`].
 pub(crate) fn sampling_insensitive_difference(left: [u8; 3], right: [u8; 3]) -> u16 {
     let outside = |[value, ..]: [u8; 3], [_, least, greatest]: [u8; 3]| {
         u16::from(value.saturating_sub(greatest).max(least.saturating_sub(value)))
@@ -91,7 +91,7 @@ mod tests {
     fn what_half_a_pixel_explains_costs_nothing() {
         let of = sampling_insensitive_difference;
         assert_eq!(of([10, 10, 15], [15, 12, 18]), 0);
-        // 3 below the range, 7 above the other: the smaller counts, either way round.
+        // One value is 3 below the other's range, the other 7 above: the smaller distance counts, in either order.
         assert_eq!([of([10, 8, 13], [20, 13, 21]), of([20, 13, 21], [10, 8, 13])], [5, 5]);
         let flat = |difference| of([difference; 3], [0; 3]);
         assert_eq!([0, 1, 2, 3, 19, 20, 255].map(flat), [0, 2, 3, 5, 29, 30, 30]);

@@ -22,7 +22,7 @@ use crate::{DisparityMap, Error};
 /// The operations that a disparity map goes through after matching; by default none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Finish {
-    /// Whether [`check_left_right`] makes pixels unknown that contradict the map of the right image.
+    /// Whether [`check_left_right`] makes pixels unknown that contradict the right image's map.
     pub check: bool,
     /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
     pub speckles: Option<usize>,
@@ -38,8 +38,8 @@ impl Finish {
     /// Applies the selected operations to the left image's map. `right` is the right image's map, for the check.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] where the two maps differ in size, [`Error::Plan`] if a check is asked for without the
-    /// right image's map, or for a median that is none of [`MEDIANS`]; [`Error::OutOfMemory`].
+    /// [`Error::WrongSize`] if the two maps differ in size; [`Error::Plan`] for a check without the right image's map,
+    /// or for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`].
     pub fn apply(&self, left: DisparityMap, right: Option<&DisparityMap>) -> Result<DisparityMap, Error> {
         let mut map = match (self.check, right) {
             (false, _) => left,
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn holes_of_the_check_are_filled_before_filters_see_them() {
-        // Pixel 3 claims what the right map contradicts; what is filled in there survives the median.
+        // The right map contradicts pixel 3. The value that fills it survives the median.
         let left = map(5, &[0.0, 0.0, 0.0, 3.0, 0.0]);
         let right = map(5, &[0.0; 5]);
         let finish = Finish { check: true, fill: true, median: Some(3), ..Finish::default() };

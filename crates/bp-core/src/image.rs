@@ -4,14 +4,14 @@ use std::{ops::Range, sync::Arc};
 
 use crate::{Error, Size, limits::MAX_SIDE};
 
-/// The most rows of an apron (see [`Image::strip`]): no data cost looks further up or down.
+/// The most rows of an apron (see [`Image::strip`]): no data cost reads rows further up or down.
 pub const APRON: usize = 2;
 
 impl Size {
     /// A size.
     ///
     /// # Errors
-    /// [`Error::Empty`] where a side is 0, [`Error::TooLarge`] if one exceeds [`MAX_SIDE`].
+    /// [`Error::Empty`] if a side is 0, [`Error::TooLarge`] if one exceeds [`MAX_SIDE`].
     pub fn new(width: usize, height: usize) -> Result<Self, Error> {
         let size = Self { width, height };
         if width == 0 || height == 0 {
@@ -26,8 +26,8 @@ impl Size {
 
 /// An image of 8-bit colours, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
 ///
-/// A strip of a larger image may have an *apron*: up to [`APRON`] rows of the larger image above and below it. They are no
-/// part of the strip, but data costs that look at neighbouring rows see them.
+/// A strip of a larger image may have an *apron*: up to [`APRON`] rows of the larger image above and below it. These
+/// rows are not part of the strip, but data costs that read neighbouring rows use them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     size: Size,
@@ -79,8 +79,8 @@ impl Image {
         &self.pixels[self.above * self.size.width..][..self.size.pixels()]
     }
 
-    /// The colours of row `y`, `[width]`. Outside the image, they come from the apron, and beyond the apron from the last
-    /// row in that direction.
+    /// The colours of row `y`, `[width]`. Outside the image they come from the apron, and beyond the apron from the
+    /// last row in that direction.
     #[must_use]
     pub fn row_near(&self, y: isize) -> &[[u8; 3]] {
         let last = self.above + self.size.height + self.below - 1;
@@ -95,8 +95,8 @@ impl Image {
         grey(self.row_near(y)[x.clamp(0, self.size.width as isize - 1) as usize])
     }
 
-    /// Copies some rows to an image of its own. Its apron has the rows above and below them, so its data costs equal those
-    /// of the whole image.
+    /// Copies some rows to a new image. Its apron holds the rows above and below them, so its data costs equal those of
+    /// the whole image.
     ///
     /// # Panics
     /// If `rows` is empty or lies outside the image.
@@ -209,7 +209,7 @@ impl StereoPair {
     /// Copies some rows of both images; see [`Image::strip`].
     ///
     /// # Panics
-    /// As there.
+    /// As [`Image::strip`].
     #[must_use]
     pub fn strip(&self, rows: Range<usize>) -> Self {
         Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
@@ -218,7 +218,7 @@ impl StereoPair {
     /// Copies the same columns of both images; see [`Image::columns`].
     ///
     /// # Panics
-    /// As there.
+    /// As [`Image::columns`].
     #[must_use]
     pub fn columns(&self, columns: Range<usize>) -> Self {
         Self { left: self.left.columns(columns.clone()), right: self.right.columns(columns) }
@@ -241,7 +241,7 @@ mod tests {
         assert_eq!([narrow(128), narrow(129), narrow(u16::MAX)], [0, 1, 255]);
     }
 
-    /// Five rows of their own number.
+    /// Five rows, each filled with its own index.
     fn rows() -> Image {
         Image::from_grey(2, 5, &[0, 0, 1, 1, 2, 2, 3, 3, 4, 4]).unwrap()
     }

@@ -22,10 +22,10 @@
 //! # }
 //! ```
 //!
-//! A [`Model`] says what is minimised, a [`Plan`] what is run and what it will cost, a [`Backend`] where. The five
-//! algorithms of the thesis and ours are [`Settings`] of one plan, and every backend gives the same labels and messages
-//! to the bit; [`exactness`] says why that is possible in 8 bits, [`worked_example`] follows a pair of 3x2 pixels by
-//! hand.
+//! A [`Model`] defines what is minimised, a [`Plan`] what runs and what it will cost, and a [`Backend`] where it runs.
+//! The five algorithms of the thesis and our own are [`Settings`] of one plan. Labels and messages are bit-identical on
+//! all backends. [`exactness`] explains why 8 bits suffice for that, and [`worked_example`] works through a pair of 3x2
+//! pixels by hand.
 
 mod backend;
 pub mod census;

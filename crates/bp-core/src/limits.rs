@@ -1,6 +1,6 @@
-//! The limits of what can be matched.
+//! The limits of images and models.
 
-/// The most pixels in a row or a column. Coordinates and disparities below it fit `i32` with room to add.
+/// The most pixels in a row or a column. Coordinates and disparities below it can be added in `i32` without overflow.
 pub const MAX_SIDE: usize = 1 << 24;
 
 /// The most labels of a model.

@@ -1,14 +1,14 @@
-//! Allocation that fails with an error instead of ending the program, and how fast memory is copied.
+//! Allocation that returns an error instead of ending the program, and a measurement of the rate of memory copies.
 
 use std::{hint::black_box, time::Instant};
 
 use crate::Error;
 
-/// Allocates a vector of `len` copies of `value`. Its memory is written now, so that no page is first touched while a solve
+/// Allocates a vector of `len` copies of `value`. Writes its memory now, so that no page is first touched while a solve
 /// is timed.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer there.
+/// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer in the error.
 pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
     let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
@@ -26,10 +26,10 @@ pub fn bytes<T>(values: &Vec<T>) -> u64 {
 /// The bytes of a copy: more than the caches of most CPUs hold.
 const COPIED: usize = 256 << 20;
 
-/// The number of copies of which the median is taken, after one that warms up.
+/// The number of timed copies after one warm-up copy. The median counts.
 const COPIES: usize = 9;
 
-/// Measures how many bytes a second `copy` reads and writes, together, when it copies a buffer in main memory. This is
+/// Measures the total bytes per second that `copy` reads and writes when it copies a buffer in main memory. This is
 /// [`crate::Device::copy_rate`] for a CPU.
 ///
 /// # Errors

@@ -8,7 +8,7 @@ pub const THRESHOLDS: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
 /// The largest difference between left and right truth, in pixels, at which a pixel counts as non-occluded.
 const VISIBLE_WITHIN: f32 = 1.0;
 
-/// The ground truth of the left image, and which of its pixels are non-occluded: seen by the right camera too.
+/// The ground truth of the left image, and which of its pixels are non-occluded: visible in the right image too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundTruth {
     disparities: DisparityMap,
@@ -25,7 +25,7 @@ impl GroundTruth {
     /// Ground truth with a mask of its non-occluded pixels, `[height][width]`.
     ///
     /// # Errors
-    /// [`Error::PixelCount`] if `visible` does not hold one value a pixel.
+    /// [`Error::PixelCount`] if `visible` does not hold one value per pixel.
     pub fn with_mask(disparities: DisparityMap, visible: Vec<bool>) -> Result<Self, Error> {
         let size = disparities.size();
         if visible.len() != size.pixels() {
@@ -34,8 +34,8 @@ impl GroundTruth {
         Ok(Self { disparities, visible: Some(visible) })
     }
 
-    /// Ground truth whose non-occluded pixels follow from the truth of the right image. Such a pixel has a known dL at x, a
-    /// known dR at `x' = floor(x - dL + 1/2)` inside the image, and `|dL - dR| <= 1`.
+    /// Ground truth whose non-occluded pixels follow from the truth of the right image. A pixel x is non-occluded if dL
+    /// is known at x, dR is known at `x' = floor(x - dL + 1/2)` inside the image, and `|dL - dR| <= 1`.
     ///
     /// # Errors
     /// [`Error::WrongSize`] if the two maps differ in size.
@@ -65,10 +65,10 @@ impl GroundTruth {
         self.visible.as_deref()
     }
 
-    /// The errors of `map` over all pixels of known truth, and over the non-occluded ones among them.
+    /// The errors of `map` over all pixels with known truth, and over the non-occluded ones among them.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the map has another size than the truth.
+    /// [`Error::WrongSize`] if the map and the truth differ in size.
     pub fn errors(&self, map: &DisparityMap) -> Result<Errors, Error> {
         check_size("the disparity map", map.size(), self.disparities.size())?;
         let pixels = || map.values().iter().zip(self.disparities.values());
@@ -89,16 +89,16 @@ pub(crate) fn check_size(what: &'static str, found: Size, expected: Size) -> Res
 /// The errors of a map over two sets of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Over all pixels of known truth.
+    /// Over all pixels with known truth.
     pub all: MapErrors,
     /// Over the non-occluded ones; `None` if those are not known.
     pub visible: Option<MapErrors>,
 }
 
-/// The errors over a set of pixels of known truth. A figure over no pixels is NaN.
+/// The errors over a set of pixels with known truth. A figure over no pixels is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapErrors {
-    /// The number of pixels of known truth (N).
+    /// The number of pixels with known truth (N).
     pub known: u64,
     /// How many of them have a disparity in the map. `answered / known` is the density of the map.
     pub answered: u64,
@@ -166,7 +166,8 @@ mod tests {
         let left = map(&[0.0, 1.5, 1.0, 1.0, NONE, 9.0]);
         let right = map(&[0.0, 3.0, NONE, 1.0, 1.0, 1.0]);
         let truth = GroundTruth::with_right(left, &right).unwrap();
-        // Pixel 1 lands on 0 and differs by 1.5, 2 differs by 2 there, 3 hits an unknown, 5 leaves the image.
+        // Pixel 1 maps to column 0 and differs by 1.5, 2 maps to 1 and differs by 2, 3 maps to an unknown pixel, 5
+        // leaves the image.
         assert_eq!(truth.visible(), Some([true, false, false, false, false, false].as_slice()));
         let errors = truth.errors(&map(&[0.0; 6])).unwrap();
         assert_eq!(errors.visible.map(|visible| visible.known), Some(1));

@@ -21,12 +21,13 @@ pub enum Profile {
     Census5x5,
     /// Truncated absolute differences of grey values and of their horizontal gradients,
     /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`.
-    /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the numbers
-    /// are ours.
+    /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the
+    /// constants are ours.
     Gradient,
-    /// The grey difference that is insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`. Here
-    /// d is the distance of one image's grey value from the range of the other's around the match. That range spans I(x)
-    /// and the halves `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`. The smaller of both directions counts.
+    /// The grey difference that is insensitive to sampling (Birchfield and Tomasi 1998), `(15 min(d, 20) + 5) div 10`.
+    /// Here d is the distance of one image's grey value from the range of the other's around the match. That range
+    /// spans I(x) and the half-pixel values `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`. Of the two
+    /// directions, the smaller distance counts.
     BirchfieldTomasi,
     /// `min(sum over R, G, B of the Hamming distances of 3x3 census codes, 18)`; see [`Profile::Census`].
     CensusRgb,
@@ -58,7 +59,7 @@ impl Profile {
         }
     }
 
-    /// How many bytes of a pixel it compares.
+    /// How many bytes it compares per pixel.
     #[must_use]
     pub fn channels(self) -> usize {
         match self {
@@ -135,7 +136,7 @@ impl Model {
     /// The same model, but label i is a disparity of `min_disparity + i` pixels.
     ///
     /// # Errors
-    /// [`Error::MinDisparity`] if its absolute value exceeds the longest side of an image.
+    /// [`Error::MinDisparity`] if its absolute value exceeds [`MAX_SIDE`].
     pub fn with_min_disparity(self, min_disparity: i32) -> Result<Self, Error> {
         if min_disparity.unsigned_abs() as usize > MAX_SIDE {
             return Err(Error::MinDisparity { min_disparity });
@@ -154,9 +155,9 @@ impl Model {
         Ok(Self { slope, truncation, ..self })
     }
 
-    /// The same model with *weak edges*. Surfaces tend to end where the image changes. So an edge between two nodes whose
-    /// grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2 (after
-    /// Boykov, Veksler and Zabih 2001). Every grid decides by its own grey values; see [`Model::coarse_grey`]. With
+    /// The same model with *weak edges*. Surfaces tend to end where the image changes. So an edge between two nodes
+    /// whose grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2
+    /// (after Boykov, Veksler and Zabih 2001). Every grid uses its own grey values; see [`Model::coarse_grey`]. With
     /// `None`, the default, no edge is weak.
     #[must_use]
     pub fn with_weak_edges(self, threshold: Option<u8>) -> Self {
@@ -218,8 +219,8 @@ impl Model {
         if is_weak { self.smoothness().weakened() } else { self.smoothness() }
     }
 
-    /// The grey value of a node of a coarser grid: the mean of its `count` children's grey values, which add up to `sum`. It
-    /// is rounded as `(sum + count div 2) div count`.
+    /// The grey value of a node of a coarser grid: the mean of its `count` children's grey values, whose sum is `sum`,
+    /// rounded as `(sum + count div 2) div count`.
     ///
     /// # Panics
     /// If `count` is 0.

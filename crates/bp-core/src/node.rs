@@ -10,7 +10,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// The node of the next coarser grid that stands for this one.
+    /// The node of the next coarser grid that covers this one.
     #[must_use]
     pub fn parent(self) -> Self {
         Self { x: self.x / 2, y: self.y / 2 }

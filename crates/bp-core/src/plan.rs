@@ -1,10 +1,10 @@
-//! The plan: what runs, and how much work and memory it needs. All of it is known before anything runs.
+//! The plan: what runs, and how much work and memory it needs. All of this is known in advance.
 
 mod traffic;
 
 use crate::{BAND_ROWS, Error, MessageStart, Model, Node, Schedule, Settings, Side, Size};
 
-/// The most grids of a plan: the longest side, [`crate::MAX_SIDE`], halves to 1 in as many.
+/// The most grids of a plan. This many reduce the longest side, [`crate::MAX_SIDE`], to 1.
 pub const MAX_GRIDS: u32 = 25;
 
 /// Settings that were checked against an image size and a model.
@@ -175,11 +175,11 @@ impl Plan {
         }
     }
 
-    /// The buffers of a straightforward implementation. A backend may pad them or do without some; see
+    /// The buffers of a straightforward implementation. A backend may pad them or omit some; see
     /// [`crate::Device::planned_bytes`].
     ///
-    /// It keeps the messages of two grids at a time: two messages for each edge, with two edges for each node. They are
-    /// double buffered under [`Schedule::Sync`]. Under [`Schedule::Sweep`] there is one message for each edge.
+    /// It keeps the messages of two grids at a time: two messages per edge, and two edges per node. Messages are double
+    /// buffered under [`Schedule::Sync`]. Under [`Schedule::Sweep`] it keeps one message per edge.
     #[must_use]
     pub fn buffers(&self) -> Vec<Buffer> {
         let pixels = self.image_size().pixels() as u64;
@@ -210,7 +210,7 @@ impl Plan {
         buffers
     }
 
-    /// The bytes of the grey values that tell the weak edges of a grid: one for each node, or 0 without weak edges.
+    /// The bytes of the grey values that determine the weak edges of a grid: one per node, or 0 without weak edges.
     ///
     /// # Panics
     /// If there is no such grid.
@@ -264,7 +264,7 @@ mod tests {
         assert!((ratio(Algorithm::Cfcsbp) - 16.8).abs() < 0.1, "{}", ratio(Algorithm::Cfcsbp));
     }
 
-    /// Counted by hand: 555 rows are 18 bands with 17 seams, which 620 columns cross.
+    /// Counted by hand: 555 rows are 18 bands with 17 seams, each crossed by 620 columns.
     #[test]
     fn a_sweep_sends_nothing_across_seams() {
         let one_grid = |cut| {

@@ -60,7 +60,7 @@ impl Algorithm {
 
     /// The settings of the thesis for an image of `size`: `k` loops in all (equations 2.37, 2.38, 2.50 and 2.71), divided
     /// by `z` if the algorithm divides. Under [`Schedule::Checkerboard`] a loop is two half-steps. No count falls below 1.
-    /// [`Algorithm::Sweep`] has settings of its own, which depend on the size alone.
+    /// [`Algorithm::Sweep`] has its own settings, which depend only on the size.
     #[must_use]
     pub fn settings(self, size: Size, k: u32, z: u32, schedule: Schedule) -> Settings {
         let log2 = size.width.max(1).ilog2();
@@ -92,7 +92,7 @@ impl Algorithm {
 /// fewer.
 pub const BAND_ROWS: usize = 32;
 
-/// The order in which messages are updated. A loop updates every directed message once; under [`Schedule::Sweep`] all but
+/// The order in which messages are updated. A loop updates every directed message once; [`Schedule::Sweep`] skips
 /// those across a seam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
@@ -102,9 +102,9 @@ pub enum Schedule {
     /// In half-step t, counted from 0 on every grid, the nodes with (x + y + t) even send, in place. Two half-steps are a
     /// loop (Felzenszwalb and Huttenlocher 2006).
     Checkerboard,
-    /// Sequential passes down and up the rows, in place. An edge holds one message: the last one sent over it, in either
-    /// direction. Sending over an edge uses up the opposite message, which counts as zeros from then on. A node is even
-    /// if x + y is even on its own grid. Nothing is sent to missing neighbours.
+    /// Sequential passes down and up the rows, in place. An edge holds one message: the last one sent over it, in
+    /// either direction. Sending over an edge consumes the opposite message, which counts as zeros from then on. A node
+    /// is even if x + y is even on its own grid. Nothing is sent to missing neighbours.
     ///
     /// Rows are cut into bands of [`BAND_ROWS`]. The edges between two bands are a seam. Nothing is sent across a seam, so
     /// bands do not depend on each other: in all loops the last row of a band holds its first messages from below, and
@@ -113,11 +113,11 @@ pub enum Schedule {
     /// 1. Forward, rows from top to bottom. In a row all even nodes send left, right and down, each message computed
     ///    from the messages that the node holds before it sends any; then all odd nodes send down. The last row of the
     ///    band sends nothing down.
-    /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up in the same manner; then all
+    /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up in the same way; then all
     ///    even nodes send up. The first row of the band sends nothing up.
     ///
-    /// So after a loop every vertical edge holds a message up (at a seam, the first one), and every horizontal edge holds
-    /// the message from its odd to its even end.
+    /// So after a loop every vertical edge holds an upward message (at a seam, the first one), and every horizontal
+    /// edge holds the message from its odd to its even end.
     ///
     /// **First messages** of a finer grid come from these edges of the coarser grid. The parent P of (x, y) is
     /// (x div 2, y div 2). If a node has a neighbour on that side, its first message is
@@ -130,7 +130,7 @@ pub enum Schedule {
     /// - from the right: the same with left and right swapped.
     ///
     /// **Labels** of each band are decided one after another, from its top row to its bottom row, in each row first for the
-    /// even nodes, then for the odd ones. With f the labels decided before and V the smoothness cost, a label is the
+    /// even nodes, then for the odd ones. Let f be the labels already decided and V the smoothness cost. A label is the
     /// smallest that minimises D plus
     ///
     /// - of an even node: `V(d, f_up)` and the messages from the left, the right and below;
@@ -165,7 +165,7 @@ impl Schedule {
 }
 
 /// Which message of the next coarser grid a node starts with. The coarsest grid starts with zeros. [`Schedule::Sweep`] has
-/// a rule of its own and requires [`MessageStart::Receiver`].
+/// its own rule and requires [`MessageStart::Receiver`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum MessageStart {

@@ -1,4 +1,4 @@
-//! The smoothness cost: the price of different labels at two neighbours.
+//! The smoothness cost: the penalty for different labels at two neighbours.
 
 /// The smoothness cost of an edge: `min(slope |a - b|, truncation)` for the labels a and b of its two nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,7 +16,7 @@ impl Smoothness {
         (u32::from(self.slope) * u32::from(a.abs_diff(b))).min(u32::from(self.truncation))
     }
 
-    /// The cost of one step between neighbouring labels, `min(s, K)`. The two passes of a message update add it.
+    /// The cost of one step between neighbouring labels, `min(s, K)`, which the two passes of a message update add.
     #[must_use]
     pub fn step(self) -> u8 {
         self.slope.min(self.truncation)

@@ -1,10 +1,10 @@
 //! A quick survey of a pair before it is matched. It estimates the range of disparities, and detects images that are
 //! exchanged, not rectified, or not a pair at all.
 //!
-//! Both images are shrunk to at most [`LONGEST_SIDE`] pixels a side. Then `coarse` matches them window by window, from both
-//! sides, over all disparities from minus to plus half the width. It keeps matches on which both sides agree, that are
-//! clearly better than all others, and that are no specks. Their disparities give the `range` and its sign. A few hundred
-//! of them, matched again in full size, tell whether `rows` correspond.
+//! Both images are shrunk to at most [`LONGEST_SIDE`] pixels a side. `coarse` then matches them window by window, in
+//! both directions, over all disparities from minus to plus half the width. It keeps matches that agree in both
+//! directions, are clearly better than all alternatives, and do not form specks. From them, `range` derives the range
+//! of disparities and its sign. `rows` matches a few hundred again at full resolution to check that rows correspond.
 //!
 //! The survey is plain integer arithmetic on one thread, so it gives the same result on every machine and backend.
 
@@ -22,14 +22,14 @@ pub use range::{DisparityRange, SeenDisparities};
 pub use rows::RowOffsets;
 pub use shrink::LONGEST_SIDE;
 
-/// The least share of pixels with a match in a pair. Real pairs have more than 0.6, photographs of different things less
-/// than 0.01.
+/// The least share of pixels with a match in a pair. Real pairs have more than 0.6, photographs of different scenes
+/// less than 0.01.
 const LEAST_SHARE: f64 = 0.1;
 
-/// If a smaller share of pixels has a match, rows may not correspond. Pairs whose rows correspond are seldom below.
+/// If a smaller share of pixels has a match, rows may not correspond. Pairs whose rows correspond seldom fall below it.
 const USUAL_SHARE: f64 = 0.5;
 
-/// By how many rows the shrunk right image is then moved, up and down.
+/// The most rows by which the shrunk right image is then shifted up and down.
 const MOST_ROWS: isize = 3;
 
 /// The fewest matches that allow a conclusion.
@@ -38,7 +38,7 @@ const LEAST_MATCHES: usize = 64;
 /// If this share of matches has negative disparities, the images are exchanged.
 const NEARLY_ALL: f64 = 0.9;
 
-/// What the survey of a pair found.
+/// The result of surveying a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// The share of pixels of the shrunk left image that have a reliable match, from 0 to 1.
@@ -47,7 +47,7 @@ pub struct Survey {
     pub seen: Option<SeenDisparities>,
     /// Whether nearly all matches have a negative disparity, as if the images were exchanged.
     pub exchanged: bool,
-    /// How many rows corresponding rows are apart, if an offset other than 0 is clearly better somewhere.
+    /// The offsets between corresponding rows, if an offset other than 0 is clearly better in any part of the image.
     pub rows: Option<RowOffsets>,
     /// Whether both images are the same.
     pub identical: bool,
@@ -59,7 +59,7 @@ impl Survey {
     /// Surveys a pair.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`]. Every pair can be surveyed.
+    /// Only [`Error::OutOfMemory`]: every pair can be surveyed.
     pub fn of(pair: &StereoPair) -> Result<Self, Error> {
         let factor = shrink::factor(pair.size());
         let small = shrink::shrunk(pair, factor)?;
@@ -79,7 +79,7 @@ impl Survey {
     }
 }
 
-/// Matches the small pair row by row. If it finds few matches, it also tries the right image higher and lower.
+/// Matches the small pair row by row. If it finds few matches, it also tries the right image shifted up and down.
 fn looks(small: &StereoPair) -> Result<Vec<Matches>, Error> {
     let first = coarse::find(small, 0)?;
     if first.share() >= USUAL_SHARE {

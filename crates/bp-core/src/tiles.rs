@@ -1,4 +1,4 @@
-//! Pairs of any size in limited memory, matched one tile at a time.
+//! Matches pairs of any size in limited memory, one tile at a time.
 
 mod tile;
 mod tiling;
@@ -22,8 +22,8 @@ pub struct Tiled {
 }
 
 impl Tiled {
-    /// Prepares the first tile on `device`. Tiles of other sizes are prepared when it is their turn, after the tile before
-    /// is freed.
+    /// Prepares the first tile on `device`. Tiles of other sizes are prepared when their turn comes, after the previous
+    /// tile is freed.
     ///
     /// # Errors
     /// Those of [`Device::prepare`].
@@ -49,7 +49,7 @@ impl Tiled {
         self.tiling.plan()
     }
 
-    /// The most bytes that were allocated at the same time so far, counted: for a tile, and for the labels of all tiles.
+    /// The peak number of bytes allocated so far: for a tile, and for the labels of all tiles.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
         self.most_bytes + memory::bytes(&self.labels)
@@ -84,11 +84,11 @@ impl Tiled {
         Ok(times)
     }
 
-    /// Matches the next frame of a video from the messages of the frame before; see [`Driver::solve_warm_observed`]. Several
-    /// tiles do not keep their messages, so with them every frame is matched as the first one.
+    /// Matches the next frame of a video from the messages of the previous frame; see [`Driver::solve_warm_observed`].
+    /// With several tiles no messages are kept, so every frame is matched like the first one.
     ///
     /// # Errors
-    /// As there, and those of [`Tiled::solve_observed`].
+    /// As [`Driver::solve_warm_observed`] and [`Tiled::solve_observed`].
     pub fn solve_warm_observed(
         &mut self,
         device: &dyn Device,
@@ -104,7 +104,7 @@ impl Tiled {
     /// [`Tiled::solve_observed`] without an observer.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Tiled::solve_observed`].
     pub fn solve(&mut self, device: &dyn Device, pair: &StereoPair) -> Result<Times, Error> {
         self.solve_observed(device, pair, &mut |_| ControlFlow::Continue(()))
     }
@@ -130,7 +130,7 @@ impl Tiled {
         Ok(times)
     }
 
-    /// The current driver if it fits the tile. Otherwise frees it and prepares the tile's plan.
+    /// Takes the current driver if it fits the tile. Otherwise frees it and prepares the tile's plan.
     fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
         let plan = tile.plan(self.tiling.plan())?;
         let driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
@@ -141,7 +141,7 @@ impl Tiled {
         Ok(driver)
     }
 
-    /// Frees everything but the last result, if there are several tiles. (A single tile holds the result itself.)
+    /// Frees everything but the last result if there are several tiles. A single tile holds the result, so it is kept.
     pub fn free_tiles(&mut self) {
         if !self.tiling.is_whole() {
             self.driver = None;
@@ -154,7 +154,7 @@ impl Tiled {
         if self.tiling.is_whole() { self.driver.as_ref().map_or(&[], Driver::labels) } else { &self.labels }
     }
 
-    /// The disparity map of the last solve. It allocates the map.
+    /// The disparity map of the last solve. Allocates the map.
     #[must_use]
     pub fn disparities(&self) -> DisparityMap {
         DisparityMap::from_labels(self.plan().image_size(), self.plan().model(), self.labels())
@@ -163,7 +163,7 @@ impl Tiled {
     /// The last messages received from `side`; see [`Driver::messages`].
     ///
     /// # Errors
-    /// As there; also [`Error::Plan`] if there are several tiles, which do not keep their messages.
+    /// As [`Driver::messages`]; also [`Error::Plan`] if there are several tiles, which do not keep their messages.
     pub fn messages(&mut self, side: Side) -> Result<Vec<u8>, Error> {
         match self.driver.as_mut().filter(|_| self.tiling.is_whole()) {
             Some(driver) => driver.messages(side),

@@ -1,5 +1,5 @@
-//! A pair of 3x2 pixels with 3 labels, small enough to follow with pencil and paper. Every number below is checked when
-//! the documentation's examples run.
+//! A pair of 3x2 pixels with 3 labels, small enough to follow with pencil and paper. The code at the end checks the
+//! data costs, labels, energies and most of the messages.
 //!
 //! ```text
 //! left   40 52 60      right   52 60 61
@@ -7,18 +7,18 @@
 //! ```
 //!
 //! **Data costs**, profile `thesis`: `D = (7 min(|left(x) - right(x - d)|, 15) + 5) div 10`, and 11 where x - d < 0. At
-//! (1, 0): label 0 compares 52 with 60, so `(56 + 5) div 10 = 6`; label 1 compares 52 with 52; label 2 leaves the image.
-//! Each cell lists the costs of labels 0, 1, 2:
+//! (1, 0) label 0 compares 52 with 60, so it costs `(56 + 5) div 10 = 6`; label 1 compares 52 with 52; label 2 leaves
+//! the image. Each cell lists the costs of labels 0, 1, 2:
 //!
 //! ```text
 //!  8 11 11    6  0 11    1  0  6
 //!  0 11 11   11  4 11    0  0 11
 //! ```
 //!
-//! **Messages.** The slope is 10, the truncation K = 17. In the first loop all received messages are 0, so (0, 0) sends
-//! from `h = 8 11 11`. The pass up the labels gives 8 11 11, the pass down the same, and less the minimum 8 the message
-//! is `0 3 3`. (1, 0) sends from `h = 6 0 11`, which becomes 6 0 10, to its left, right and down. After one loop, what
-//! each node received from its left neighbour and from the one below:
+//! **Messages.** The slope is 10 and the truncation K is 17. In the first loop all received messages are 0, so (0, 0)
+//! has `h = 8 11 11`. Neither the pass up the labels nor the pass down changes it. Subtracting the minimum 8 gives the
+//! message `0 3 3`. (1, 0) has `h = 6 0 11`. The passes turn it into `6 0 10`, which goes to the left, right and down.
+//! After one loop the nodes have received these messages from the left neighbour and from the one below:
 //!
 //! ```text
 //! from the left    -         0  3  3    6  0 10
@@ -27,19 +27,19 @@
 //!                  -         -          -
 //! ```
 //!
-//! **Labels** of least belief, D plus the four messages: after one loop `0 1 1 / 0 1 1`, with energy 12 + 20; after two
-//! loops `1 0 1 / 1 1 1`, with 32 + 30. Belief propagation on a graph with cycles promises no descent: the least energy
-//! of all 729 labellings is 26, all labels 0.
+//! **Labels** minimise the belief, which is D plus the four messages. After one loop they are `0 1 1 / 0 1 1`, with
+//! energy 12 + 20 (data + smoothness); after two loops they are `1 0 1 / 1 1 1`, with 32 + 30. On a graph with cycles,
+//! belief propagation does not guarantee descent. The least energy of all 729 labellings is 26, with all labels 0.
 //!
-//! **Coarse to fine**, two grids with one loop on each: grid 1 has two nodes, whose costs are the sums
-//! `8+6+0+11 11+0+11+4 11+11+11+11 = 25 26 44` and, of only one column, `1 0 17`. They send `0 1 11` to the right and
-//! `1 0 10` to the left. Grid 0 starts with these at every child that has a neighbour on that side, and after its loop
-//! (0, 0) has received `7 0 10` from the right instead of `6 0 10`. The labels are `0 1 1 / 0 1 1`.
+//! **Coarse to fine**, two grids with one loop on each: grid 1 has two nodes. The costs of the first are the sums
+//! `8+6+0+11 11+0+11+4 11+11+11+11 = 25 26 44`; the second covers only one column and has `1 0 17`. They send `0 1 11`
+//! to the right and `1 0 10` to the left. On grid 0 every child with a neighbour on that side starts with these. After
+//! the loop on grid 0, (0, 0) has received `7 0 10` from the right instead of `6 0 10`. The labels are `0 1 1 / 0 1 1`.
 //!
-//! **Cut into four** at (1, 1) with the census match of that pixel as a prior: the strip is 3 pixels wide and 2 high
-//! there, so only label 0 keeps it inside the right image. The four nodes around (1, 1) get costs 0 for labels 0 and 1
-//! and 11 for label 2. Parts are the columns 0 and 1..3 by the rows 0 and 1; after two loops the labels are
-//! `0 1 1 / 0 0 0`, with energy 19 + 30 by the images' own costs and over all edges.
+//! **Cut into four** at (1, 1), with the census match of that pixel as a prior: there the strip is 3 pixels wide and 2
+//! high, so only label 0 keeps it inside the right image. The four nodes around (1, 1) cost 0 for labels 0 and 1, and
+//! 11 for label 2. The parts are columns 0 and 1..3 times rows 0 and 1. After two loops the labels are `0 1 1 / 0 0 0`,
+//! with energy 19 + 30, computed with the images' own costs and over all edges.
 //!
 //! ```
 //! use bp_core::{Cut, Energy, Image, Driver, MessageStart, Model, Plan, Profile, Schedule, Settings, Side, StereoPair};

@@ -1,4 +1,4 @@
-//! What a survey says of made-up scenes, and of pairs that are wrong in one way.
+//! Surveys of synthetic scenes, and of pairs with a single fault.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::sync::LazyLock;
@@ -30,7 +30,7 @@ fn exchanged(pair: &StereoPair) -> StereoPair {
     StereoPair::new(pair.right().clone(), pair.left().clone()).unwrap()
 }
 
-/// The pair with another right image, each pixel of which comes from where `from` says.
+/// The pair with a resampled right image: `from` maps each pixel to its source position.
 fn moved(pair: &StereoPair, from: impl Fn(f64, f64) -> (f64, f64)) -> StereoPair {
     let Size { width, height } = pair.size();
     let inside = |place: f64, side: usize| (place.round().max(0.0) as usize).min(side - 1);
@@ -42,7 +42,7 @@ fn moved(pair: &StereoPair, from: impl Fn(f64, f64) -> (f64, f64)) -> StereoPair
     StereoPair::new(pair.left().clone(), right).unwrap()
 }
 
-/// The scenes at half size: large enough to be shrunk. Drawing them takes longer than everything else here.
+/// The scenes at half size, which are large enough to be shrunk. Rendering them takes longer than all other work here.
 static SCENES: LazyLock<Vec<Scene>> =
     LazyLock::new(|| (0..synthetic::NAMES.len()).map(|index| synthetic::scene(index, 2)).collect());
 

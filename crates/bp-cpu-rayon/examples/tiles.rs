@@ -1,7 +1,7 @@
-//! How far tiles are from the whole image: prints the table of docs/big-images.md.
+//! Measures how much the result of tiles differs from that of the whole image. Prints the table of docs/big-images.md.
 //!
-//! `cargo run --release -p bp-cpu-rayon --example tiles -- DATA`, where DATA has the Middlebury pairs of 2006 at full and
-//! half size.
+//! `cargo run --release -p bp-cpu-rayon --example tiles -- DATA`, where DATA is a folder with the Middlebury pairs of
+//! 2006 at full and half size.
 
 use std::{error::Error, path::Path};
 
@@ -12,14 +12,14 @@ use bp_core::{
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Folder, scene, labels, and what stored truth is divided by.
+/// Folder, scene, labels, and the divisor of the stored ground truth.
 const SCENES: [(&str, &str, usize, f32); 3] = [
     ("middlebury2006-fullsize", "Books", 240, 1.0),
     ("middlebury2006", "Aloe", 112, 2.0),
     ("middlebury2006", "Baby1", 112, 2.0),
 ];
 
-/// Columns and rows that are kept of a tile, and the halo. No image here is as wide as `ALL`.
+/// The columns and rows that a tile keeps, and the halo. `ALL` exceeds the width of every image here.
 const TILES: [(usize, usize, usize); 11] = [
     (ALL, 512, 0),
     (256, 512, 0),
@@ -42,7 +42,7 @@ struct Scene {
     truth: GroundTruth,
 }
 
-/// What is told of an answer.
+/// The measured properties of a result.
 struct Run {
     labels: Vec<u16>,
     bad: f64,
@@ -115,7 +115,7 @@ fn image(path: &Path) -> Result<Image> {
     Ok(Image::from_rgb(read.width() as usize, read.height() as usize, pixels)?)
 }
 
-/// A map of stored values that are `scale` times the disparity, 0 where it is unknown.
+/// Reads a map whose stored values are `scale` times the disparity, or 0 if it is unknown.
 fn map(path: &Path, scale: f32) -> Result<DisparityMap> {
     let stored = image(path)?;
     let disparity = |&[value, ..]: &[u8; 3]| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / scale };

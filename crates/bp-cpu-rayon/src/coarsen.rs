@@ -1,6 +1,6 @@
 //! Data costs of a coarser grid.
 //!
-//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//! In the terms of `bp-cpu-scalar`, the kernel computes:
 //!
 //! ```text
 //! for each node (X, Y) of the coarse grid:
@@ -26,7 +26,7 @@ use crate::{
 /// one first.
 pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout; 2], fine: &Costs, coarse: &mut Costs) {
     let args = Grids { level, layouts, clip: plan.clip(grid) };
-    // The width of the sums decides the type, even if they are not kept.
+    // The width of the sums determines the type, even if they are not kept.
     let bytes = plan.sum_bytes(grid);
     match (&fine.sums, bytes) {
         (Sums::None, 1) => args.narrow_rows(&fine.stored, coarse),
@@ -41,7 +41,7 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
     }
 }
 
-/// The same for a grid 0 whose costs are not stored: it computes them again, two rows at a time.
+/// As [`coarsen`], for a grid 0 whose costs are not stored: computes them again, two rows at a time.
 pub(crate) fn coarsen_unstored(matching: &Matching<'_>, windows: &Windows, layout: &Layout, coarse: &mut Costs) {
     let (fine, clip) = (matching.layout, matching.plan.clip(1));
     let grids = Grids { level: matching.level, layouts: [fine, layout], clip };
@@ -96,12 +96,12 @@ impl Grids<'_> {
         });
     }
 
-    /// The same for sums that fit 8 bits, as those of the largest grids do.
+    /// As [`Grids::rows`], for sums that fit 8 bits, as those of the largest grids do.
     fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
         self.narrow_rows_of(coarse, |y, sum| sum(self.children(fine, y)));
     }
 
-    /// The same for rows that are computed on demand: `children(y, sum)` calls `sum` with them.
+    /// As [`Grids::narrow_rows`], for rows that are computed on demand: `children(y, sum)` calls `sum` with the rows.
     fn narrow_rows_of(&self, coarse: &mut Costs, children: impl Fn(usize, &mut dyn FnMut([&[u8]; 2])) + Sync) {
         let Costs { stored, sums } = coarse;
         costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, mut keep| {
@@ -111,7 +111,7 @@ impl Grids<'_> {
         });
     }
 
-    /// The two rows of the finer grid below row `y`. The second may be missing; it is empty then.
+    /// The two rows of the finer grid that row `y` covers. If the second is missing, it is empty.
     fn children<'a, F>(&self, fine: &'a [F], y: usize) -> [&'a [F]; 2] {
         let row = self.layouts[0].row();
         let (upper, rest) = fine[2 * y * row..].split_at(row);
@@ -137,7 +137,7 @@ impl Grids<'_> {
         );
     }
 
-    /// Sums a strip of nodes of either plane and returns the least cost of each.
+    /// Sums the children of a strip of nodes in both planes, and returns the least cost of each node.
     #[inline(always)]
     fn narrow_strip<S: Simd>(&self, simd: S, children: [&[u8]; 2], strip: Strip, raw: &mut [u8]) -> [[u8; STRIP]; 2] {
         let [fine, layout] = self.layouts;

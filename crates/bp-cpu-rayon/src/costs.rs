@@ -6,17 +6,17 @@ use rayon::prelude::*;
 
 use crate::shape::{BLOCK, BlockStart, STRIP, Shape, Strip};
 
-/// Data costs `[height][plane][label][lane]`: as messages need them, and as coarser grids sum them.
+/// Data costs `[height][plane][label][lane]`, in the forms that messages and the sums of coarser grids need.
 pub(crate) struct Costs {
-    /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless the sums fit 8 bits without.
+    /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless sums fit 8 bits without that.
     pub(crate) stored: Vec<u8>,
-    /// Neither normalised nor clipped, if the plan keeps them.
+    /// Neither normalised nor clipped. Only present if the plan keeps them.
     pub(crate) sums: Sums,
 }
 
 /// Unclipped costs in the narrowest integer that holds them.
 pub(crate) enum Sums {
-    /// None are kept: the stored costs serve.
+    /// None are kept, because the stored costs are used instead.
     None,
     U8(Vec<u8>),
     U16(Vec<u16>),
@@ -38,7 +38,7 @@ impl Costs {
         Ok(Self { stored: memory::filled("data cost", len, 0)?, sums })
     }
 
-    /// Room for nothing.
+    /// Allocates nothing.
     pub(crate) fn none() -> Self {
         Self { stored: Vec::new(), sums: Sums::None }
     }
@@ -56,7 +56,7 @@ impl Costs {
     }
 }
 
-/// The number of costs of a grid, padding included.
+/// The number of costs of a grid, including padding.
 pub(crate) fn volume(shape: &Shape) -> usize {
     shape.row().saturating_mul(shape.size.height)
 }
@@ -127,8 +127,8 @@ macro_rules! widen {
 
 widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
-/// Stores the costs of a row, block by block. `raw(start, label)` gives the unclipped costs of a block; `keep` receives
-/// them too.
+/// Stores the costs of a row, block by block. `raw(start, label)` returns the unclipped costs of a block, which are
+/// also written to `keep`.
 #[inline(always)]
 pub(crate) fn store<S: Simd, T: Sum>(
     simd: S,
@@ -160,7 +160,7 @@ pub(crate) fn store<S: Simd, T: Sum>(
     );
 }
 
-/// Calls `raw` twice for every label, because the least cost is known only after all labels.
+/// Calls `raw` twice for every label, because the least cost is known only after a pass over all labels.
 #[inline(always)]
 fn store_block<T: Sum>(
     shape: &Shape,

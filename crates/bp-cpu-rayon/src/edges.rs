@@ -1,4 +1,4 @@
-//! Messages, one for each edge.
+//! Messages, one per edge.
 
 use bp_core::{Error, Plan, Side, memory};
 use rayon::{prelude::*, slice::ChunksMut};
@@ -8,24 +8,24 @@ use crate::{
     shape::{BLOCK, Shape},
 };
 
-/// The planes of a row: the edges up from both planes of nodes, then the edges inside pairs of columns, then those
-/// between pairs.
+/// The planes of a row: two with the edges up from the two planes of nodes, one with the edges inside pairs of columns,
+/// and one with those between pairs.
 const PLANES: usize = 4;
 
-/// One message for each edge, updated in place. A node that sends over an edge has just read the message that came the
-/// other way, and the other end reads it before it answers. Row y of storage holds the edges up from row y and those
-/// inside row y. A row of zeros follows the last one.
+/// One message per edge, updated in place. One is enough: a node that sends over an edge has just read the message that
+/// came the other way, and the other end reads the new one before it answers. Row y of storage holds the edges up from
+/// row y and those inside row y. A row of zeros follows the last one.
 pub(crate) struct Edges {
     values: Vec<u8>,
 }
 
 impl Edges {
-    /// Allocates room for the edges of `grid`, which is enough for every coarser grid too.
+    /// Allocates room for the edges of `grid`, which is also enough for every coarser grid.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         Ok(Self { values: memory::filled("messages", bytes(&Shape::new(plan, grid)), 0)? })
     }
 
-    /// Room for nothing.
+    /// Allocates nothing.
     pub(crate) fn none() -> Self {
         Self { values: Vec::new() }
     }
@@ -35,7 +35,7 @@ impl Edges {
         Rows { layout, first: 0, values: self.values.get(..bytes(layout)).unwrap_or_default() }
     }
 
-    /// For every band of so many rows, the edges inside and down from its rows, ordered as in [`inside_and_down`].
+    /// For every band of `rows` rows, the edges inside and down from its rows, ordered as in [`inside_and_down`].
     pub(crate) fn bands_mut(&mut self, layout: &Layout, rows: usize) -> ChunksMut<'_, u8> {
         let all = layout.size.height * row_bytes(layout);
         self.rows_mut(layout)[2 * plane(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
@@ -52,7 +52,7 @@ impl Edges {
     }
 }
 
-/// All edges of these rows but those up from the first row.
+/// All edges of these rows except those up from the first row.
 pub(crate) fn inside_and_down<'a>(shape: &Shape, rows: &'a [u8]) -> &'a [u8] {
     &rows[2 * plane(shape)..]
 }
@@ -67,8 +67,8 @@ pub(crate) fn row_bytes(shape: &Shape) -> usize {
     PLANES * plane(shape)
 }
 
-/// The bytes of a plane. It has a block more than its nodes need, because nodes of plane 1 reach one lane further in the
-/// edges between pairs.
+/// The bytes of a plane. It has one block more than its nodes need, because in the edges between pairs the nodes of
+/// plane 1 reach one lane further.
 fn plane(shape: &Shape) -> usize {
     shape.plane() + BLOCK
 }

@@ -18,10 +18,10 @@ pub(crate) struct Features {
     left: Vec<u8>,
     /// Every row of lanes has a block of padding on both sides.
     right: Vec<u8>,
-    /// 255 where the right image has a column, else 0: `[parity][lane]`, with the same padding.
+    /// 255 where the right image has a column, otherwise 0: `[parity][lane]`, with the same padding as `right`.
     inside: [Vec<u8>; 2],
     /// Values of both images and around them (see [`Image::grey_near`]), `[height][plane][width]` with [`APRON`] more rows
-    /// and columns on every side. Only profiles that look at neighbours need them; see [`padded_planes`].
+    /// and columns on every side. Only profiles that compare neighbours need them; see [`padded_planes`].
     padded: [Vec<u8>; 2],
 }
 
@@ -69,7 +69,7 @@ impl Features {
         &self.left[((y * self.profile.channels() + channel) * 2 + parity) * self.lanes..][..self.lanes]
     }
 
-    /// The features of a row of the right image, from one block before lane 0 on.
+    /// The features of a row of the right image, starting one block before lane 0.
     pub(crate) fn right(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
         let lanes = self.lanes + 2 * BLOCK;
         &self.right[((y * self.profile.channels() + channel) * 2 + parity) * lanes..][..lanes]
@@ -97,7 +97,7 @@ fn padded_bytes(size: Size, profile: Profile) -> usize {
     padded_planes(profile) * (size.height + 2 * APRON) * (size.width + 2 * APRON)
 }
 
-/// The number of planes of values that a profile looks for neighbours in: one of grey values, or one for each colour.
+/// The number of planes in which a profile compares neighbours: one of grey values, or one per colour channel.
 fn padded_planes(profile: Profile) -> usize {
     match profile {
         Profile::Thesis | Profile::Mrf => 0,
@@ -126,13 +126,13 @@ fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row:
     after.fill(own[width - 1]);
 }
 
-/// The columns and rows of eight neighbours, counted from the pixel [`APRON`] columns and rows before.
+/// The columns and rows of eight neighbours, relative to the pixel [`APRON`] columns and rows before the centre.
 type Neighbours = [(usize, usize); 8];
 
 /// The neighbours that a census code compares, in order.
 const CENSUS: Neighbours = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
 
-/// The neighbours that each byte of the larger code compares.
+/// The neighbours that each byte of the 5x5 code compares.
 const CENSUS_5X5: [Neighbours; 3] = [
     [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (0, 1), (1, 1), (2, 1)],
     [(3, 1), (4, 1), (0, 2), (1, 2), (3, 2), (4, 2), (0, 3), (1, 3)],
@@ -142,13 +142,13 @@ const CENSUS_5X5: [Neighbours; 3] = [
 /// Rows of features to be written.
 struct Rows<'a> {
     values: &'a mut [u8],
-    /// Lanes from one row of lanes to the next.
+    /// The distance from one row of lanes to the next.
     lanes: usize,
-    /// Where lane 0 lies in a row of lanes.
+    /// The position of lane 0 in a row of lanes.
     offset: usize,
 }
 
-/// An image whose features are computed.
+/// An image whose features are being computed.
 struct View<'a> {
     profile: Profile,
     image: &'a Image,
@@ -195,21 +195,21 @@ impl View<'_> {
         }
     }
 
-    /// Values of a plane near consecutive pixels from `at` on: those `dx - APRON` columns and `dy - APRON` rows away.
+    /// The values of a plane `dx - APRON` columns and `dy - APRON` rows away from consecutive pixels, starting at `at`.
     #[inline(always)]
     fn near(&self, plane: usize, at: Node, (dx, dy): (usize, usize), columns: usize) -> &[u8] {
         let row = self.image.size().width + 2 * APRON;
         &self.padded[((at.y + dy) * padded_planes(self.profile) + plane) * row + at.x + dx..][..columns]
     }
 
-    /// Computes a byte of the census codes of pixels from `at` on, by the values of a plane; see [`bp_core::census`].
+    /// Computes a byte of the census codes of pixels from `at` on, from the values of a plane; see [`bp_core::census`].
     #[inline(always)]
     fn census(&self, neighbours: &Neighbours, plane: usize, at: Node, codes: &mut [u8]) {
         let middle = self.near(plane, at, (APRON, APRON), codes.len());
         for &offset in neighbours {
             let neighbours = self.near(plane, at, offset, codes.len());
             for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
-                // Eight shifts push out whatever was there before.
+                // Eight shifts push out any earlier bits.
                 *code = *code << 1 | u8::from(neighbour > middle);
             }
         }
@@ -243,7 +243,7 @@ impl View<'_> {
         }
     }
 
-    /// The grey values of pixels from `at` on: first of their left neighbours, then their own, then of the right ones.
+    /// The grey values for pixels from `at` on: of their left neighbours, of the pixels, and of their right neighbours.
     #[inline(always)]
     fn row_near(&self, at: Node, columns: usize) -> [&[u8]; 3] {
         [APRON - 1, APRON, APRON + 1].map(|dx| self.near(0, at, (dx, APRON), columns))
@@ -256,7 +256,7 @@ fn mean(a: u8, b: u8) -> u8 {
     (u16::from(a) + u16::from(b)).div_ceil(2) as u8
 }
 
-/// Writes a row block by block. `values(x, out)` gives the values of consecutive columns from x on, which alternate
+/// Writes a row block by block. `values(x, out)` computes the values of consecutive columns from x on, which alternate
 /// between the even and the odd plane.
 #[inline(always)]
 fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {

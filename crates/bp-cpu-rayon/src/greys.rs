@@ -1,4 +1,4 @@
-//! The grey values of a grid. They tell which edges are weak; see [`bp_core::Model::with_weak_edges`].
+//! The grey values of a grid. They determine which edges are weak; see [`bp_core::Model::with_weak_edges`].
 
 use bp_core::{Error, Image, Model, Plan, image::grey, memory};
 use fearless_simd::{Level, Select, Simd, SimdInt, dispatch};
@@ -33,7 +33,7 @@ impl Greys {
         });
     }
 
-    /// Computes the grey values of a coarser grid: a node has the mean of its children, four at most.
+    /// Computes the grey values of a coarser grid: a node has the mean of its children, at most four.
     pub(crate) fn coarsen(&mut self, fine: &Self) {
         let shape = self.shape;
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
@@ -56,7 +56,7 @@ impl Greys {
         if self.values.is_empty() {
             return None;
         }
-        // Without a row above or below, no message goes there, so any values will do.
+        // If there is no row above or below, no message goes there, so any values will do.
         let (above, below) = (y.saturating_sub(1), (y + 1).min(self.shape.size.height - 1));
         let beside = self.row(1 - plane, y);
         let same = &beside[BLOCK..];
@@ -120,7 +120,7 @@ pub(crate) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// The same for an upward pass, which exchanges the last two slots.
+    /// Swaps the last two slots, for an upward pass.
     pub(crate) fn upwards(mut self) -> Self {
         self.neighbours.swap(2, 3);
         self

@@ -13,7 +13,7 @@ use crate::{
     wavefront::{Part, Wavefront, fused_steps},
 };
 
-/// How many steps run at a time on a grid.
+/// The number of steps that run together on a grid.
 pub(crate) fn steps_at_a_time(layout: &Layout) -> usize {
     fused_steps(layout.row() + edges::row_bytes(layout))
 }

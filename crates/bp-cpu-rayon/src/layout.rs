@@ -19,10 +19,11 @@ pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
 #[derive(Debug)]
 pub(crate) struct Layout {
     shape: Shape,
-    /// For each plane two masks: 255 where a node exchanges messages with its neighbour in the same pair of columns, else
-    /// 0; then the same for the neighbour in the next pair. A block of zeros precedes and follows each mask.
+    /// Two masks for each plane. The first is 255 where a node exchanges messages with its neighbour in the same pair
+    /// of columns, otherwise 0. The second does the same for the neighbour in the next pair. A block of zeros precedes
+    /// and follows each mask.
     masks: [[Vec<u8>; 2]; 2],
-    /// The mask of nodes without neighbours, and the mask of nodes that all have one.
+    /// A mask for nodes without neighbours (all 0), and one for nodes that all have one (all 255).
     none_and_all: [Vec<u8>; 2],
     /// For each row, whether it exchanges messages with the row above.
     joined_above: Vec<bool>,
@@ -73,12 +74,12 @@ impl Layout {
         self.padded_masks(plane).map(|mask| &mask[BLOCK..BLOCK + self.lanes])
     }
 
-    /// The same with a block of zeros before and after.
+    /// As [`Layout::masks`], with a block of zeros before and after.
     pub(crate) fn padded_masks(&self, plane: usize) -> [&[u8]; 2] {
         self.masks[plane].each_ref().map(Vec::as_slice)
     }
 
-    /// The mask of nodes without neighbours, and the mask of nodes that all have one, `[lane]`.
+    /// A mask for nodes without neighbours, and one for nodes that all have a neighbour, `[lane]`.
     pub(crate) fn none_and_all(&self) -> [&[u8]; 2] {
         self.none_and_all.each_ref().map(Vec::as_slice)
     }

@@ -1,19 +1,19 @@
-//! The fast CPU backend. It computes vectors of pixels, shares work among threads with rayon, and updates messages in
-//! place while they are in cache. Its labels and messages equal those of the scalar backend to the bit, on every
+//! The fast CPU backend. It computes vectors of pixels, distributes work over threads with rayon, and updates messages
+//! in place while they are in cache. Its labels and messages are bit-identical to those of the scalar backend, on every
 //! instruction set and with any number of threads.
 //!
 //! Its devices are the instruction sets of this CPU, the widest first. Work runs on the current rayon pool; use
-//! [`rayon::ThreadPool::install`] to run it on a pool of your own. The schedule `sweep` needs memory for every thread:
+//! [`rayon::ThreadPool::install`] to run it on your own pool. The schedule `sweep` needs memory for every thread, so
 //! prepare a plan, and predict its memory, on the pool that solves it.
 //!
 //! Where to start reading:
 //!
 //! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and which are weak.
-//! * `edges` explains why one message for each edge is enough.
-//! * Each kernel has a file of its own: `match_cost` (on `features`), `coarsen`, `refine`, `update_messages` and
-//!   `select_labels`. Each opens with the loop of its scalar twin.
-//! * `pass` is what a row does in a step. `half_steps` runs such passes over whole grids by `wavefront`; `sweep` runs them
-//!   over one band at a time, in `windows`.
+//! * `edges` explains why one message per edge is enough.
+//! * Each kernel has its own file: `match_cost` (on `features`), `coarsen`, `refine`, `update_messages` and
+//!   `select_labels`. Each file begins with the loop of the scalar version.
+//! * `pass` is the work of a row in a step. `half_steps` runs such passes over whole grids by `wavefront`; `sweep` runs
+//!   them over one band at a time, in `windows`.
 
 mod coarsen;
 mod costs;

@@ -1,6 +1,6 @@
 //! Data costs of the image.
 //!
-//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//! In the terms of `bp-cpu-scalar`, the kernel computes:
 //!
 //! ```text
 //! for each pixel (x, y):
@@ -21,7 +21,7 @@ use crate::{
     shape::{BLOCK, BlockStart, Column, STRIP, Strip},
 };
 
-/// Everything that the data costs of a pair are computed from.
+/// The inputs of the data costs of a pair.
 pub(crate) struct Matching<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
@@ -30,7 +30,7 @@ pub(crate) struct Matching<'a> {
     pub(crate) seed: Option<Seed>,
 }
 
-/// Whether the costs of a grid are stored. Those of a swept image are computed whenever they are needed.
+/// Whether the costs of a grid are stored. Under `sweep`, those of grid 0 are computed when needed if they fit 8 bits.
 pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
     grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
 }
@@ -61,7 +61,7 @@ impl Matching<'_> {
     /// Stores the costs of a row of a narrow profile. Also stores the unclipped costs if `sums` has room for them.
     pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
         let row = Row { matching: self, y };
-        // Normalising and clipping never change a message. They only keep sums within 8 bits, and here sums fit anyway.
+        // Normalising and clipping never change a message. They keep sums within 8 bits. Sums that fit need neither.
         let model = self.plan.model();
         let fits = model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into();
         if fits && sums.is_none() {
@@ -93,8 +93,8 @@ impl Matching<'_> {
         self.fix(y, stored);
     }
 
-    /// Sets the costs of the nodes around a known match; see [`Seed`]. It leaves the sums alone: a plan with a cut has one
-    /// grid, which needs none.
+    /// Sets the costs of the nodes around a known match; see [`Seed`]. It does not change sums: a plan with a cut has
+    /// one grid, which needs none.
     fn fix(&self, y: usize, row: &mut [u8]) {
         let Some(seed) = self.seed else { return };
         let layout = self.layout;
@@ -108,7 +108,7 @@ impl Matching<'_> {
     }
 }
 
-/// A row that is matched.
+/// A row that is being matched.
 struct Row<'a> {
     matching: &'a Matching<'a>,
     y: usize,
@@ -176,7 +176,7 @@ impl Row<'_> {
         }
     }
 
-    /// Computes the costs of a strip of nodes by comparing so many channels. Returns the least cost of each node.
+    /// Computes the costs of a strip of nodes by comparing `CHANNELS` channels. Returns the least cost of each node.
     #[inline(always)]
     fn strip<S: Simd, const CHANNELS: usize>(
         &self,
@@ -230,8 +230,8 @@ impl Row<'_> {
         })
     }
 
-    /// The lanes of the right image that the nodes from `start` on match under a label: the parity of their columns, and
-    /// where they start in [`Features::right`].
+    /// The lanes of the right image that match the nodes from `start` on under a label: the parity of their columns,
+    /// and their start in [`Features::right`].
     #[inline(always)]
     fn lanes(&self, start: BlockStart, label: usize) -> (usize, usize) {
         let BlockStart { plane, lane } = start;
@@ -256,7 +256,7 @@ impl Row<'_> {
     }
 }
 
-/// Collects `lanes` of every channel.
+/// Calls `lanes` for every channel and collects the results.
 #[inline(always)]
 fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
     let mut all = [[].as_slice(); CHANNELS];
@@ -270,7 +270,7 @@ fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1])
     (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
 }
 
-/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: the distance of 24 bits, at most `MOST`.
+/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: the Hamming distance of 24 bits, at most `MOST`.
 #[inline(always)]
 fn hamming_distance_of_24<S: Simd, const MOST: u8>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
     let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
@@ -280,7 +280,7 @@ fn hamming_distance_of_24<S: Simd, const MOST: u8>(simd: S, left: [S::u8s; 3], r
     (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, MOST))
 }
 
-/// [`Profile::Thesis`], by a table.
+/// [`Profile::Thesis`], with a table.
 #[inline(always)]
 fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
     let table = |difference| (7 * difference + 5) / 10;
@@ -292,8 +292,8 @@ fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s;
 fn gradient_difference<S: Simd>(simd: S, left: [S::u8s; 2], right: [S::u8s; 2]) -> S::u8s {
     let (grey, gradient) = (difference::<S>(left[0], right[0]), difference::<S>(left[1], right[1]));
     let [four, five, fifteen] = [4, 5, 15].map(|most| S::u8s::splat(simd, most));
-    // A table has 16 entries, but a takes 21 values. Beyond 15 a second look-up adds the rest: 3 (15 + b) div 5 is
-    // 9 + 3 b div 5.
+    // A table has 16 entries, but a has 21 possible values. Beyond 15 a second look-up adds the rest: 3 (15 + c) div 5
+    // is 9 + 3 c div 5.
     let table = |difference| 3 * difference / 5;
     let upper = grey.saturating_sub(fifteen).min(five);
     let greys = look_up(simd, table, grey.min(fifteen)) + look_up(simd, table, upper);
@@ -308,7 +308,7 @@ fn sampling_insensitive_difference<S: Simd>(simd: S, left: [S::u8s; 3], right: [
     outside + ((outside + S::u8s::splat(simd, 1)) >> 1)
 }
 
-/// How far a value lies outside the range around the other pixel.
+/// By how much a value lies outside the range around the other pixel.
 #[inline(always)]
 fn outside<S: Simd>([value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]) -> S::u8s {
     value.saturating_sub(greatest) | least.saturating_sub(value)
@@ -319,7 +319,7 @@ fn difference<S: Simd>(left: S::u8s, right: S::u8s) -> S::u8s {
     left.saturating_sub(right) | right.saturating_sub(left)
 }
 
-/// Looks indices from 0 to 15 up in `table`.
+/// Looks up indices from 0 to 15 in `table`.
 #[inline(always)]
 fn look_up<S: Simd>(simd: S, table: impl Fn(u8) -> u8, indices: S::u8s) -> S::u8s {
     let table = u8x16::from_fn(simd, |index| table(index as u8));
@@ -329,9 +329,9 @@ fn look_up<S: Simd>(simd: S, table: impl Fn(u8) -> u8, indices: S::u8s) -> S::u8
 struct Block<'a> {
     left: &'a [u8; BLOCK],
     right: &'a [u8; BLOCK],
-    /// 255 where the right image has a column, else 0.
+    /// 255 where the right image has a column, otherwise 0.
     inside: &'a [u8; BLOCK],
-    /// 255 where the left image has one, else 0.
+    /// 255 where the left image has a column, otherwise 0.
     node: &'a [u8; BLOCK],
 }
 

@@ -1,4 +1,4 @@
-//! What the nodes of a plane in a row do in a step, under every schedule.
+//! The work of the nodes of a plane in a row in one step, under every schedule.
 
 use bp_core::{Plan, Side};
 use fearless_simd::Level;
@@ -24,11 +24,11 @@ pub(crate) struct Pass<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
     pub(crate) layout: &'a Layout,
-    /// The row that `costs` start with.
+    /// The first row of `costs`.
     pub(crate) first: usize,
     pub(crate) costs: &'a [u8],
     pub(crate) coarser: Option<Coarser<'a>>,
-    /// Whether the grid starts with the messages that it holds instead of those of the coarser grid.
+    /// Whether the grid starts with the messages that it already holds, instead of those of the coarser grid.
     pub(crate) keeps_messages: bool,
 }
 
@@ -39,7 +39,7 @@ impl Pass<'_> {
         refine(self.level, self.plan, self.layout, self.coarser, at, sides, &mut slots);
     }
 
-    /// Sends the messages of the nodes of a plane in a row, in a pass in this direction. `rows` start with that row.
+    /// Sends the messages of the nodes of a plane in a row, in a pass in direction `way`. `rows` start with that row.
     pub(crate) fn send(&self, way: Way, at: PlaneRow, sends: Sends, rows: &mut [u8]) {
         let mut slots = edges::slots(self.layout, rows, at.plane);
         self.drop_missing(at.y, &mut slots);

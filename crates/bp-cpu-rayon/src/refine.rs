@@ -1,9 +1,9 @@
 //! First messages of a grid.
 //!
-//! What the kernel computes, in the words of `bp-cpu-scalar`:
+//! In the terms of `bp-cpu-scalar`, the kernel computes:
 //!
 //! ```text
-//! for each node (x, y) and side that it has a neighbour on:
+//! for each node (x, y) and each side on which it has a neighbour:
 //!     message(x, y) from side = message(parent of (x, y)) from side, on the next coarser grid
 //! ```
 //!
@@ -27,8 +27,8 @@ pub(crate) struct Coarser<'a> {
     pub(crate) received: [Rows<'a>; 2],
 }
 
-/// Writes the first messages from `sides` to the nodes of a plane in a row: zeros if there is no coarser grid. A caller
-/// does so just before these nodes send for the first time, while their row is in cache.
+/// Writes the first messages from `sides` to the nodes of a plane in a row: zeros if there is no coarser grid. Callers
+/// do this just before these nodes send for the first time, while their row is in cache.
 pub(crate) fn refine(
     level: Level,
     plan: &Plan,
@@ -57,7 +57,7 @@ pub(crate) fn slot(side: Side, plane: usize) -> usize {
     }
 }
 
-/// Where fine nodes take their first messages from: lane i takes them from lane i div 2 of `planes[i % 2]`.
+/// The source of the first messages of fine nodes: lane i takes them from lane i div 2 of `planes[i % 2]`.
 struct Source<'a> {
     lanes: usize,
     planes: [Parents<'a>; 2],
@@ -67,19 +67,19 @@ struct Source<'a> {
 struct Parents<'a> {
     /// Their messages, `[label][lane]`.
     values: &'a [u8],
-    /// 255 where a lane has a neighbour that sends, else 0, from a block before the first lane on.
+    /// 255 where a lane has a neighbour that sends, otherwise 0, starting one block before the first lane.
     mask: Option<&'a [u8]>,
-    /// How many lanes further on the messages are taken.
+    /// The offset in lanes at which messages are taken.
     moved: isize,
 }
 
-/// Where the nodes of a plane in a row take their first messages from `side`. `None` if that coarse row does not exist
-/// or has no neighbours on that side.
+/// The source of the first messages from `side` for the nodes of a plane in a row. `None` if that coarse row does not
+/// exist or has no neighbours on that side.
 fn source<'a>(plan: &Plan, coarser: Coarser<'a>, at: PlaneRow, side: Side) -> Option<Source<'a>> {
     let PlaneRow { plane, y } = at;
     let layout = coarser.layout;
     let by_sender = plan.settings().message_start == MessageStart::Sender;
-    // The sender's parent sends to the next coarse row, unless it is the receiver's parent too.
+    // If sender and receiver share a parent, this parent sends to the adjacent coarse row.
     let rows = match side {
         Side::Up if by_sender => y as isize % 2,
         Side::Down if by_sender => y as isize % 2 - 1,
@@ -96,19 +96,19 @@ fn source<'a>(plan: &Plan, coarser: Coarser<'a>, at: PlaneRow, side: Side) -> Op
     Some(Source { lanes: layout.lanes, planes: [even?, odd?] })
 }
 
-/// For even and for odd lanes of a fine plane, whose lane i has coarse column i as parent: the coarse plane that messages
-/// are taken from, and by how many lanes they are moved.
+/// For the even and the odd lanes of a fine plane, whose lane i has coarse column i as its parent: the coarse plane
+/// that messages are taken from, and the offset in lanes.
 fn columns(side: Side, plane: usize, by_sender: bool) -> [(usize, isize); 2] {
     match (side, plane) {
-        // A sender's parent sends to one column further on than the receiver's own.
+        // A sender's parent that is also the receiver's parent sends to the adjacent coarse column.
         (Side::Left, 1) if by_sender => [(1, 0), (0, 1)],
         (Side::Right, 0) if by_sender => [(1, -1), (0, 0)],
         _ => [(0, 0), (1, 0)],
     }
 }
 
-/// The same for a swept grid. Only its even nodes hold messages from left and right, so an odd parent is replaced by its
-/// neighbour on that side. Nothing comes from above.
+/// As [`columns`], for a swept grid. Only its even nodes hold messages from the left and right, so an odd parent is
+/// replaced by its neighbour on that side. Nothing comes from above.
 fn swept(side: Side, y: usize) -> Option<[(usize, isize); 2]> {
     match (side, y % 2) {
         (Side::Up, _) => None,
@@ -142,7 +142,7 @@ fn expand<S: Simd>(simd: S, layout: &Layout, source: &Source<'_>, plane: usize, 
 }
 
 impl Parents<'_> {
-    /// The messages of a vector of lanes of the label that starts at `from`; zeros where a lane has no sender.
+    /// The messages of a vector of lanes, for the label that starts at `from`; zeros where a lane has no sender.
     #[inline(always)]
     fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> S::u8s {
         let values = match (from + lane).checked_add_signed(self.moved) {

@@ -1,15 +1,15 @@
 //! Label selection: by the lowest belief, or in sequence, given the labels already decided.
 //!
-//! What the kernel computes for every node, in the words of `bp-cpu-scalar`:
+//! In the terms of `bp-cpu-scalar`, the kernel computes for every node:
 //!
 //! ```text
 //! for each label d:
 //!     belief(d) = cost(d) + messages from the sides without a decided label (d)
 //!                         + smoothness(d, label decided there) for the other sides
-//! label = the smallest d of the lowest belief
+//! label = the smallest d with the lowest belief
 //! ```
 //!
-//! Here one lane of a vector is one node. It keeps the best belief and its label while all labels pass by.
+//! Here one lane of a vector is one node. It keeps the best belief and its label during the loop over all labels.
 
 use std::array;
 
@@ -28,8 +28,8 @@ use crate::{
 /// A distance of labels that costs the truncation for every slope but 0.
 const FAR: usize = MAX_TRUNCATION as usize + 1;
 
-/// How many labels are compared at a time. Distances to decided labels, clamped to [`FAR`] beyond either end of such a
-/// chunk, stay within 8 bits.
+/// The number of labels compared at a time. Decided labels are clamped to [`FAR`] beyond either end of such a chunk, so
+/// distances to them stay within 8 bits.
 const CHUNK: usize = 256 - 2 * FAR;
 
 /// The costs and messages that labels are selected by, for rows from `first` on.
@@ -43,7 +43,7 @@ pub(crate) struct Answer<'a> {
     pub(crate) received: [Rows<'a>; 2],
 }
 
-/// Writes the label of the lowest belief of every node, `[height][width]`.
+/// Writes the label with the lowest belief of every node, `[height][width]`.
 pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
     labels.par_chunks_exact_mut(answer.layout.size.width).enumerate().for_each(|(y, row)| {
         for plane in 0..2 {
@@ -59,7 +59,7 @@ pub(crate) fn select_labels(answer: &Answer<'_>, labels: &mut [u16]) {
 struct Received<'a> {
     /// The messages, `[label][lane]`.
     values: &'a [u8],
-    /// 255 where a neighbour sent one, else 0, `[lane]`.
+    /// 255 where a neighbour sent one, otherwise 0, `[lane]`.
     mask: &'a [u8],
 }
 
@@ -68,7 +68,7 @@ impl<'a> Answer<'a> {
         &self.stored[(y - self.first) * self.layout.row() + plane * self.layout.plane()..][..self.layout.plane()]
     }
 
-    /// Copies the messages received from `side` to `messages`, for as many rows as there is room for.
+    /// Copies the messages received from `side` to `messages`, for as many rows as fit.
     pub(crate) fn read_messages(&self, plan: &Plan, side: Side, messages: &mut [u8]) {
         let one_an_edge = plan.settings().schedule == Schedule::Sweep;
         let nodes = (self.first..).flat_map(|y| self.layout.columns().map(move |column| (column, y)));
@@ -92,8 +92,8 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// 255 where a node of `plane` has a neighbour on `side`, `[lane]`. For up and down it is 255 everywhere: a caller knows
-    /// whether there is such a row.
+    /// 255 where a node of `plane` has a neighbour on `side`, `[lane]`. For up and down it is 255 everywhere, because
+    /// callers know whether there is such a row.
     fn mask(&self, plane: usize, side: Side) -> &'a [u8] {
         let [_, all] = self.layout.none_and_all();
         self.layout.masks(plane).get(slot(side, plane)).copied().unwrap_or(all)
@@ -129,9 +129,9 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// Decides the nodes of a plane in a row. Each takes the label that costs least, given the messages from some sides
-    /// and the labels already decided on the others; the smallest label wins a tie. `known` gives the decided labels
-    /// for a strip.
+    /// Decides the labels of the nodes of a plane in a row. Each node takes the label with the lowest cost, given the
+    /// messages from some sides and the labels already decided on the others; the smallest label wins a tie. `known`
+    /// returns the decided labels for a strip.
     fn decide<'b, const M: usize, const K: usize>(
         &self,
         at: PlaneRow,
@@ -172,11 +172,11 @@ fn decided(row: &[u16], x: isize) -> [u16; STRIP] {
 #[derive(Clone, Copy)]
 struct Candidate {
     label: usize,
-    /// Its place in the chunk.
+    /// Its index in the chunk.
     low: usize,
 }
 
-/// The decided labels of the neighbours of a strip of nodes, and where there are such neighbours.
+/// The decided labels of the neighbours of a strip of nodes, and which of these neighbours exist.
 struct Known<'a> {
     slot: usize,
     labels: [u16; STRIP],
@@ -267,7 +267,7 @@ impl Undecided<'_> {
         )
     }
 
-    /// Compares the belief of a label with the best so far, and keeps the better one and its place in the chunk.
+    /// Compares the belief of a label with the best so far. Keeps the better one and its index in the chunk.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
     fn compare<S: Simd, const WEAK: bool, const M: usize, const K: usize>(
@@ -331,7 +331,7 @@ fn near(known: &Known<'_>, from: usize) -> [u8; STRIP] {
     relative
 }
 
-/// The least distance of labels that costs the truncation on every edge. Its product with the step fits 8 bits, because
+/// A distance of labels from which on every edge costs its truncation. Its product with the step fits 8 bits, because
 /// s div 2 is at least a third of s, or 0.
 fn far(model: &Model, weak: bool) -> u8 {
     let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);

@@ -1,14 +1,14 @@
-//! Where the values of a grid lie.
+//! The memory layout of the values of a grid.
 
 use bp_core::{Plan, Size};
 
 /// Every row of lanes is a whole number of blocks. No vector is longer than a block.
 pub(crate) const BLOCK: usize = 64;
 
-/// The most lanes of a strip: their running minima stay in the L1 cache while all labels pass by.
+/// The most lanes of a strip: their running minima stay in the L1 cache during the loop over all labels.
 pub(crate) const STRIP: usize = 8 * BLOCK;
 
-/// The fewest rows that are worth handing to another thread.
+/// The fewest rows that are worth passing to another thread.
 pub(crate) const MIN_ROWS: usize = 32;
 
 /// Rows of a grid are split into two *planes* by column parity: lane i of plane p is column `2i + p`. All nodes of a
@@ -20,7 +20,7 @@ pub(crate) struct Shape {
     pub(crate) size: Size,
     /// Number of labels.
     pub(crate) labels: usize,
-    /// The lanes from one label to the next: those of a plane, and padding.
+    /// The distance in lanes from one label to the next: the lanes of a plane plus padding.
     pub(crate) lanes: usize,
 }
 
@@ -36,17 +36,17 @@ impl Shape {
         (self.size.width + 1 - plane) / 2
     }
 
-    /// Entries of a plane of a row.
+    /// Number of entries in one plane of a row.
     pub(crate) fn plane(&self) -> usize {
         self.labels * self.lanes
     }
 
-    /// Entries of both planes of a row.
+    /// Number of entries in both planes of a row.
     pub(crate) fn row(&self) -> usize {
         2 * self.plane()
     }
 
-    /// The lanes of a plane in strips of whole blocks.
+    /// Splits the lanes of a plane into strips of whole blocks.
     pub(crate) fn strips(&self, plane: usize) -> impl Iterator<Item = Strip> + use<> {
         let lanes = self.nodes(plane).next_multiple_of(BLOCK);
         (0..lanes).step_by(STRIP).map(move |first| Strip { first, lanes: STRIP.min(lanes - first) })
@@ -62,7 +62,7 @@ impl Shape {
 #[derive(Clone, Copy)]
 pub(crate) struct Strip {
     pub(crate) first: usize,
-    /// How many lanes there are; at most [`STRIP`].
+    /// The number of lanes, at most [`STRIP`].
     pub(crate) lanes: usize,
 }
 
@@ -79,7 +79,7 @@ impl Strip {
     }
 }
 
-/// A column, and where it lies.
+/// A column and its position in the layout.
 #[derive(Clone, Copy)]
 pub(crate) struct Column {
     pub(crate) x: usize,
@@ -101,7 +101,7 @@ impl PlaneRow {
     }
 }
 
-/// A block of nodes in a row.
+/// The start of a block of nodes in a row.
 #[derive(Clone, Copy)]
 pub(crate) struct BlockStart {
     pub(crate) plane: usize,
@@ -109,14 +109,14 @@ pub(crate) struct BlockStart {
     pub(crate) lane: usize,
 }
 
-/// The lanes of a plane, padded to whole blocks. If labels would lie a multiple of 256 bytes apart, one block is added:
-/// they would share too few sets of the cache.
+/// The lanes of a plane, padded to whole blocks. If labels would lie a multiple of 256 bytes apart, one block is added,
+/// because otherwise they would share too few sets of the cache.
 pub(crate) fn lanes(size: Size) -> usize {
     let blocks = size.width.div_ceil(2).div_ceil(BLOCK);
     BLOCK * if blocks.is_multiple_of(4) { blocks + 1 } else { blocks }
 }
 
-/// Writes a value of every second pixel from the first on: of the pixels of one plane.
+/// Writes a value for every second pixel, starting with the first. These are the pixels of one plane.
 #[inline(always)]
 pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));

@@ -28,22 +28,22 @@ pub(crate) struct RayonSolver {
     layouts: Vec<Layout>,
     features: Features,
     costs: Vec<Costs>,
-    /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at a time.
+    /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at the same time.
     messages: [Messages; 2],
     windows: Windows,
-    /// Whether grid 0 starts with the messages that it holds.
+    /// Whether grid 0 starts with the messages that it already holds.
     keeps_messages: bool,
     seed: Option<Seed>,
     /// The labels of a swept image. They are decided while its messages are in cache.
     decided: Vec<u16>,
 }
 
-/// The messages of one grid. A set has one message for each edge, and a schedule needs one or two sets.
+/// The messages of one grid. A set has one message per edge, and a schedule needs one or two sets.
 ///
-/// A grid is bipartite. So a synchronous run is two runs of half-steps that never touch: in one the even nodes send first,
-/// in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is the first run alone; only its last
-/// half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps one message
-/// for each edge by definition.
+/// A grid is bipartite. So a synchronous run consists of two independent runs of half-steps: in one the even nodes send
+/// first, in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is only the first run; its
+/// last half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps one
+/// message per edge by definition.
 struct Messages {
     sets: [Edges; 2],
 }
@@ -54,7 +54,7 @@ impl Messages {
     }
 }
 
-/// The number of sets of messages that are kept of a grid. A swept image keeps none.
+/// The number of sets of messages that a grid keeps. Grid 0 keeps none under `sweep`.
 fn sets(plan: &Plan, grid: usize) -> usize {
     match plan.settings().schedule {
         Schedule::Sweep => usize::from(grid > 0),
@@ -62,7 +62,7 @@ fn sets(plan: &Plan, grid: usize) -> usize {
     }
 }
 
-/// The two grids whose messages need the most room: the finest grids of even and of odd index that keep any.
+/// The two grids whose messages need the most memory: the finest grids of even and of odd index that keep any.
 fn largest(plan: &Plan) -> [usize; 2] {
     if sets(plan, 0) == 0 { [2, 1] } else { [0, 1] }
 }
@@ -177,13 +177,13 @@ impl Solver for RayonSolver {
         Ok(())
     }
 
-    /// Does nothing: nodes read their first messages just before they first send; see [`crate::refine`].
+    /// Copies nothing: nodes read their first messages just before they first send; see [`crate::refine`].
     fn refine(&mut self, _grid: usize) -> Result<(), Error> {
         self.keeps_messages = false;
         Ok(())
     }
 
-    /// Even nodes send first, in the first set. So the set with the messages they received last has to become the first.
+    /// Even nodes send first, in the first set. So the set with the messages they received last must become the first.
     fn keep_messages(&mut self) -> Result<(), Error> {
         let [of_even, _] = received_in(&self.plan);
         self.messages[0].sets.rotate_left(of_even);
@@ -233,7 +233,7 @@ impl Solver for RayonSolver {
     }
 
     /// Refining is part of updating: the first step on a grid reads the coarser grid's messages instead of its own. Over all
-    /// grids that saves the messages of one step on the finest grid.
+    /// grids, this saves reading the messages of one step on the finest grid.
     fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         let [match_cost, coarsen, _, update_messages, select_labels] = self.plan.moved_bytes()?;
         Some([match_cost, coarsen, 0, update_messages - self.plan.updates_per_step(0), select_labels])

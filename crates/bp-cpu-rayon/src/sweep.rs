@@ -1,4 +1,4 @@
-//! [`bp_core::Schedule::Sweep`]: sweeps every band of rows by itself, in cache.
+//! [`bp_core::Schedule::Sweep`]: sweeps every band of rows independently, in cache.
 
 use bp_core::{BAND_ROWS, Plan, Side};
 use fearless_simd::Level;
@@ -20,7 +20,7 @@ use crate::{
 pub(crate) enum CostSource<'a> {
     /// They are stored.
     Stored(&'a [u8]),
-    /// They are computed whenever they are needed. That takes less time than reading them from memory.
+    /// They are computed when needed, which takes less time than reading them from memory.
     Computed(Matching<'a>),
 }
 
@@ -67,7 +67,7 @@ impl Bands<'_> {
         Answer { level, model, layout, first, stored, received: [rows, rows] }
     }
 
-    /// Sweeps a band as often as the plan says, then calls `then` with its costs and edges.
+    /// Sweeps a band as often as the plan requires, then calls `then` with its costs and edges.
     fn sweep<R>(&self, index: usize, then: impl FnOnce(&[u8], &[u8]) -> R) -> R {
         let (first, row) = (index * BAND_ROWS, self.layout.row());
         let end = (first + BAND_ROWS).min(self.layout.size.height);

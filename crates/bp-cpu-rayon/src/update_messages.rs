@@ -1,6 +1,6 @@
 //! Message passing: the kernel that sends the messages of one plane of nodes in one row.
 //!
-//! What it computes for every node, in the words of `bp-cpu-scalar`:
+//! In the terms of `bp-cpu-scalar`, it computes for every node:
 //!
 //! ```text
 //! for each side `to` that the node sends to:
@@ -27,9 +27,9 @@ pub(crate) enum Sends {
     All,
     /// Those to the left and right.
     Sides,
-    /// Those to the left and right, and the one onward in the direction of the pass.
+    /// Those to the left and right, and the one forward in the direction of the pass.
     SidesAndOn,
-    /// Only the one onward.
+    /// Only the one forward.
     On,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Nodes<'a> {
     pub(crate) lanes: usize,
     /// The smoothness cost of edges that are not weak.
     pub(crate) smoothness: Smoothness,
-    /// The grey values that tell which edges are weak; `None` if no edge is.
+    /// The grey values that determine which edges are weak; `None` if no edge is.
     pub(crate) around: Option<Around<'a>>,
 }
 
@@ -76,8 +76,8 @@ impl Nodes<'_> {
     }
 }
 
-/// Sends messages in place: each overwrites the message that came over the same edge. The last slot is the one onward,
-/// so a caller that passes upwards exchanges the last two slots.
+/// Sends messages in place: each overwrites the message that came over the same edge. The last slot is the one forward
+/// in the direction of the pass, so callers swap the last two slots for an upward pass.
 pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     if nodes.around.is_some() {
         send::<true>(level, sends, nodes, slots)
@@ -95,7 +95,7 @@ fn send<const WEAK: bool>(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: 
     }
 }
 
-/// Runs over a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
+/// Processes a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
 #[inline(always)]
 fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
     simd: S,
@@ -197,8 +197,8 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: b
     let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
         start -= nodes.lanes;
-        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, and a load would wait for a store
-        // at such a distance.
+        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, and a load would have to wait
+        // for a store at such a distance.
         for w in 0..W {
             let from = start + w * V::LEN;
             for side in 0..4 {

@@ -1,13 +1,13 @@
-//! Several steps in one pass over the rows of a grid, so that rows stay in cache, on several threads.
+//! Runs several steps in one pass over the rows of a grid, so that rows stay in cache, on several threads.
 //!
-//! Run one after another, steps would read all rows from memory again and again:
+//! If steps ran one after another, each would read all rows from memory again:
 //!
 //! ```text
 //! for t in 0..steps:  for y in 0..height:  step(y, t)
 //! ```
 //!
-//! Step t may run on row y as soon as step t - 1 has run on rows y - 1, y and y + 1. So each step follows the one before
-//! it, one row behind, and a row is used by all steps while it is in cache:
+//! Step t may run on row y as soon as step t - 1 has run on rows y - 1, y and y + 1. So each step follows the previous
+//! one, one row behind, and all steps use a row while it is in cache:
 //!
 //! ```text
 //! for front in 0..height + steps:  for t in 0..steps:  step(front - t, t)
@@ -15,13 +15,13 @@
 
 use std::ops::Range;
 
-/// Bytes of rows that one thread keeps in cache. More steps at a time need more rows.
+/// Bytes of rows that one thread keeps in cache. Running more steps together needs more rows.
 const REACH: usize = 6 << 20;
 
-/// The most steps at a time. More save nothing.
+/// The most steps that run together. More would save nothing.
 const MOST_STEPS: usize = 16;
 
-/// How many steps to run at a time over rows of so many bytes. Each step needs one row more in cache.
+/// The number of steps to run together over rows of `row_bytes` bytes. Each step needs one more row in cache.
 pub(crate) fn fused_steps(row_bytes: usize) -> usize {
     (REACH / row_bytes.max(1)).clamp(1, MOST_STEPS)
 }
@@ -40,8 +40,8 @@ impl Wavefront {
     /// Calls `step(rows, y, t)` for every row y and step t, with the rows of each buffer from row y on. Buffers have one
     /// row more than the grid.
     ///
-    /// Threads work on slabs of rows. At first each slab runs the steps that need no other slab: with every step, one row
-    /// less at each border. Then the gaps between slabs are filled. The result does not depend on the number of slabs.
+    /// Threads work on slabs of rows. First, each slab runs the steps that need no other slab: with every step, one row
+    /// less at each border. Then the gaps between slabs are filled. The number of slabs does not affect the result.
     pub(crate) fn run<const N: usize>(
         self,
         buffers: [Part<'_>; N],
@@ -116,7 +116,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Calls `f(rows, index)` for every slab of `slab` rows, on several threads. The last slab has all rows that are left.
+/// Calls `f(rows, index)` for every slab of `slab` rows, on several threads. The last slab has all remaining rows.
 pub(crate) fn each_slab<const N: usize>(
     buffers: [Part<'_>; N],
     slabs: Range<usize>,

@@ -1,4 +1,4 @@
-//! Memory for the bands that threads sweep at once.
+//! Memory for the bands that threads sweep at the same time.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -6,9 +6,9 @@ use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
 
 use crate::{edges, match_cost::is_stored, shape::Shape};
 
-/// The memory in which one thread sweeps a band: its costs and messages. Those of the whole image are never stored.
+/// The memory in which one thread sweeps a band: its messages, and its costs unless those of the grid are stored.
 pub(crate) struct Window {
-    /// The costs of a band, if those of the grid are not stored.
+    /// The costs of a band; empty if those of the grid are stored.
     pub(crate) costs: Vec<u8>,
     /// The edges up from the first row, and those inside and down from all rows.
     pub(crate) edges: Vec<u8>,
@@ -51,12 +51,12 @@ impl Windows {
         Ok(Self { windows: (0..windows(plan)).map(window).collect::<Result<_, Error>>()? })
     }
 
-    /// Calls `work` with a free window. A thread waits for one only in a larger pool than the one of [`Windows::new`].
+    /// Calls `work` with a free window. A thread waits only if more threads than windows need one at the same time.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
         let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
         let (before, after) = self.windows.split_at(own);
         let free = after.iter().chain(before).find_map(|window| window.try_lock().ok());
-        // A window holds nothing that outlives a band, so a panic in another band did it no harm.
+        // A window holds nothing that outlives a band, so a panic in another band does no harm.
         let mut window = free.unwrap_or_else(|| self.windows[own].lock().unwrap_or_else(PoisonError::into_inner));
         work(&mut window)
     }

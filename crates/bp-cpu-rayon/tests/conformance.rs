@@ -1,4 +1,4 @@
-//! The rayon backend against the reference, on every instruction set that this processor has.
+//! Compares the rayon backend with the reference, on every instruction set of this CPU.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule};
@@ -32,13 +32,13 @@ fn rayon_equals_scalar_with_any_number_of_threads() {
         let opened = Rayon.open(device).unwrap();
         let refused = POOLS[pool].install(|| compare_at_random(&Scalar, &[opened.as_ref()], [seed]));
         assert_eq!(refused, Ok(0), "{seed}");
-        // Threads may take turns differently the second time.
+        // The second time, threads may run in a different order.
         let case = random_case(seed);
         assert!(solve_on(device, pool, &case) == solve_on(device, pool, &case), "{seed} {:?}", case.plan);
     }
 }
 
-/// Bands, windows and seams of images as large as real ones, with more threads than processors.
+/// Covers bands, windows and seams of a larger image, also with more threads than CPU cores.
 #[test]
 fn a_large_image_is_the_same_on_any_number_of_threads() {
     let pair = noise_pair(333, 277, 9);
@@ -57,7 +57,7 @@ fn a_large_image_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// What was prepared for one thread is swept by eight, and the other way round.
+/// Eight threads sweep a plan that was prepared for one thread, and vice versa.
 #[test]
 fn a_matcher_may_move_to_another_pool() {
     let pair = noise_pair(90, 200, 4);

@@ -1,4 +1,4 @@
-//! What the operations on maps are good for, on made-up scenes whose truth is exact.
+//! Checks that the operations on maps improve them, on synthetic scenes with exact ground truth.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
@@ -8,7 +8,7 @@ use bp_core::{
 use bp_cpu_rayon::Rayon;
 use bp_testkit::synthetic::{self, Scene};
 
-/// A third of the full size has disparities up to 37.
+/// The scenes at a third of the full size have disparities up to 37.
 const LABELS: usize = 48;
 
 /// Both images' maps, straight from the labels.
@@ -28,7 +28,7 @@ fn errors(scene: &Scene, map: &DisparityMap) -> MapErrors {
     truth.errors(map).unwrap().all
 }
 
-/// The sum over all scenes of a figure of each.
+/// Sums the figures over all scenes.
 fn over_scenes<const N: usize>(figures: impl Fn(&Scene) -> [f64; N]) -> [f64; N] {
     let scenes = (0..synthetic::NAMES.len()).map(|index| synthetic::scene(index, 3));
     scenes.fold([0.0; N], |sums, scene| {

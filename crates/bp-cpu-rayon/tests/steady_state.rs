@@ -25,7 +25,7 @@ fn matching_allocates_nothing() {
         }
     }
     pool.install(|| {
-        // Once, so that the pool's own queues have grown.
+        // Solve once, so that the pool's own queues have grown.
         matchers.iter_mut().for_each(|driver| _ = driver.solve(&pairs[0]).unwrap());
         for driver in &mut matchers {
             let region = Region::new(ALLOCATOR);

@@ -1,4 +1,4 @@
-//! Tiles against the whole image.
+//! Compares tiles with the whole image.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
@@ -25,7 +25,7 @@ fn tiled(device: &dyn Device, pair: &StereoPair, tiling: Tiling) -> Vec<u16> {
     tiled.labels().to_vec()
 }
 
-/// Share of pixels whose labels differ, in percent.
+/// The percentage of pixels whose labels differ.
 fn differing(a: &[u16], b: &[u16]) -> f64 {
     100.0 * a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len() as f64
 }
@@ -56,7 +56,7 @@ fn strips_of_a_swept_image_are_the_whole_image() {
     }
 }
 
-/// What docs/big-images.md says of real images, on a synthetic one.
+/// Checks the claim of docs/big-images.md about real images on a synthetic one.
 #[test]
 fn tiles_with_a_halo_are_nearly_the_whole_image() {
     let scene = synthetic::scene(0, 2);

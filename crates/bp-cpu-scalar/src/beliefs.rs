@@ -1,4 +1,4 @@
-//! Labels of the lowest belief.
+//! Selects the labels with the lowest belief.
 
 use bp_core::Side;
 
@@ -7,7 +7,7 @@ use crate::{
     messages::{Messages, add},
 };
 
-/// Writes the label of the lowest belief of every node. `belief` has room for one node's labels.
+/// Writes the label with the lowest belief of every node. `belief` has room for one node's labels.
 ///
 /// ```text
 /// belief(d) = data cost of d + the messages received from all four sides
@@ -20,7 +20,7 @@ pub(crate) fn lowest_beliefs(costs: &Costs, messages: &Messages, labels: &mut [u
     }
 }
 
-/// The label of the lowest sum; the smallest label wins a tie.
+/// The label with the lowest sum; the smallest label wins a tie.
 pub(crate) fn smallest_least(sums: &[u8]) -> u16 {
     let least = sums.iter().copied().min();
     sums.iter().position(|&sum| Some(sum) == least).unwrap_or(0) as u16

@@ -4,8 +4,8 @@ use bp_core::Size;
 
 use crate::costs::Costs;
 
-/// Computes the costs of a coarser grid: a node sums the costs of its children, four at most, label by label. `fine_size`
-/// is the size of the finer grid. `scratch` has room for one node's labels.
+/// Computes the costs of a coarser grid: a node sums the costs of its children, at most four, label by label.
+/// `fine_size` is the size of the finer grid. `scratch` has room for one node's labels.
 pub(crate) fn coarsen(fine: &Costs, fine_size: Size, coarse: &mut Costs, scratch: &mut [u64]) {
     let size = fine_size.coarser();
     for node in 0..size.pixels() {

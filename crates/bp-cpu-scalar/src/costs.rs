@@ -4,8 +4,8 @@ use bp_core::{Error, Plan, memory};
 
 use crate::sums::{self, Sums};
 
-/// Data costs `[node][label]`, normalised by each node's least cost and clipped at [`Plan::clip`]. Beside them it keeps the
-/// unclipped costs, if the next coarser grid sums those.
+/// Data costs `[node][label]`, normalised by each node's least cost and clipped at [`Plan::clip`]. It also keeps the
+/// unclipped costs if the next coarser grid needs them for its sums.
 pub(crate) struct Costs {
     labels: usize,
     clip: u64,
@@ -41,7 +41,7 @@ impl Costs {
         }
     }
 
-    /// Adds the unclipped costs of one node to `costs`. Without sums, the stored costs were never clipped.
+    /// Adds the unclipped costs of one node to `costs`. If there are no sums, the stored costs were never clipped.
     pub(crate) fn add_unclipped(&self, node: usize, costs: &mut [u64]) {
         match &self.sums {
             Some(sums) => sums.add_to(node, costs),

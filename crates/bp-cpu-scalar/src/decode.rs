@@ -36,7 +36,7 @@ pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], s
     }
 }
 
-/// Adds the smoothness cost of every label beside `label`. It is at most K, which fits 8 bits.
+/// Adds the smoothness cost between every label and `label`. It is at most K, which fits 8 bits.
 fn add_smoothness(smoothness: Smoothness, label: u16, sums: &mut [u8]) {
     for (d, sum) in (0..).zip(sums) {
         *sum = sum.saturating_add(smoothness.of(d, label) as u8);

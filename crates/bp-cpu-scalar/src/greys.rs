@@ -1,4 +1,4 @@
-//! The grey values of one grid. They tell which edges are weak.
+//! The grey values of one grid. They determine which edges are weak.
 
 use bp_core::{Error, Image, Model, Plan, Size, Smoothness, memory};
 
@@ -23,7 +23,7 @@ impl Greys {
         }
     }
 
-    /// Computes the grey values of a coarser grid: a node has the mean of its children, four at most.
+    /// Computes the grey values of a coarser grid: a node has the mean of its children, at most four.
     pub(crate) fn coarsen(&mut self, fine: &Self) {
         for (node, value) in self.values.iter_mut().enumerate() {
             let (x, y) = (2 * (node % self.size.width), 2 * (node / self.size.width));

@@ -1,4 +1,4 @@
-//! What message passing on one grid needs besides the messages.
+//! Everything that message passing on one grid needs besides the messages.
 
 use bp_core::{Node, Plan, Side, Size};
 
@@ -24,7 +24,7 @@ impl Grid<'_> {
         self.plan.neighbour(self.index, node, side)
     }
 
-    /// Sets `h` to the data costs of `node` plus the messages that it received from all sides but `to`.
+    /// Sets `h` to the data costs of `node` plus the messages that it received from all sides except `to`.
     #[inline(always)]
     pub(crate) fn gather(&self, messages: &Messages, node: Node, to: Side, h: &mut [u8]) {
         let node = self.size.index(node);
@@ -37,7 +37,7 @@ impl Grid<'_> {
     /// Turns `h` of `node` into its message to the neighbour `receiver`.
     ///
     /// ```text
-    /// message(d) = min over a of (h(a) + min(slope |a - d|, K)), less its minimum over d, which is that of h
+    /// message(d) = min over a of (h(a) + min(slope |a - d|, K)), less its minimum over d, which equals that of h
     /// ```
     ///
     /// The minimum over a is the lower envelope of L cones. One pass up and one pass down the labels compute it

@@ -1,7 +1,7 @@
-//! The reference backend: one thread, textbook loops with the label loop innermost, written to be read.
+//! The reference backend: one thread, textbook loops with the label loop innermost, written for readability.
 //!
-//! It is the baseline of all speed tables. Every other backend must compute the same labels and messages, to the bit.
-//! Each kernel has a file of its own: `match_cost`, `coarsen`, `refine`, `update_messages` and `select_labels`. The files
+//! It is the baseline of all speed tables. Every other backend must compute bit-identical labels and messages.
+//! Each kernel has its own file: `match_cost`, `coarsen`, `refine`, `update_messages` and `select_labels`. The files
 //! `sweep` and `decode` hold the parts that differ under the schedule `sweep`. `grid` computes a message.
 
 mod beliefs;
@@ -22,7 +22,7 @@ mod update_messages;
 
 use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver, memory};
 
-/// The reference backend, which is its own only device.
+/// The reference backend, which is also its only device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Scalar;
 

@@ -9,16 +9,16 @@ pub(crate) fn add(message: &[u8], sums: &mut [u8]) {
 }
 
 /// The last message that every node received from each side: `[side][node][label]`, sides in the order of [`Side::ALL`].
-/// The slots of missing neighbours are always 0, and so are those of messages that the schedule `sweep` used up.
+/// The slots of missing neighbours are always 0, and so are those of messages that the schedule `sweep` has consumed.
 pub(crate) struct Messages {
     labels: usize,
     received: [Vec<u8>; 4],
-    /// Where a synchronous loop writes, because it must read only the loop before; empty under other schedules.
+    /// The output of a synchronous loop, which must read only the previous loop. Empty under other schedules.
     next: [Vec<u8>; 4],
 }
 
 impl Messages {
-    /// Allocates room for `grid` and for every second grid above it.
+    /// Allocates room for the messages of `grid`, which is also enough for every second coarser grid.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let volume = || memory::filled("messages", plan.volume(grid), 0);
         let sync = plan.settings().schedule == Schedule::Sync;

@@ -29,8 +29,8 @@ fn coarse_receiver(plan: &Plan, grid: usize, node: Node, side: Side) -> Option<N
     }
 }
 
-/// The same under the schedule `sweep`, where an edge holds only the message up or the message towards its even end. An
-/// odd parent received nothing from that side, but its neighbour there, which is even, did.
+/// The coarse receiver under the schedule `sweep`, where an edge holds only the upward message or the message towards
+/// its even end. An odd parent received nothing from that side, but its even neighbour there did.
 fn sweep_receiver(plan: &Plan, grid: usize, node: Node, side: Side) -> Option<Node> {
     let parent = node.parent();
     match side {

@@ -16,7 +16,7 @@ pub(crate) struct ScalarSolver {
     costs: Vec<Costs>,
     greys: Vec<Greys>,
     /// The messages of even grids and, if the plan has several grids, of odd ones: only a grid and the next coarser one are
-    /// needed at a time.
+    /// needed at the same time.
     messages: Vec<Messages>,
     scratch: Vec<u64>,
     h: Vec<u8>,

@@ -49,7 +49,7 @@ impl Sweep<'_> {
                 let slot = self.messages.received_mut(size.index(receiver), to.opposite());
                 self.grid.send(node, receiver, self.h, slot);
             }
-            // Not earlier: a message received from one side is part of those sent to the others.
+            // Clear received messages only now: a message from one side is part of the messages to the others.
             for &to in sides {
                 self.messages.received_mut(size.index(node), to).fill(0);
             }

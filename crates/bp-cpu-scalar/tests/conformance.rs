@@ -1,4 +1,4 @@
-//! The reference backend against unbounded integers.
+//! Compares the reference backend with unbounded integers.
 
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{Difference, Oracle, conform};

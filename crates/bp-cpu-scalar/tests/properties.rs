@@ -1,4 +1,4 @@
-//! What belief propagation must satisfy, whatever computes it.
+//! Properties that every implementation of belief propagation must satisfy.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::ops::ControlFlow;
@@ -20,7 +20,7 @@ fn answer(pair: &StereoPair, model: Model, settings: Settings) -> Answer {
     solve(&Scalar, &Case { pair: pair.clone(), plan }).unwrap()
 }
 
-/// The answer put together from those of strips of so many rows.
+/// The answer assembled from the answers of strips with this many rows.
 fn answer_in_strips(pair: &StereoPair, model: Model, settings: Settings, rows: usize) -> Answer {
     let height = pair.size().height;
     let strips = (0..height).step_by(rows).map(|first| pair.strip(first..height.min(first + rows)));
@@ -54,7 +54,7 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
 }
 
 fn any_case() -> impl Strategy<Value = Case> {
-    // Now and then high enough for several bands of the schedule sweep.
+    // Sometimes tall enough for several bands of the schedule `sweep`.
     let height = prop_oneof![3 => 1..9_usize, 1 => 30..70_usize];
     (1..9_usize, height, any::<u32>(), any_model(1..20)).prop_flat_map(|(width, height, seed, model)| {
         let pair = noise_pair(width, height, seed.into());
@@ -65,13 +65,13 @@ fn any_case() -> impl Strategy<Value = Case> {
     })
 }
 
-/// The least energy of any labelling of a chain that gives node p label d, `[node][label]`.
+/// The least energy over all labellings of a chain in which node p has label d, `[node][label]`.
 fn min_marginals(pair: &StereoPair, model: &Model, nodes: &[(usize, usize)]) -> Vec<Vec<i64>> {
     let cost = DataCost::of_pair(pair, *model).unwrap();
     let grey = |(x, y)| pair.left().grey(x, y);
     let labels = 0..model.labels() as u16;
     let data = |&(x, y): &(usize, usize)| labels.clone().map(|d| i64::from(cost.at(x, y, d))).collect::<Vec<_>>();
-    // Least energy of all nodes before one, for each of its labels.
+    // For each label of a node, the least energy of all nodes before it.
     let before = |order: &[(usize, usize)]| {
         let mut sums = vec![vec![0; model.labels()]];
         for edge in order.windows(2) {
@@ -103,7 +103,7 @@ proptest! {
         compare(&Oracle, &Scalar, &case).unwrap();
     }
 
-    /// On a chain, belief propagation is dynamic programming: beliefs are min-marginals up to a constant a node.
+    /// On a chain, belief propagation is dynamic programming: beliefs are min-marginals up to a constant per node.
     #[test]
     fn a_chain_is_solved_exactly(
         len in 1..12_usize, upright in any::<bool>(), seed in any::<u32>(), model in any_model(1..9),
@@ -131,7 +131,7 @@ proptest! {
         }
     }
 
-    /// In a column of one band, one loop of sweeps is dynamic programming: messages come up, labels are decided down.
+    /// In a column of one band, a loop of sweeps is dynamic programming: messages go up, then labels are decided down.
     #[test]
     fn one_sweep_solves_a_column_of_one_band_exactly(
         height in 1..=BAND_ROWS, seed in any::<u32>(), model in any_model(1..9),
@@ -144,7 +144,7 @@ proptest! {
         prop_assert_eq!(energy as i64, *marginals[0].iter().min().unwrap());
     }
 
-    /// A band's labels and messages are those of an image of its own.
+    /// A band has the same labels and messages as if it were an image of its own.
     #[test]
     fn sweeps_process_every_band_by_itself(
         width in 1..9_usize, height in 1..70_usize, steps in 1..3_u32, seed in any::<u32>(), model in any_model(1..9),
@@ -154,7 +154,7 @@ proptest! {
         prop_assert_eq!(answer_in_strips(&pair, model, settings, BAND_ROWS), answer(&pair, model, settings));
     }
 
-    /// After a loop of sweeps every edge holds one message, up or towards its even end.
+    /// After a loop of sweeps every edge holds one message: upward, or towards its even end.
     #[test]
     fn a_sweep_leaves_one_message_an_edge(
         width in 1..9_usize, height in 1..70_usize, grids in 1..4_u32, seed in any::<u32>(), model in any_model(2..9),
@@ -170,7 +170,7 @@ proptest! {
         }
     }
 
-    /// The grid is bipartite: T half-steps from zero are one colour of T synchronous loops.
+    /// The grid is bipartite: T half-steps from zero give one colour of T synchronous loops.
     #[test]
     fn half_steps_are_half_of_the_synchronous_loops(
         width in 1..9_usize, height in 1..9_usize, steps in 1..7_u32, seed in any::<u32>(), model in any_model(1..9),
@@ -196,7 +196,7 @@ proptest! {
         prop_assert_eq!(answer(&pair, model, bp), answer(&pair, model, one_grid));
     }
 
-    /// No order of rows is built in. (Columns have one: disparities go one way.)
+    /// The order of rows does not matter. (The order of columns does, because disparities have a direction.)
     #[test]
     fn a_pair_upside_down_gives_the_map_upside_down(
         width in 1..9_usize, height in 1..9_usize, steps in 1..7_u32, seed in any::<u32>(), model in any_model(1..9),
@@ -212,7 +212,7 @@ proptest! {
         prop_assert_eq!(answer(&turned, model, settings).labels, expected);
     }
 
-    /// What lies in one part of a cut image has no effect on the others.
+    /// The contents of one part of a cut image do not affect the other parts.
     #[test]
     fn no_message_crosses_a_cut(
         width in 2..9_usize, height in prop_oneof![2..9_usize, Just(2 * BAND_ROWS)], seed in any::<u32>(), labels in 1..9_usize,
@@ -252,7 +252,7 @@ fn a_shifted_random_dot_pair_gives_the_shift() {
     }
 }
 
-/// A band of the coarsest grid is a strip of the image that exchanges nothing with others, on no grid.
+/// A band of the coarsest grid covers a strip of the image that exchanges nothing with other strips on any grid.
 #[test]
 fn a_sweep_in_strips_is_a_sweep_of_the_whole() {
     let pair = noise_pair(33, 1100, 5);
@@ -268,7 +268,7 @@ fn a_sweep_in_strips_is_a_sweep_of_the_whole() {
     assert!(answer_in_strips(&pair, model, settings, rows / 2) != answer(&pair, model, settings));
 }
 
-/// Black against white is the dearest pair; 14 grids reach the widest sums.
+/// Black against white gives the highest costs, and 14 grids reach the widest sums.
 #[test]
 fn sums_hold_the_extreme_costs() {
     let view = |value| Image::from_grey(67, 33, &[value; 67 * 33]).unwrap();

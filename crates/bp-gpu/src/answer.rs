@@ -4,7 +4,7 @@ use bp_core::{Error, Node, Plan, Schedule, Seed, Side, Size, StereoPair, image::
 
 use crate::{Program, Queue, layout::colour};
 
-/// The bytes of one image in the upload buffer, with [`APRON`] rows above and below, rounded up to whole vectors.
+/// The bytes of an image in the upload buffer, including [`APRON`] rows above and below, rounded up to whole vectors.
 pub(crate) fn image_bytes(size: Size) -> u64 {
     (3 * size.width as u64 * (size.height + 2 * APRON) as u64).next_multiple_of(16)
 }
@@ -71,7 +71,7 @@ pub(crate) fn read_messages(
     Ok(())
 }
 
-/// Whether the node's edge on `side` holds the message to it. Under [`Schedule::Sweep`] an edge holds only one of two.
+/// Whether the node's edge on `side` holds the message to it. Under [`Schedule::Sweep`] an edge holds only one message.
 fn is_held(plan: &Plan, node: Node, side: Side) -> bool {
     plan.settings().schedule != Schedule::Sweep
         || match side {

@@ -1,4 +1,4 @@
-//! Compiled pipelines, kept between runs in the user's cache folder.
+//! Keeps compiled pipelines between runs in the user's cache folder.
 
 use std::{fs, io::Write as _, path::PathBuf};
 
@@ -7,11 +7,11 @@ use sha2::{Digest, Sha256};
 /// The length of a SHA-256 sum.
 const SUM_BYTES: usize = 32;
 
-/// No pipelines are larger. A larger file is not ours, and reading it would only cost time and memory.
+/// The largest file to read. Ours are never larger, and reading another file would only cost time and memory.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// The folder, if the system has a cache folder. Without it, the first start after a reboot is slow on drivers that keep no
-/// cache of their own.
+/// The folder, if the system has a cache folder. Without it, the first start after a reboot is slow on drivers that
+/// have no cache of their own.
 #[must_use]
 pub fn folder() -> Option<PathBuf> {
     Some(dirs::cache_dir()?.join("belief-propagation-stereo"))
@@ -28,7 +28,7 @@ pub fn load(key: &str) -> Option<Vec<u8>> {
     (Sha256::digest(data).as_slice() == sum).then(|| data.to_vec())
 }
 
-/// Stores `data` under this key, completely or not at all. It ignores failures, because nothing depends on the cache.
+/// Stores `data` under this key, completely or not at all. Ignores failures, because nothing depends on the cache.
 pub fn store(key: &str, data: &[u8]) {
     let Some(folder) = folder() else { return };
     let write = || -> std::io::Result<()> {

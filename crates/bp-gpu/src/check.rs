@@ -6,7 +6,7 @@ use bp_core::{Device, Driver, Error, Image, MessageStart, Model, Plan, Profile, 
 /// fails this test cannot be trusted with anything larger.
 ///
 /// # Errors
-/// The reason in words.
+/// The reason as text.
 pub fn check(device: &dyn Device) -> Result<(), String> {
     let labels = solve(device).map_err(|error| format!("a tiny problem failed: {error}"))?;
     let expected = [0, 1, 1, 0, 1, 1];

@@ -15,8 +15,8 @@ use recorder::Recorder;
 
 use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout};
 
-/// The number of full dispatches in a submission: few enough for watchdogs, progress and quick stopping, but enough that
-/// submitting takes no time in comparison.
+/// The number of full dispatches in a submission: few enough for watchdogs, progress reports and quick stopping, but
+/// enough to make the cost of submitting negligible.
 const DISPATCHES_PER_SUBMISSION: u64 = 8;
 
 /// The most marks of a solve.
@@ -27,7 +27,7 @@ impl Program {
     ///
     /// # Errors
     /// [`Error::Unsupported`] if a device with these limits cannot run it, [`Error::OutOfMemory`] if its buffers need more
-    /// memory than there is.
+    /// memory than is available.
     pub fn new(plan: &Plan, limits: &Limits) -> Result<Self, Error> {
         let program = compose(plan, limits)?;
         match limits.memory_bytes {
@@ -38,8 +38,8 @@ impl Program {
         }
     }
 
-    /// The bytes that a driver of this plan takes on a device with these limits, including its labels on the host. If the
-    /// device cannot run the plan, the bytes of the plan itself.
+    /// The bytes that a driver of this plan uses on a device with these limits, including its labels on the host. If
+    /// the device cannot run the plan, the bytes of the plan itself.
     #[must_use]
     pub fn planned_bytes(plan: &Plan, limits: &Limits) -> u64 {
         let labels = 2 * plan.image_size().pixels() as u64;
@@ -108,7 +108,7 @@ impl Composer<'_> {
         let (grids, periods) = (0..self.plan.grids(), self.periods());
         let submission_entries = DISPATCHES_PER_SUBMISSION.saturating_mul(self.limits.dispatch_entries);
         let mut recorder = Recorder::new(submission_entries);
-        // In the order of Program::segments_of.
+        // This order must match Program::segments_of.
         self.match_cost(recorder.part());
         grids.clone().skip(1).for_each(|grid| self.coarsen(recorder.part(), grid));
         grids.clone().for_each(|grid| self.refine(recorder.part(), grid));
@@ -153,7 +153,7 @@ impl Composer<'_> {
     fn marks(&self, submission_entries: u64) -> usize {
         let steps = fused_steps(self.plan, submission_entries);
         let updates = self.plan.settings().steps.div_ceil(steps) as usize;
-        // More device times are not worth their queries.
+        // More marks would not be worth their queries.
         (2 + self.plan.grids().saturating_mul(2 + updates)).min(MOST_MARKS)
     }
 
@@ -164,7 +164,7 @@ impl Composer<'_> {
     }
 }
 
-/// How many steps on grid 0 fill a submission.
+/// The number of steps on grid 0 that fill a submission.
 pub(crate) fn fused_steps(plan: &Plan, submission_entries: u64) -> u32 {
     let steps = submission_entries / plan.updates_per_step(0).max(1);
     u32::try_from(steps).unwrap_or(u32::MAX).max(1)

@@ -1,7 +1,7 @@
 //! The tests that GPU backends share. They run the suite of [`bp_testkit`], also on devices with lowered limits, so that small
-//! plans are split like large ones, and check further rules for devices.
+//! plans are split like large ones. They also check further rules for devices.
 //!
-//! `open` opens the first device of the backend with changed limits, or gives `None` if there is none; see [`opened`].
+//! `open` opens the backend's first device with changed limits, or returns `None` if there is none; see [`opened`].
 
 use std::{env, thread, time::Duration};
 
@@ -10,7 +10,7 @@ use bp_testkit::{Case, Difference, compare, compare_at_random, conform, noise_pa
 
 use crate::Limits;
 
-/// The device, or `None` after printing why there is none.
+/// Returns the device, or prints why there is none and returns `None`.
 ///
 /// # Panics
 /// If there is no device although `BP_REQUIRE_GPU` is set in the environment.
@@ -58,7 +58,7 @@ pub fn conforms_cut_up(
     let lowered = [16, 32, 64, 128, 512, 2048].map(|kib| {
         open(&|limits| {
             limits.binding_bytes = kib << 10;
-            // As many workgroups as the widest of the images takes.
+            // As many workgroups as the widest image needs.
             (limits.workgroups, limits.dispatch_entries) = (18, 5000);
         })
     });
@@ -80,7 +80,7 @@ fn banded_cases() -> Vec<Case> {
     plans.filter_map(plan).map(|plan| Case { pair: pair.clone(), plan }).collect()
 }
 
-/// Runs several plans at the same time. They share the device's queue and its kernels.
+/// Runs several plans at the same time. They share the device's queue and kernels.
 ///
 /// # Errors
 /// The first difference from the reference.
@@ -100,7 +100,8 @@ pub fn runs_plans_at_once(
     })
 }
 
-/// Checks that plans and devices beyond the limits fail with the right kind of error, when they are prepared or opened.
+/// Checks that plans beyond the limits fail with the right kind of error when they are prepared, and devices beyond
+/// them when they are opened.
 ///
 /// # Panics
 /// If they do not.
@@ -117,7 +118,8 @@ pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Er
     assert!(matches!(few, Some(Error::Unavailable { .. })), "{few:?}");
 }
 
-/// Checks device times: the stages of a solve fill most of the time that the host waits, and no more.
+/// Checks device times: the stages of a solve take more than a quarter of its total time on the host, and no more than
+/// all of it.
 ///
 /// # Panics
 /// If they do not.

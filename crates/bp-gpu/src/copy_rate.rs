@@ -6,15 +6,15 @@ use bp_core::Error;
 
 use crate::{Buffer, Command, Limits, Memory, Program, Queue, Segment};
 
-/// The bytes of a copy, if buffers may be so large: more than any cache holds.
+/// The bytes of a copy, if buffers may be that large: more than any cache holds.
 const BYTES: u64 = 256 << 20;
-/// The number of copies of which the median is taken, after one that warms up.
+/// The number of timed copies after one warm-up copy. The median counts.
 const COPIES: usize = 9;
 
-/// Measures how many bytes a second a device reads and writes, together. `prepare` prepares a program on the device.
+/// Measures the total bytes per second that a device reads and writes. `prepare` prepares a program on the device.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn copy_rate(
     limits: &Limits,
     prepare: impl FnOnce(&Program) -> Result<Box<dyn Queue>, Error>,

@@ -1,4 +1,4 @@
-//! The kernels. Each has a WGSL file of its own.
+//! The kernels. Each has its own WGSL file.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ use Access::{Read, Write};
 /// A kernel, named like its file and its entry point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
-    /// The features of every pixel of one image, which the profile compares; part of the stage `match_cost`.
+    /// The features that the profile compares, for every pixel of one image; part of the stage `match_cost`.
     Features,
     /// Grey values of the left image, if the model has weak edges; part of the stage `match_cost`.
     Greys,
@@ -87,8 +87,8 @@ impl Kernel {
         [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
     }
 
-    /// How it accesses the storage buffers of group 0, from binding 1 on. Binding 0 is a block of the parameters at a dynamic
-    /// offset, which it reads.
+    /// How it accesses the storage buffers of group 0, from binding 1 on. Binding 0 is a read-only block of parameters
+    /// at a dynamic offset.
     #[must_use]
     pub fn bindings(self) -> &'static [Access] {
         match self {
@@ -108,7 +108,7 @@ impl Kernel {
     }
 }
 
-/// A kernel with the values of its pipeline-overridable constants. It is compiled as one unit.
+/// A kernel with the values of its pipeline-overridable constants, compiled as one unit.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Pipeline {
     /// The kernel.

@@ -1,4 +1,4 @@
-//! How the values of a plan lie in memory.
+//! The layout of a plan's values in memory.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ const QUAD_LABELS: usize = 4;
 /// The bytes of a vector: four labels at four nodes.
 const VECTOR_BYTES: u64 = 16;
 
-/// Rows of a grid with buffers of their own, so that no buffer is larger than a device allows.
+/// Rows of a grid that have their own buffers, so that no buffer is larger than a device allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Strip {
     /// First row.
@@ -54,7 +54,7 @@ impl Grid {
         self.row_bytes().saturating_mul(strip.rows as u64 + 2)
     }
 
-    /// Bytes of the sums beside a plane.
+    /// Bytes of the sums that belong to a plane.
     pub(crate) fn sums_bytes(&self, strip: Strip) -> u64 {
         self.plane_bytes(strip).saturating_mul(self.sum_bytes as u64)
     }
@@ -75,12 +75,12 @@ impl Grid {
         self.strips = (0..height).step_by(rows).map(|first| Strip { first, rows: rows.min(height - first) }).collect();
     }
 
-    /// The strip with row `y`.
+    /// The strip that contains row `y`.
     pub(crate) fn strip_of(&self, y: usize) -> usize {
         self.strips.iter().rposition(|strip| strip.first <= y).unwrap_or(0)
     }
 
-    /// The position of a label's byte of a node in a plane of a strip. The node's colour selects the plane.
+    /// The position of the byte of a node and label in a plane of a strip. The node's colour selects the plane.
     pub(crate) fn byte(&self, strip: Strip, node: Node, label: usize) -> usize {
         let Node { x, y } = node;
         let node = x / 2;
@@ -95,10 +95,10 @@ pub(crate) fn colour(node: Node) -> usize {
 }
 
 /// The grids of a plan. Grids whose buffers would be too large are cut into strips. A strip begins at an even row of the
-/// next finer grid's strip; under [`Schedule::Sweep`] it begins with a band, too.
+/// next finer grid's strip and, under [`Schedule::Sweep`], at the first row of a band.
 ///
 /// # Errors
-/// [`Error::Unsupported`] if the fewest rows of a strip are too large.
+/// [`Error::Unsupported`] if even the smallest strip is too large.
 pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
     let mut grids: Vec<_> = (0..plan.grids()).map(|grid| Grid::new(plan, grid)).collect();
     let bytes = limits.binding_bytes.min(limits.buffer_bytes);
@@ -117,7 +117,7 @@ pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
     Ok(grids)
 }
 
-/// The rows of grid 0 in a strip, if the grids `cut` are cut.
+/// The number of rows of grid 0 in a strip, if the grids `cut` are cut.
 fn strip_rows(plan: &Plan, grids: &[Grid], cut: Range<usize>, bytes: u64) -> usize {
     let sweep = plan.settings().schedule == Schedule::Sweep;
     let unit = if sweep { BAND_ROWS } else { 2 } << (cut.end - 1);

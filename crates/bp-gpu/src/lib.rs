@@ -1,7 +1,7 @@
-//! What the GPU backends share: it turns a plan into a [`Program`] of buffers, pipelines and commands.
+//! Code shared by the GPU backends. It turns a plan into a [`Program`] of buffers, pipelines and commands.
 //!
-//! A program uses terms that every GPU API has. A backend implements [`Queue`]: it allocates, compiles, records and submits.
-//! [`GpuSolver`] does the rest. The WGSL text of the kernels is in `bp-shaders`.
+//! A program uses only concepts that every GPU API has. A backend implements [`Queue`]: it allocates, compiles, records
+//! and submits. [`GpuSolver`] does the rest. The WGSL text of the kernels is in `bp-shaders`.
 
 mod answer;
 pub mod cache;

@@ -2,27 +2,27 @@
 
 use bp_core::DeviceKind;
 
-/// The limits of a device that a [`crate::Program`] is made for.
+/// The limits of the device that a [`crate::Program`] is made for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Name of the device, for error messages.
     pub device: String,
-    /// The most bytes of a buffer that a kernel can bind.
+    /// The largest buffer that a kernel can bind, in bytes.
     pub binding_bytes: u64,
-    /// The most bytes of a buffer.
+    /// The largest buffer, in bytes.
     pub buffer_bytes: u64,
     /// The most storage buffers that a kernel can bind.
     pub bindings: u32,
     /// The most workgroups of a dispatch.
     pub workgroups: u32,
-    /// The bytes that all buffers may take, if known.
+    /// The bytes that all buffers together may take, if known.
     pub memory_bytes: Option<u64>,
     /// The message entries after which a dispatch is split, so that none keeps the device busy for long.
     pub dispatch_entries: u64,
 }
 
 impl Limits {
-    /// The limits of an imaginary device that allows nearly everything, for looking at programs without a device.
+    /// The limits of an imaginary device that allows nearly everything, to inspect programs without a device.
     #[must_use]
     pub fn roomy() -> Self {
         Self {
@@ -36,9 +36,9 @@ impl Limits {
         }
     }
 
-    /// How many message entries a device of this kind computes within 0.2 s at the very least. The slowest GPUs move 10 GB/s,
-    /// and an entry moves four bytes or less. A software rasteriser takes about 1 ns for an entry on two cores, and 10 ns
-    /// on a slow core.
+    /// The message entries that even the slowest device of this kind computes within 0.2 s. The slowest GPUs move 10
+    /// GB/s, and an entry moves four bytes or less. A software rasteriser takes about 1 ns for an entry on two cores,
+    /// and 10 ns on a slow core.
     #[must_use]
     pub fn dispatch_entries(kind: DeviceKind) -> u64 {
         match kind {

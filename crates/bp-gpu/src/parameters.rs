@@ -31,21 +31,21 @@ parameters! {
     labels: u32,
     /// Quads of labels.
     quads: u32,
-    /// Row of the grid that the strip begins with.
+    /// First row of the strip, in the grid.
     first_row: u32,
     /// Colour of the nodes.
     colour: u32,
-    /// First row of the dispatch, counted in the strip.
+    /// First row of the dispatch, in the strip.
     row: u32,
-    /// Distance of its rows.
+    /// Distance between its rows.
     row_step: u32,
-    /// How many rows.
+    /// Number of its rows.
     rows: u32,
     /// Slope of the smoothness cost.
     slope: u32,
     /// Truncation of the smoothness cost.
     truncation: u32,
-    /// The least of both.
+    /// The smaller of the two.
     step: u32,
     /// The value at which data costs are clipped.
     clip: u32,
@@ -67,13 +67,13 @@ parameters! {
     other_height: u32,
     /// Words in a row of its planes.
     other_words: u32,
-    /// Row of it that its strip begins with.
+    /// First row of its strip, in that grid.
     other_first_row: u32,
     /// Slope of the smoothness cost of weak edges.
     weak_slope: u32,
-    /// Truncation of theirs.
+    /// Truncation of the smoothness cost of weak edges.
     weak_truncation: u32,
-    /// The least of both.
+    /// The smaller of the two.
     weak_step: u32,
     /// Grey difference above which edges are weak.
     edge_threshold: u32,

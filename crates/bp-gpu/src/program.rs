@@ -1,4 +1,4 @@
-//! The program of a plan: buffers, pipelines, and the commands of every stage, in terms that every GPU API has.
+//! The program of a plan: buffers, pipelines, and the commands of every stage, in concepts that every GPU API has.
 
 use std::ops::Range;
 
@@ -9,11 +9,11 @@ use crate::{Kernel, Parameters, Pipeline, layout::Grid};
 /// Where a buffer lies, and who accesses it besides kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// On the device. It is cleared once, when it is made, and copied from and to.
+    /// On the device. It is cleared once, when it is created. Commands copy from it and to it.
     Device,
-    /// The host writes it before every solve. It is copied from.
+    /// The host writes it before every solve. Commands copy from it.
     Upload,
-    /// It is copied to. The host reads it after every solve.
+    /// Commands copy to it. The host reads it after every solve.
     Download,
 }
 
@@ -24,15 +24,15 @@ pub struct Buffer {
     pub name: &'static str,
     /// Its size in bytes, a multiple of 256, so that buffers side by side leave no gaps.
     pub bytes: u64,
-    /// The memory it lies in.
+    /// The kind of memory it lies in.
     pub memory: Memory,
 }
 
-/// The buffers that a kernel binds from binding 1 on, as indices into [`Program::buffers`]. No buffer is bound both to be
-/// read and to be written.
+/// The buffers that a kernel binds from binding 1 on, as indices into [`Program::buffers`]. No buffer is bound for both
+/// reading and writing.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct BindGroup {
-    /// The kernel. Its [`Kernel::bindings`] say how it accesses them.
+    /// The kernel. [`Kernel::bindings`] describes how it accesses the buffers.
     pub kernel: Kernel,
     /// The buffers.
     pub buffers: Vec<usize>,
@@ -54,15 +54,15 @@ pub enum Command {
     },
     /// Copies between two buffers. Offsets and size are multiples of 4.
     Copy {
-        /// Index of the buffer that is read.
+        /// Index of the source buffer.
         from: usize,
-        /// Offset there in bytes.
+        /// Offset in the source, in bytes.
         from_offset: u64,
-        /// Index of the buffer that is written.
+        /// Index of the destination buffer.
         to: usize,
-        /// Offset there in bytes.
+        /// Offset in the destination, in bytes.
         to_offset: u64,
-        /// How many bytes.
+        /// Number of bytes.
         bytes: u64,
     },
     /// Sets a whole buffer to zeros.
@@ -70,27 +70,27 @@ pub enum Command {
         /// Its index.
         buffer: usize,
     },
-    /// Commands after the barrier see what commands before it wrote, kernels and copies alike.
+    /// Makes everything written before the barrier, by kernels and copies, visible to commands after it.
     Barrier,
 }
 
-/// Commands that are recorded together. Each segment sees what the segments before it wrote, as if a [`Command::Barrier`] were
-/// between them.
+/// Commands that are recorded together. Each segment sees what earlier segments wrote, as if a [`Command::Barrier`]
+/// stood between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// The commands.
     pub commands: Vec<Command>,
     /// The message entries that it computes, or an equivalent for other work.
     pub(crate) entries: u64,
-    /// The bytes that it has to read and write at least, without those counted by other segments of its part.
+    /// The minimum number of bytes that it reads and writes, without those counted by other segments of its part.
     pub(crate) moved_bytes: u64,
 }
 
 /// Everything that a device does for a plan.
 #[derive(Clone, Debug)]
 pub struct Program {
-    /// The buffers. The first holds [`Program::parameters`]. The second is the one of [`Memory::Upload`], the third the one of
-    /// [`Memory::Download`]. All others are [`Memory::Device`].
+    /// The buffers. The first holds [`Program::parameters`]. The second is the only one of [`Memory::Upload`], the
+    /// third the only one of [`Memory::Download`]. All others are [`Memory::Device`].
     pub buffers: Vec<Buffer>,
     /// The parameters of all dispatches: blocks of [`Program::PARAMETER_BYTES`], each at a multiple of 256 bytes.
     pub parameters: Vec<u8>,
@@ -104,17 +104,17 @@ pub struct Program {
     pub marks: usize,
     /// The number of steps on a grid after which their segments repeat.
     pub(crate) periods: u32,
-    /// The segments of each [`Part`], by [`Program::segments_of`].
+    /// The segments of each [`Part`]; see [`Program::segments_of`].
     pub(crate) parts: Vec<Range<usize>>,
-    /// The most message entries of a submission. No segment has more, unless a single row has.
+    /// The most message entries of a submission. No segment exceeds it, unless a single row does.
     pub(crate) submission_entries: u64,
     /// The layout of each grid.
     pub(crate) grids: Vec<Grid>,
-    /// Indices of the buffers of grid 0's last messages, `[strip][side][colour]`.
+    /// Indices of the buffers with the last messages of grid 0, `[strip][side][colour]`.
     pub(crate) last_sent: Vec<[[usize; 2]; 4]>,
 }
 
-/// A part of a program: the work of one kernel call of the driver, or of one step of it.
+/// A part of a program: the work of one kernel call of the driver, or of one step within such a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     MatchCost,
@@ -134,7 +134,7 @@ impl Program {
     pub const UPLOAD: usize = 1;
     /// Index of the buffer that the host reads.
     pub const DOWNLOAD: usize = 2;
-    /// Bytes of one block of parameters: the size to which binding 0 is bound.
+    /// Bytes of one block of parameters, which is the size of binding 0.
     pub const PARAMETER_BYTES: u64 = size_of::<Parameters>() as u64;
 
     /// Bytes of all buffers.
@@ -156,7 +156,7 @@ impl Program {
         self.parts[index].clone()
     }
 
-    /// The indices of the buffers with the last messages that nodes of colour 0 and 1 in a strip of grid 0 sent.
+    /// The indices of the buffers with the last messages to `side` from nodes of colour 0 and 1 in a strip of grid 0.
     pub(crate) fn last_sent(&self, strip: usize, side: Side) -> [usize; 2] {
         self.last_sent[strip][side as usize]
     }

@@ -6,21 +6,21 @@ use bp_core::{Error, Plan, Schedule, Seed, Settings, Side, Solver, Stage, Stereo
 
 use crate::{Program, Queue, answer, compose, program::Part};
 
-/// Runs the program of a plan on a queue. It appends segments and submits them whenever they are enough work.
+/// Runs the program of a plan on a queue. It appends segments and submits them whenever they amount to enough work.
 pub struct GpuSolver {
     plan: Plan,
     program: Program,
     queue: Box<dyn Queue>,
     /// The stage of the segments between each mark and the next.
     stages: Vec<Stage>,
-    /// The message entries that are appended but not submitted.
+    /// The message entries appended but not yet submitted.
     pending: u64,
     times: Option<[Duration; Stage::ALL.len()]>,
     moved_bytes: [u64; Stage::ALL.len()],
 }
 
 impl GpuSolver {
-    /// Makes a solver that runs `program`. It was made for `plan` and prepared on `queue`.
+    /// Makes a solver that runs `program`, which was made for `plan` and prepared on `queue`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -38,7 +38,7 @@ impl GpuSolver {
         })
     }
 
-    /// Appends parts of one stage, then a mark. It submits before the appended work gets too large.
+    /// Appends parts of one stage, then a mark. Submits before the appended work grows too large.
     fn run(&mut self, stage: Stage, parts: impl Iterator<Item = Part>) -> Result<(), Error> {
         for index in parts.flat_map(|part| self.program.segments_of(part)) {
             let segment = &self.program.segments[index];
@@ -76,8 +76,8 @@ impl Solver for GpuSolver {
         self.run(Stage::Refine, [Part::Refine(grid)].into_iter())
     }
 
-    /// The messages are still where the first step reads them. After an odd number of synchronous loops they are not: the
-    /// last loop wrote to the buffers that the first loop would write to.
+    /// The messages are still where the first step reads them, except after an odd number of synchronous loops: then
+    /// the last loop wrote to the buffers that the first loop would write to.
     fn keep_messages(&mut self) -> Result<(), Error> {
         let Settings { schedule, steps, .. } = *self.plan.settings();
         if schedule == Schedule::Sync && steps % 2 == 1 {
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
     use crate::Limits;
 
-    /// Notes the message entries of each submission, and answers zeros.
+    /// Records the message entries of each submission, and returns zeros as results.
     struct Counter {
         entries: Vec<u64>,
         download: Vec<u8>,
@@ -189,7 +189,7 @@ mod tests {
         }
     }
 
-    /// What each submission of a solve is worth, and the most that one should be.
+    /// The message entries of each submission of a solve, and the most that one may have.
     fn submissions(plan: &Plan, dispatch_entries: u64) -> (Vec<u64>, u64) {
         let limits = Limits { dispatch_entries, ..Limits::roomy() };
         let program = Program::new(plan, &limits).unwrap();
@@ -213,7 +213,7 @@ mod tests {
         (submitted.lock().unwrap().clone(), most)
     }
 
-    /// No watchdog has to wait for more than a few dispatches, and nobody hands over next to nothing.
+    /// No submission keeps a watchdog waiting for more than a few dispatches, and few submissions are nearly empty.
     #[test]
     fn submissions_are_neither_long_nor_many() {
         let pair = noise_pair(60, 70, 1);

@@ -1,4 +1,4 @@
-//! The WGSL files are valid, and declare what the Rust side says they do.
+//! The WGSL files are valid, and their declarations match the Rust side.
 
 use bp_gpu::{Access, Kernel, Parameters};
 use naga::{
@@ -43,7 +43,7 @@ fn bindings_are_those_declared() {
     }
 }
 
-/// What the host writes is what kernels read.
+/// The host writes the struct that kernels read.
 #[test]
 fn parameters_have_the_layout_of_the_wgsl_struct() {
     for kernel in Kernel::ALL {

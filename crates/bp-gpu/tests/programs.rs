@@ -1,4 +1,4 @@
-//! Programs stay within a device's limits, whatever these are, and leave no node out.
+//! Programs stay within any limits of a device, and leave no node out.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::collections::HashMap;
@@ -52,7 +52,7 @@ fn no_dispatch_and_no_buffer_passes_a_limit() {
         );
         for Dispatch { kernel, parameters, workgroups } in dispatches(&program) {
             assert!(workgroups <= 7, "{kernel:?} {plan:?}");
-            // An invocation of refine makes one message at eight nodes, one of update_messages four at four.
+            // An invocation of refine writes one message at eight nodes, one of update_messages writes four at four.
             let invocations = if kernel == Kernel::Refine { parameters.words.div_ceil(2) } else { parameters.words };
             let entries = u64::from(parameters.rows * invocations * 16 * parameters.labels);
             assert!(entries <= tight.dispatch_entries || parameters.rows == 1, "{kernel:?} {plan:?}");
@@ -73,16 +73,16 @@ fn computed(program: &Program) -> HashMap<(Kernel, u32, u32, u32), u32> {
     times
 }
 
-/// How often a kernel should compute a row of the image in a program of one grid; `features` knows no colours.
+/// How often a kernel should compute a row of the image in a program of one grid. `features` ignores colours.
 fn expected(kernel: Kernel, schedule: Schedule, (row, colour): (u32, u32)) -> u32 {
     let last_of_band = row % 32 == 31;
     match (kernel, schedule) {
         (Kernel::Features, _) => 2,
         (Kernel::Greys | Kernel::MatchCost | Kernel::SelectLabels, _) => 1,
-        // Two steps are composed.
+        // A program contains two steps.
         (Kernel::UpdateMessages, Schedule::Sync) => 2,
         (Kernel::UpdateMessages, Schedule::Checkerboard) => 1,
-        // Down and up, but for odd nodes of a band's last row and even ones of its first.
+        // Forward and backward, except odd nodes in a band's last row and even nodes in its first.
         (Kernel::UpdateMessages, Schedule::Sweep) if colour == 1 && last_of_band => 1,
         (Kernel::UpdateMessages, Schedule::Sweep) if colour == 0 && row % 32 == 0 => 1,
         (Kernel::UpdateMessages, Schedule::Sweep) => 2,
@@ -106,7 +106,7 @@ fn every_row_is_computed_as_often_as_it_should_be() {
             let fine: usize = (0..plan.grids() - 1).map(height).sum();
             assert_eq!(4 * 2 * fine, sum(Kernel::Refine), "{plan:?}");
         }
-        // The coarsest grids may have the same width; then their rows count together.
+        // The coarsest grids may have the same width, so that their rows are counted together.
         for (&(kernel, _, row, colour), &count) in rows.iter().filter(|_| plan.grids() == 1) {
             let expected = expected(kernel, plan.settings().schedule, (row, colour));
             assert!((row as usize) < size.height, "{kernel:?} {plan:?}");
@@ -144,10 +144,10 @@ fn what_does_not_fit_is_refused_with_both_numbers() {
     assert_eq!(error, Error::OutOfMemory { what: "device buffers", needed, available: Some(needed - 1) });
 }
 
-/// What a command does with a buffer: (buffer, whether it is written, by which kernel if any, colour and first row).
+/// How a command uses a buffer: (buffer, whether it is written, kernel if any, colour and first row).
 type Use = (usize, bool, Option<Kernel>, (u32, u32));
 
-/// Stands for the place of a copy.
+/// Used as colour and first row of a copy.
 const COPIED: (u32, u32) = (u32::MAX, 0);
 
 fn uses(program: &Program, command: &Command) -> Vec<Use> {
@@ -167,10 +167,9 @@ fn uses(program: &Program, command: &Command) -> Vec<Use> {
     }
 }
 
-/// Whether two commands without a barrier between them may meet in a buffer: they may not where one writes what the
-/// other reads or writes. Dispatches of one kernel write rows of their own; labels are shared by
-/// all colours and strips, and under the schedule `sweep` those of the other colour are read; what is copied between strips
-/// are first and last rows, which come from other rows than those that they go to.
+/// Whether two commands without a barrier between them may use the same buffer. They may not if one writes what the
+/// other reads or writes. Dispatches of one kernel write different rows. All colours and strips share the labels; under
+/// `sweep` a dispatch reads those of the other colour. Copies between strips read and write different rows.
 fn may_meet(program: &Program, sweep: bool, a: Use, b: Use) -> bool {
     let is_read_only = !a.1 && !b.1;
     let other_rows = a.1 && b.1 && a.2.is_some() && a.2 == b.2 && a.3 != b.3;
@@ -181,8 +180,8 @@ fn may_meet(program: &Program, sweep: bool, a: Use, b: Use) -> bool {
     is_read_only || copies || unused || (!decided_one_after_another && (other_rows || labels))
 }
 
-/// On lavapipe dispatches never overlap, and validation layers see no more than copies: so that a barrier is not missed
-/// where it matters, this looks for it.
+/// Looks for missing barriers. Other tests cannot: on lavapipe dispatches never overlap, and validation layers check
+/// only copies.
 #[test]
 fn commands_without_a_barrier_between_them_do_not_meet() {
     let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };

@@ -1,5 +1,4 @@
-//! The geometry of a pair, from options or from a `calib.txt` as Middlebury's data sets of 2014 and 2021 and ETH3D's have
-//! one.
+//! The geometry of a pair, from options or from a `calib.txt` in the format of Middlebury 2014 and 2021 and of ETH3D.
 
 use std::path::{Path, PathBuf};
 
@@ -7,27 +6,27 @@ use bp_core::{Calibration, Size};
 
 use crate::{Error, Limits, images::read_limited};
 
-/// A geometry that is not yet held against the size of images.
+/// A geometry that was not yet checked against the size of the images.
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// Focal length in pixels.
     pub focal: f64,
-    /// Distance of the cameras in millimetres.
+    /// Distance between the cameras in millimetres.
     pub baseline: f64,
-    /// Column of the right principal point less that of the left one.
+    /// Column of the right principal point minus that of the left one.
     pub doffs: f64,
-    /// Column and row of the left one; none for the middle of the image.
+    /// Column and row of the left principal point; `None` means the centre of the image.
     pub principal_point: Option<[f64; 2]>,
-    /// The file that it is from, and the size of its images where it tells that.
+    /// The file that the geometry was read from.
     pub file: Option<CalibrationFile>,
 }
 
-/// The file that a geometry is from.
+/// The file that a geometry was read from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationFile {
     /// Its path.
     pub path: PathBuf,
-    /// The size of its images, where it says that.
+    /// The size of its images, if the file gives it.
     pub size: Option<Size>,
 }
 
@@ -40,7 +39,7 @@ impl Geometry {
         Self::parse(path, &read_limited(path, Limits { pixels: 0, memory: None })?)
     }
 
-    /// Reads one that is in memory; messages call it `path`.
+    /// Parses a `calib.txt` in memory; messages call it `path`.
     ///
     /// # Errors
     /// [`Error::Read`].
@@ -63,10 +62,10 @@ impl Geometry {
         Ok(geometry)
     }
 
-    /// The geometry of images of this size, which must be those that it is for.
+    /// The calibration of images of this size.
     ///
     /// # Errors
-    /// [`Error::Read`] where the file is for images of another size, [`Error::Request`] where no cameras have this geometry.
+    /// [`Error::Read`] if the file is for images of another size, [`Error::Request`] if no cameras have this geometry.
     pub fn of(&self, size: Size) -> Result<Calibration, Error> {
         if let Some(CalibrationFile { path, size: Some(told) }) =
             self.file.as_ref().filter(|file| file.size != Some(size))
@@ -138,7 +137,7 @@ impl Entries<'_> {
         }
     }
 
-    /// The size of the images, where both sides are told.
+    /// The size of the images, if both sides are given.
     fn size(&self) -> Result<Option<Size>, Error> {
         let side = |name: &str| -> Result<Option<usize>, Error> {
             let wrong = |text| self.failed(&format!("{name}={text:.40} should be a number of pixels"));

@@ -1,4 +1,4 @@
-//! Panics of decoders that are not ours.
+//! Turns panics of third-party decoders into errors.
 
 use std::{
     any::Any,
@@ -10,14 +10,14 @@ thread_local! {
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a panic on this thread becomes an [`crate::Error`] now. A program's panic hook can ask this, to keep quiet: this
-/// library changes no hook.
+/// Whether a panic on this thread would now become an [`crate::Error`]. A program's panic hook can check this and print
+/// nothing. This library changes no hook.
 #[must_use]
 pub fn is_caught() -> bool {
     IS_CAUGHT.get()
 }
 
-/// What `work` returns, or the words of its panic. Nothing that a panic left behind may be used again.
+/// Returns the result of `work`, or the message of its panic. After a panic, nothing that `work` modified may be used.
 pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let before = IS_CAUGHT.replace(true);
     let outcome = panic::catch_unwind(AssertUnwindSafe(work));

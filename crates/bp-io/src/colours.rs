@@ -1,22 +1,22 @@
-//! Colours for values.
+//! Colour maps.
 
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 
-/// From which colours a picture is made.
+/// The colour map of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Colours {
-    /// From dark violet to yellow: colour-blind readers and grey printers keep it in order.
+    /// From dark violet to yellow. The order stays visible to colour-blind readers and in greyscale print.
     #[default]
     Viridis,
-    /// The rainbow whose lightness rises and falls evenly (Mikhailov 2019, by its author's polynomials).
+    /// A rainbow whose lightness rises and falls evenly (Mikhailov 2019, computed with its author's polynomials).
     Turbo,
-    /// The rainbow of older papers, which shows edges that are none.
+    /// The rainbow of older papers, which shows edges that do not exist.
     Jet,
 }
 
 impl Colours {
-    /// All, the default first.
+    /// All colour maps, the default first.
     pub const ALL: [Self; 3] = [Self::Viridis, Self::Turbo, Self::Jet];
 
     /// Its name.
@@ -34,13 +34,13 @@ impl Colours {
     pub fn at(self, place: f64) -> [u8; 3] {
         let place = place.clamp(0.0, 1.0);
         match self {
-            // Not colorous's, which differs a little: recorded figures are made again to the byte.
+            // Not colorous's viridis, which differs slightly: recorded figures must be reproduced to the byte.
             Self::Viridis => {
                 let colour = ViridisRGB.get_color(place as f32);
                 [colour.0, colour.1, colour.2]
             }
             Self::Turbo => colorous::TURBO.eval_continuous(place).as_array(),
-            // Red, green and blue rise and fall one after another, each as a hat around 3/4, 2/4 and 1/4.
+            // Red, green and blue are trapezoids around 3/4, 2/4 and 1/4.
             Self::Jet => {
                 [3.0, 2.0, 1.0].map(|top| (255.0 * (1.5 - (4.0 * place - top).abs()).clamp(0.0, 1.0)).round() as u8)
             }
@@ -58,7 +58,7 @@ mod tests {
         assert_eq!(ends(Colours::Viridis)[0], [68, 1, 84]);
         assert_eq!(ends(Colours::Viridis)[2], [254, 232, 37]);
         assert_eq!(ends(Colours::Jet), [[0, 0, 128], [128, 255, 128], [128, 0, 0]]);
-        // Of the polynomials; the table that they approach begins with [48, 18, 59].
+        // The values of the polynomials. The table that they approximate begins with [48, 18, 59].
         assert_eq!(ends(Colours::Turbo), [[34, 23, 27], [148, 250, 80], [144, 12, 0]]);
         assert!(Colours::ALL.iter().all(|colours| (0..=100).all(|i| colours.at(f64::from(i) / 100.0) != [0; 3])));
     }

@@ -1,4 +1,4 @@
-//! What can go wrong with a file.
+//! Errors about files.
 
 use std::{
     fmt::Display,
@@ -7,11 +7,11 @@ use std::{
 
 use bytesize::ByteSize;
 
-/// Why a file could not be read or written. The variant says who can mend it.
+/// Why a file could not be read or written. The variant says who can fix it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file is missing, broken or does not fit: another file is needed.
+    /// The file is missing, broken or unsuitable: another file is needed.
     #[error("{}: {reason}", path.display())]
     Read {
         /// The file.
@@ -24,19 +24,19 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why it cannot be written.
+        /// The reason.
         reason: String,
     },
-    /// The caller asks for something that this path cannot be: an unknown ending, a value beyond the format, a file that is
-    /// also an input.
+    /// The path does not suit the request: an unknown extension, a value beyond the format, a file that is also an
+    /// input.
     #[error("{}: {reason}", path.display())]
     Request {
         /// The path that the caller gave.
         path: PathBuf,
-        /// What it cannot be.
+        /// The reason.
         reason: String,
     },
-    /// The folder that a file should go into is missing: the caller creates it or names another.
+    /// The folder of an output is missing: the caller must create it or name another.
     #[error("cannot write {}: there is no folder {}; create it first", path.display(), folder.display())]
     MissingFolder {
         /// The file.
@@ -44,14 +44,14 @@ pub enum Error {
         /// Its folder.
         folder: PathBuf,
     },
-    /// Reading the file takes more memory than there is.
+    /// Reading the file needs more memory than is available.
     #[error("{}: reading it needs {}{}", path.display(), iec(*needed), but_only(*available))]
     OutOfMemory {
         /// The file.
         path: PathBuf,
         /// Bytes needed.
         needed: u64,
-        /// Bytes available, where that is known.
+        /// Bytes available, if known.
         available: Option<u64>,
     },
 }
@@ -65,17 +65,17 @@ fn but_only(available: Option<u64>) -> String {
 }
 
 impl Error {
-    /// A file that cannot be read, for this reason.
+    /// [`Error::Read`] with this reason.
     pub fn reading(path: &Path, reason: &dyn Display) -> Self {
         Self::Read { path: path.to_owned(), reason: reason.to_string() }
     }
 
-    /// A file that cannot be written, for this reason.
+    /// [`Error::Write`] with this reason.
     pub fn writing(path: &Path, reason: &dyn Display) -> Self {
         Self::Write { path: path.to_owned(), reason: reason.to_string() }
     }
 
-    /// A path that cannot be what is asked of it, for this reason.
+    /// [`Error::Request`] with this reason.
     pub fn request(path: &Path, reason: &dyn Display) -> Self {
         Self::Request { path: path.to_owned(), reason: reason.to_string() }
     }

@@ -1,34 +1,33 @@
-//! In which formats maps are stored, and what unknown is in each.
+//! The formats of maps, and how each stores unknown values.
 //!
-//! `.pfm`, `.tif` and `.npy` hold the values themselves in 32-bit floats, plus infinity where unknown. `.png` holds whole
-//! numbers of 16 bits, 0 where unknown: 256 times a disparity, a depth in millimetres, or 65535
-//! times a confidence.
+//! `.pfm`, `.tif` and `.npy` hold the values themselves as 32-bit floats, with plus infinity for unknown. `.png` holds
+//! 16-bit integers, with 0 for unknown: 256 times a disparity, a depth in millimetres, or 65535 times a confidence.
 
 use std::path::Path;
 
 use crate::{Error, write::is_stream};
 
-/// How a map is stored, by the file's ending.
+/// The format of a map, selected by the file's extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MapFormat {
     /// Portable float map.
     Pfm,
-    /// PNG of 16 bits.
+    /// 16-bit PNG.
     Png16,
-    /// TIFF of 32-bit floats.
+    /// TIFF with 32-bit floats.
     Tiff,
-    /// NumPy's array of 32-bit floats.
+    /// NumPy array of 32-bit floats.
     Npy,
 }
 
 impl MapFormat {
-    /// The endings, for messages.
+    /// The extensions, for messages.
     const ENDINGS: &str = ".pfm, .png, .tif, .tiff or .npy";
 
     /// The format of an output path.
     ///
     /// # Errors
-    /// [`Error::Request`] where the ending is none of these.
+    /// [`Error::Request`] for an unknown extension.
     pub fn of(path: &Path) -> Result<Self, Error> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         match ending.as_deref() {
@@ -53,7 +52,7 @@ impl MapFormat {
     }
 }
 
-/// What the values of a map are.
+/// The quantity that a map holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Disparities in pixels.
@@ -85,7 +84,7 @@ impl Quantity {
         }
     }
 
-    /// What values are multiplied by where they are stored as whole numbers: KITTI's for disparities.
+    /// The factor by which values are multiplied when stored as integers; for disparities, that of KITTI.
     #[must_use]
     pub fn steps(self) -> f32 {
         match self {
@@ -96,8 +95,8 @@ impl Quantity {
     }
 }
 
-/// Fails where a path's ending names no format, or one that cannot hold disparities from `low` to `high`, so that a
-/// caller can say so before the work is done.
+/// Fails if the extension of a path is unknown, or if its format cannot hold disparities from `low` to `high`. A caller
+/// can report this before the work begins.
 ///
 /// # Errors
 /// [`Error::Request`].
@@ -114,7 +113,7 @@ pub(crate) fn out_of_png_range(path: &Path) -> Error {
     Error::request(path, &what)
 }
 
-/// Fails where a path does not have an ending.
+/// Fails if a path does not have this extension.
 ///
 /// # Errors
 /// [`Error::Request`].

@@ -15,8 +15,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{Error, Limits, caught::caught, pfm};
 
-/// Reads an image of 8 or 16 bits, or a PFM, grey or colour. Transparency and a camera's note of its orientation are
-/// ignored.
+/// Reads an image with 8 or 16 bits, or a PFM, grey or colour. Ignores transparency and the orientation tag of cameras.
 ///
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
@@ -24,10 +23,10 @@ pub fn read_image(path: &Path, limit: Limits) -> Result<Image, Error> {
     parse_image(path, &read_limited(path, limit)?, limit)
 }
 
-/// Reads an image that is in memory; messages call it `path`.
+/// Parses an image in memory; messages call it `path`.
 ///
 /// # Errors
-/// As [`read_image`].
+/// Those of [`read_image`].
 pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Error> {
     let (size, pixels) = if pfm::is_pfm(bytes) {
         let file = pfm::parse(path, bytes, limit)?;
@@ -39,7 +38,7 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
     Image::from_rgb(size.width, size.height, pixels).map_err(|error| Error::reading(path, &error))
 }
 
-/// The colours in 8 bits.
+/// The colours, as 8-bit values.
 fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
     if has_16_bits(&image) {
         image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
@@ -48,7 +47,7 @@ fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
     }
 }
 
-/// The size, which some formats allow to be 0.
+/// The size. Fails if it is 0, which some formats allow.
 fn size(path: &Path, image: &DynamicImage) -> Result<Size, Error> {
     let size = Size::new(image.width() as usize, image.height() as usize);
     size.map_err(|error| Error::reading(path, &error))
@@ -65,19 +64,19 @@ pub struct StoredGrey {
     pub size: Size,
     /// `[height][width]`.
     pub values: Vec<u16>,
-    /// Whether the file has 16 bits a value; else it has 8.
+    /// Whether the file has 16 bits per value, not 8.
     pub has_16_bits: bool,
 }
 
 /// Reads the grey values of an image as they are stored.
 ///
 /// # Errors
-/// [`Error::Read`] where it is no image or has colours, [`Error::OutOfMemory`].
+/// [`Error::Read`] if it is not an image or has colours, [`Error::OutOfMemory`].
 pub fn read_stored_grey(path: &Path, limit: Limits) -> Result<StoredGrey, Error> {
     stored_grey(path, &read_limited(path, limit)?, limit)
 }
 
-/// Reads grey values of a file that is in memory.
+/// Parses the grey values of a file in memory.
 pub(crate) fn stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<StoredGrey, Error> {
     let decoded = decoded(path, || {
         check_unscaled(path, bytes)?;
@@ -95,8 +94,8 @@ pub(crate) fn stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<St
     Ok(StoredGrey { size, values: values.ok_or_else(coloured)?, has_16_bits: sixteen })
 }
 
-/// Refuses files whose values are not those that were stored: a JPEG's are about them, and decoders stretch others to
-/// fill 8 or 16 bits.
+/// Refuses files whose stored values cannot be recovered: JPEG is lossy, and decoders stretch values of other bit
+/// depths to 8 or 16 bits.
 fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let failed = |error: &dyn std::fmt::Display| Error::reading(path, error);
     let stretched = match image::guess_format(bytes) {
@@ -123,7 +122,7 @@ fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     }
 }
 
-/// SHA-256 of decoded pixels, row by row, a byte for each of red, green and blue.
+/// SHA-256 of the decoded pixels, row by row, with one byte each for red, green and blue.
 #[must_use]
 pub fn pixels_sha256(image: &Image) -> String {
     hex(&Sha256::digest(image.pixels().as_flattened()))
@@ -135,7 +134,7 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Reads a file, a pipe too, but no more than what a picture within the limit can take.
+/// Reads a file or a pipe, up to the most bytes that an image within the limit can have.
 pub(crate) fn read_limited(path: &Path, limit: Limits) -> Result<Vec<u8>, Error> {
     let failed = |error: &dyn std::fmt::Display| Error::reading(path, error);
     let file = File::open(path).map_err(|e| failed(&e))?;
@@ -154,8 +153,7 @@ pub(crate) fn read_limited(path: &Path, limit: Limits) -> Result<Vec<u8>, Error>
     Ok(bytes)
 }
 
-/// What a decoder makes of a file. Some panic on broken ones: that of the crate `png` 0.18.1 does on a palette that ends
-/// within a colour.
+/// Decodes a file. Some decoders panic on broken files: the crate `png` 0.18.1 does if a palette ends within a colour.
 pub(crate) fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let broken = |words| Err(Error::reading(path, &format!("{ENDS_EARLY} (the decoder: {words})")));
     caught(decode).unwrap_or_else(broken)
@@ -179,7 +177,7 @@ fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<DynamicImage, Erro
         return Err(failed(&OTHER_TIFF));
     }
     let pixels = u64::from(width) * u64::from(height);
-    // The decoded image, two copies as colours of 8 bits while it is converted, and what its decoder holds meanwhile.
+    // The decoded image, two copies as 8-bit colours during its conversion, and what its decoder holds meanwhile.
     let meanwhile = match format {
         ImageFormat::Tiff => decoder.total_bytes(),
         ImageFormat::Jpeg => 8 * pixels,
@@ -190,7 +188,7 @@ fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<DynamicImage, Erro
     DynamicImage::from_decoder(decoder).map_err(|error| undecoded(path, format, error))
 }
 
-/// The formats that images are read in, PFM apart.
+/// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
 
 const ENDS_EARLY: &str = "the file ends too early or is broken";
@@ -207,7 +205,8 @@ fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Error {
     }
 }
 
-/// Whether the end is marked after the last begin of coded pixels; the decoder makes up what a cut file lacks.
+/// Whether the end marker comes after the last start of scan. The decoder would invent the pixels that a cut file
+/// lacks.
 fn has_jpeg_end(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     last([0xff, 0xd9]) > last([0xff, 0xda])

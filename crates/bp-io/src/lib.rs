@@ -1,7 +1,8 @@
-//! Files of stereo matching: images, disparity maps, masks, point clouds, calibrations and the sidecars that describe maps.
+//! Files of stereo matching: images, disparity maps, masks, point clouds, calibrations and the sidecars that describe
+//! maps.
 //!
-//! Readers take any bytes and answer with an [`Error`] instead of a panic; [`Limits`] bound what they allocate. Writers
-//! go through [`Files`], which writes beside the final place and renames, so that nobody ever sees half a file.
+//! Readers accept any bytes and return an [`Error`] instead of a panic. [`Limits`] bound their memory. Writers use
+//! [`Files`], which writes a temporary file and renames it, so that nobody ever sees half a file.
 //!
 //! ```no_run
 //! use bp_io::{Files, Limits, Raster, read_image, read_map};

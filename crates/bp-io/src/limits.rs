@@ -1,19 +1,19 @@
-//! How much a reader may take.
+//! Limits of readers.
 
 use std::path::Path;
 
 use crate::Error;
 
-/// Bounds on what a file may hold, and on the memory that reading it may take.
+/// Limits on the size of an image and on the memory for reading it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Most pixels.
     pub pixels: u64,
-    /// Most bytes of memory, where there is such a bound.
+    /// Most bytes of memory, if limited.
     pub memory: Option<u64>,
 }
 
-/// [`Limits::MEGAPIXELS`] and any memory.
+/// [`Limits::MEGAPIXELS`] and unlimited memory.
 impl Default for Limits {
     fn default() -> Self {
         Self::megapixels(Self::MEGAPIXELS)
@@ -24,19 +24,19 @@ impl Limits {
     /// The default, in megapixels.
     pub const MEGAPIXELS: u32 = 100;
 
-    /// A limit of so many megapixels, and any memory.
+    /// A limit in megapixels, with unlimited memory.
     #[must_use]
     pub fn megapixels(megapixels: u32) -> Self {
         Self { pixels: u64::from(megapixels) * 1_000_000, memory: None }
     }
 
-    /// The same with at most so many bytes of memory.
+    /// The same limit of pixels with this limit of memory, in bytes.
     #[must_use]
     pub fn within(self, memory: Option<u64>) -> Self {
         Self { memory, ..self }
     }
 
-    /// Most bytes that a file of so many pixels may have, and its decoder may take at a time.
+    /// Most bytes that a file within the limit may have, and that its decoder may allocate.
     pub(crate) fn file_bytes(self) -> u64 {
         self.pixels.saturating_mul(16).saturating_add(1 << 20)
     }
@@ -51,13 +51,13 @@ impl Limits {
         Err(Error::reading(path, &what))
     }
 
-    /// Refuses a file that takes more memory to read than there is.
+    /// Refuses a file that needs more memory to read than is available.
     pub(crate) fn check_memory(self, path: &Path, needed: u64) -> Result<(), Error> {
         let refused = |available| Error::OutOfMemory { path: path.to_owned(), needed, available };
         if self.memory.is_some_and(|memory| needed > memory) {
             return Err(refused(self.memory));
         }
-        // A decoder that gets no memory, below `ulimit -v` say, would end the program.
+        // Tried here because a decoder that gets no memory, for example under `ulimit -v`, would abort the program.
         let is_there = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX)).is_ok();
         if is_there { Ok(()) } else { Err(refused(None)) }
     }

@@ -13,10 +13,10 @@ use crate::{
     tiff,
 };
 
-/// Reads a map. Stored whole numbers are divided by `scale`, by default 256 where they have 16 bits and 1 where they have
-/// 8; 0 is unknown. Floats are divided by `scale` where that is given; what is not finite is unknown.
+/// Reads a disparity map. Stored integers are divided by `scale`, by default 256 for 16 bits and 1 for 8 bits; 0 means
+/// unknown. Floats are divided by `scale` if it is given; values that are not finite are unknown.
 ///
-/// A sidecar beside it that says it holds something else is believed.
+/// Refuses the map if its sidecar says that it holds another quantity.
 ///
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
@@ -29,10 +29,10 @@ pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<Dispar
     parse_map(path, &read_limited(path, limit)?, scale, limit)
 }
 
-/// Reads a map that is in memory; messages call it `path`.
+/// Parses a map in memory; messages call it `path`.
 ///
 /// # Errors
-/// As [`read_map`].
+/// Those of [`read_map`].
 pub fn parse_map(path: &Path, bytes: &[u8], scale: Option<f32>, limit: Limits) -> Result<DisparityMap, Error> {
     let (size, values) = match floats(path, bytes, limit)? {
         Some((size, values)) => (size, values.into_iter().map(|value| value / scale.unwrap_or(1.0)).collect()),
@@ -46,7 +46,7 @@ pub fn parse_map(path: &Path, bytes: &[u8], scale: Option<f32>, limit: Limits) -
     DisparityMap::new(size, values).map_err(|error| Error::reading(path, &error))
 }
 
-/// The values of a file that holds floats.
+/// The values of a file, if it holds floats.
 fn floats(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
     if pfm::is_pfm(bytes) {
         return pfm::parse(path, bytes, limit)?.into_map(path).map(Some);
@@ -60,7 +60,7 @@ fn floats(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<
     }
 }
 
-/// Which pixels count.
+/// A selection of pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     /// Width and height.
@@ -69,7 +69,7 @@ pub struct Mask {
     pub values: Vec<bool>,
 }
 
-/// Reads a mask of 8 bits: a pixel counts where 255 is stored.
+/// Reads an 8-bit mask. Pixels with the value 255 are selected.
 ///
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
@@ -77,10 +77,10 @@ pub fn read_mask(path: &Path, limit: Limits) -> Result<Mask, Error> {
     parse_mask(path, &read_limited(path, limit)?, limit)
 }
 
-/// Reads a mask that is in memory; messages call it `path`.
+/// Parses a mask in memory; messages call it `path`.
 ///
 /// # Errors
-/// As [`read_mask`].
+/// Those of [`read_mask`].
 pub fn parse_mask(path: &Path, bytes: &[u8], limit: Limits) -> Result<Mask, Error> {
     let StoredGrey { size, values, has_16_bits } = stored_grey(path, bytes, limit)?;
     if has_16_bits {

@@ -1,4 +1,4 @@
-//! NumPy's array files (version 1.0 is written, 1.0 to 3.0 are read).
+//! NumPy's array files. Writes version 1.0 and reads 1.0 to 3.0.
 
 use std::{io::Write, path::Path};
 
@@ -8,7 +8,7 @@ use crate::{Error, Limits};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Whether the bytes begin as a file of this kind.
+/// Whether the bytes begin like an NPY file.
 pub(crate) fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
@@ -29,7 +29,7 @@ pub(crate) fn write(file: &mut dyn Write, size: Size, values: &[f32]) -> std::io
     Ok(())
 }
 
-/// Reads floats `[height][width]` of 32 or 64 bits in either byte order.
+/// Reads 32- or 64-bit floats `[height][width]` in either byte order.
 pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<(Size, Vec<f32>), Error> {
     let failed = |what: &str| Error::reading(path, &what);
     let (header, data) = split_header(bytes).ok_or_else(|| failed("not an NPY file: its header is broken"))?;
@@ -76,7 +76,7 @@ impl Value {
     }
 }
 
-/// The dictionary, and what follows it.
+/// Splits a file into the dictionary of its header and the data.
 fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let (version, rest) = bytes.strip_prefix(MAGIC)?.split_at_checked(2)?;
     let (len, rest) = rest.split_at_checked(if version[0] == 1 { 2 } else { 4 })?;
@@ -85,7 +85,7 @@ fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     Some((std::str::from_utf8(header).ok()?, data))
 }
 
-/// The text of an item of the dictionary that holds no comma.
+/// The value of an item of the dictionary. The value must not contain a comma.
 fn item<'a>(header: &'a str, name: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(&format!("'{name}':"))?;
     rest.split([',', '}']).next().map(str::trim)

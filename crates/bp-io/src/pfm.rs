@@ -6,7 +6,7 @@ use bp_core::{DisparityMap, Size};
 
 use crate::{Error, Limits};
 
-/// What a file holds.
+/// The contents of a file.
 pub(crate) struct Pfm {
     /// Width and height.
     pub(crate) size: Size,
@@ -16,7 +16,7 @@ pub(crate) struct Pfm {
     pub(crate) values: Vec<f32>,
 }
 
-/// Whether the bytes begin as a file of this kind.
+/// Whether the bytes begin like a PFM file.
 pub(crate) fn is_pfm(bytes: &[u8]) -> bool {
     bytes.starts_with(b"Pf") || bytes.starts_with(b"PF")
 }
@@ -63,7 +63,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Pfm, Err
     Ok(Pfm { size, channels, values })
 }
 
-/// The four words of a PFM header, and what follows the one white space after them.
+/// The four words of a PFM header, and the data after the single white space that ends it.
 fn split_header(bytes: &[u8]) -> Option<([&str; 4], &[u8])> {
     let mut words = [""; 4];
     let mut rest = bytes;
@@ -85,7 +85,7 @@ impl Pfm {
         }
     }
 
-    /// The pixels of an image, whose values go from 0 to 1 or from 0 to 255: where none is above 1 they are taken times
+    /// The pixels of an image with values from 0 to 1 or from 0 to 255. If no value is above 1, all are multiplied by
     /// 255.
     pub(crate) fn into_pixels(self, path: &Path) -> Result<Vec<[u8; 3]>, Error> {
         let failed = |what: String| Error::reading(path, &what);

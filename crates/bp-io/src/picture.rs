@@ -13,15 +13,15 @@ const UNKNOWN: [u8; 3] = [0; 3];
 /// A picture in memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Pixels of a row.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
     /// Red, green and blue, `[height][width]`.
     pub colours: Vec<[u8; 3]>,
 }
 
-/// The bar beside a picture: which disparities its colours stand for.
+/// The colour bar beside a picture, which shows the disparities of its colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourBar {
     /// Disparity of the lower end in pixels.
@@ -34,7 +34,7 @@ pub struct ColourBar {
     pub colours: Colours,
 }
 
-/// Draws a bar, or says why it cannot. Text needs a font, so that a program brings its own way to draw it.
+/// Draws a colour bar, or returns why it cannot. Its text needs a font, so the program supplies this function.
 pub type DrawBar = fn(&ColourBar) -> Result<Pixels, String>;
 
 /// How a picture of a map looks.
@@ -42,12 +42,12 @@ pub type DrawBar = fn(&ColourBar) -> Result<Pixels, String>;
 pub struct Picture {
     /// The colours of known pixels.
     pub colours: Colours,
-    /// Draws the bar beside the map; none for a picture of the map's size.
+    /// Draws the colour bar beside the map. `None` makes a picture with the size of the map.
     pub bar: Option<DrawBar>,
 }
 
 impl Picture {
-    /// Writes a map as a coloured PNG over its own range; a map without known pixels has no bar.
+    /// Writes a map as a coloured PNG over its own range. A map without known pixels gets no bar.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -62,7 +62,7 @@ impl Picture {
     }
 }
 
-/// Encodes a map as a coloured PNG: the near end of `range` bright, the far end dark, unknown black.
+/// Encodes a map as a coloured PNG: the near end of `range` is bright, the far end dark, and unknown pixels are black.
 ///
 /// # Errors
 /// Those of the encoder, and of writing.
@@ -78,7 +78,7 @@ fn coloured(map: &DisparityMap, range: RangeInclusive<f32>, colours: Colours) ->
     Pixels { width: width as u32, height: height as u32, colours: map.values().iter().map(pixel).collect() }
 }
 
-/// Two pictures side by side from the top, on white.
+/// Two pictures side by side, aligned at the top, on white.
 fn beside(left: &Pixels, right: &Pixels) -> Pixels {
     let (width, height) = (left.width + right.width, left.height.max(right.height));
     let row = |picture: &Pixels, y: u32| -> Vec<[u8; 3]> {

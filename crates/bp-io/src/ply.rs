@@ -6,7 +6,7 @@ use bp_core::Point;
 
 use crate::{Error, Files};
 
-/// Writes points, whose positions are in millimetres.
+/// Writes points with positions in millimetres.
 ///
 /// # Errors
 /// [`Error::Write`].

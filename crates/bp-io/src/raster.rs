@@ -1,4 +1,4 @@
-//! Values a pixel on their way to a file.
+//! One value per pixel, to be written to a file.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use crate::{Error, Files, MapFormat, Quantity, format::out_of_png_range, npy, pfm, tiff};
 
-/// Values on their way to a file.
+/// One value per pixel, to be written to a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Raster<'a> {
     /// Width and height.
     pub size: Size,
-    /// `[height][width]`; plus infinity where unknown.
+    /// `[height][width]`; plus infinity means unknown.
     pub values: &'a [f32],
-    /// What they are.
+    /// The quantity of the values.
     pub quantity: Quantity,
 }
 
@@ -32,10 +32,10 @@ impl<'a> Raster<'a> {
         known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
-    /// The file of a format that holds the values themselves, in memory.
+    /// Encodes the values in memory, in a format of floats. `None` for [`MapFormat::Png16`], which rounds.
     ///
     /// # Errors
-    /// What the encoder says; `None` for [`MapFormat::Png16`], which rounds.
+    /// Those of the encoder, as text.
     pub fn floats(&self, format: MapFormat) -> Option<Result<Vec<u8>, String>> {
         let Self { size, values, .. } = *self;
         let mut bytes = Vec::new();
@@ -50,10 +50,10 @@ impl<'a> Raster<'a> {
         Some(written.map(|()| bytes))
     }
 
-    /// Writes it in the format of the path's ending.
+    /// Writes the values in the format of the path's extension.
     ///
     /// # Errors
-    /// [`Error::Request`] where the format cannot hold a value, [`Error::Write`].
+    /// [`Error::Request`] if the format cannot hold a value, [`Error::Write`].
     pub fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
         let Self { size, values, quantity } = *self;
         match MapFormat::of(path)? {
@@ -75,7 +75,7 @@ impl<'a> Raster<'a> {
     }
 }
 
-/// Values times `steps`, at least 1; 0 where unknown. `None` where one does not fit.
+/// Values times `steps`, rounded and at least 1; 0 means unknown. `None` if a value does not fit.
 fn whole_numbers(values: &[f32], steps: f32) -> Option<Vec<u16>> {
     let stored = |&value: &f32| match (value * steps).round() {
         _ if !value.is_finite() => Some(0),

@@ -1,4 +1,4 @@
-//! What a map's file does not say of itself, as JSON beside it.
+//! Sidecars: JSON files beside maps, with the information that the map's format cannot hold.
 
 use std::{
     fs,
@@ -11,13 +11,13 @@ use serde_json::Value;
 
 use crate::{Colours, Error, Files, MapFormat, Raster};
 
-/// Version of the sidecar; changes with every change of meaning.
+/// Version of the sidecar's format. Every change of meaning raises it.
 const SCHEMA_VERSION: u32 = 1;
 
-/// What the program is called in it, before its version.
+/// The name of the program in the sidecar, before its version.
 const PROGRAM: &str = "bp ";
 
-/// The sidecar's path: the map's, and `.json`.
+/// The sidecar's path: the map's path with `.json` appended.
 #[must_use]
 pub fn sidecar_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -25,7 +25,7 @@ pub fn sidecar_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// What a map's sidecar says it holds; `None` where there is no sidecar of this program.
+/// The quantity that a map's sidecar names; `None` if there is no sidecar of this program.
 pub(crate) fn told_quantity(path: &Path) -> Option<String> {
     let sidecar: Value = serde_json::from_slice(&fs::read(sidecar_of(path)).ok()?).ok()?;
     let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
@@ -44,20 +44,20 @@ pub fn remove_sidecar(path: &Path) -> Result<(), Error> {
     fs::remove_file(&sidecar).map_err(|error| Error::writing(&sidecar, &error))
 }
 
-/// Where a map comes from.
+/// The origin of a map.
 #[derive(Clone, Copy, Debug)]
 pub struct Origin<'a, P> {
-    /// What was run to make it, where it was matched.
+    /// The plan of the match, if the map comes from one.
     pub plan: Option<&'a P>,
-    /// Disparities of the first and the last label in pixels, where it was matched.
+    /// Disparities of the first and the last label in pixels, if the map comes from a match.
     pub labels: Option<[i64; 2]>,
-    /// The geometry, of depths.
+    /// The calibration, for depths.
     pub calibration: Option<&'a Calibration>,
-    /// The files that it was made of.
+    /// The files that the map was made from.
     pub inputs: &'a [&'a Path],
 }
 
-/// What is told; a value is `stored * scale + offset`.
+/// The contents of a sidecar. A value is `stored * scale + offset`.
 #[derive(Serialize)]
 struct Sidecar<'a, P> {
     schema_version: u32,
@@ -68,20 +68,20 @@ struct Sidecar<'a, P> {
     scale: f64,
     offset: f64,
     unknown: Unknown,
-    /// Of a picture: the colours in which places from 0 to 1 are stored.
+    /// For a picture, the colour map, whose positions from 0 to 1 are the stored values.
     colours: Option<&'static str>,
     width: usize,
     height: usize,
     /// Disparities of the first and the last label, in pixels.
     labels: Option<Range<i64>>,
-    /// The least and the largest known value, in `unit`; none where no pixel is known.
+    /// The least and the largest known value, in `unit`; `None` if no pixel is known.
     found: Option<Range<f32>>,
     calibration: Option<Geometry>,
     plan: Option<&'a P>,
     inputs: Vec<String>,
 }
 
-/// What is stored where nothing is known; JSON has no number for infinity.
+/// The stored value of unknown pixels. Infinity is text, because JSON has no number for it.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Unknown {
@@ -141,8 +141,8 @@ pub fn write_sidecar<P: Serialize>(
     write(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
 }
 
-/// Writes the sidecar of a coloured picture of a map that was written to `path`: stored are places among the colours,
-/// from 0 to 1.
+/// Writes the sidecar of a map's coloured picture that was written to `path`. Stored values are positions in the colour
+/// map, from 0 to 1.
 ///
 /// # Errors
 /// [`Error::Write`].

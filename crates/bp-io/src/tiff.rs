@@ -1,4 +1,4 @@
-//! TIFF files of 32-bit floats, which the `image` crate neither reads nor writes.
+//! TIFF files of floats, which the `image` crate neither reads as such nor writes.
 
 use std::{
     io::{Cursor, ErrorKind},
@@ -14,14 +14,14 @@ use tiff::{
 
 use crate::{Error, Limits};
 
-/// Encodes values `[height][width]`.
+/// Encodes values `[height][width]` as 32-bit floats.
 pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
     let mut file = Cursor::new(Vec::new());
     TiffEncoder::new(&mut file)?.write_image::<Gray32Float>(size.width as u32, size.height as u32, values)?;
     Ok(file.into_inner())
 }
 
-/// The floats `[height][width]` of a grey file; `None` where it holds something else.
+/// The floats `[height][width]` of a grey file; `None` if it holds something else.
 pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
     let failed = |error: TiffError| match error {
         TiffError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
@@ -36,7 +36,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
     let (width, height) = decoder.dimensions().map_err(failed)?;
     limit.check_size(path, width.into(), height.into())?;
     let size = Size::new(width as usize, height as usize).map_err(|error| Error::reading(path, &error))?;
-    // Doubles and what they become.
+    // 8 bytes per pixel for doubles, and 4 for the floats that they are converted to.
     let needed = 12 * size.pixels() as u64;
     limit.check_memory(path, needed)?;
     let mut limits = tiff::decoder::Limits::default();

@@ -1,4 +1,4 @@
-//! Writing files whole or not at all.
+//! Writes files whole or not at all.
 
 use std::{
     fmt::Display,
@@ -12,14 +12,14 @@ use tempfile::NamedTempFile;
 
 use crate::Error;
 
-/// Writes files beside their final place and renames them.
+/// Writes temporary files in the folder of the final file and renames them.
 #[derive(Clone, Debug)]
 pub struct Files {
-    /// What names of temporary files begin with, so that those of a killed process can be found.
+    /// The prefix of the names of temporary files, by which those of a killed process can be found.
     temporary: String,
 }
 
-/// Temporary files are called `.bp-` and something random.
+/// Temporary files are named `.bp-` and random characters.
 impl Default for Files {
     fn default() -> Self {
         Self { temporary: Self::PREFIX.to_owned() }
@@ -27,7 +27,7 @@ impl Default for Files {
 }
 
 impl Files {
-    /// What names of all temporary files begin with.
+    /// The prefix of the names of all temporary files.
     pub const PREFIX: &str = ".bp-";
 
     /// Files whose temporary names begin with [`Files::PREFIX`], `owner` and a hyphen.
@@ -36,13 +36,13 @@ impl Files {
         Self { temporary: format!("{}{owner}-", Self::PREFIX) }
     }
 
-    /// What names of these temporary files begin with.
+    /// The prefix of the names of these temporary files.
     #[must_use]
     pub fn prefix(&self) -> &str {
         &self.temporary
     }
 
-    /// Writes a file that `write` fills, or leaves what was there.
+    /// Writes a file that `write` fills. On failure, an existing file stays as it was.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -54,7 +54,7 @@ impl Files {
         if is_stream(path) {
             return stream(path, write);
         }
-        // A link stays; what it points to is replaced.
+        // A symbolic link stays, and its target is replaced.
         let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
         self.filled_beside(path, write)?.persist(path).map_err(|failed| Error::writing(path, &failed.error))?;
         Ok(())
@@ -68,7 +68,7 @@ impl Files {
         self.whole(path, |file| file.write_all(text.as_bytes()))
     }
 
-    /// Writes a value as JSON that people can read.
+    /// Writes a value as indented JSON.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -77,17 +77,17 @@ impl Files {
         self.text(path, &(text + "\n"))
     }
 
-    /// Writes a file that is not there yet; one that is stays as it was.
+    /// Writes a new file. An existing file stays as it was.
     ///
     /// # Errors
-    /// [`Error::Write`], also where there is a file.
+    /// [`Error::Write`], also if the file exists.
     pub fn new_file(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Error> {
         let file = self.filled_beside(path, |file| file.write_all(contents.as_ref()))?;
         file.persist_noclobber(path).map_err(|failed| Error::writing(path, &failed.error))?;
         Ok(())
     }
 
-    /// Fails where no file could be written at `path`, so that a caller can say so before the work is done.
+    /// Fails if no file can be written at `path`. A caller can report this before the work begins.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -101,7 +101,7 @@ impl Files {
         self.temporary_beside(path).map(drop)
     }
 
-    /// A file in the folder of `path`, filled and safe on the disk, which vanishes unless it is kept.
+    /// A temporary file in the folder of `path`, filled and synced to disk. It is deleted unless it is persisted.
     fn filled_beside<E: Display>(
         &self,
         path: &Path,
@@ -123,17 +123,16 @@ impl Files {
             return Err(Error::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
         }
         let mut builder = tempfile::Builder::new();
-        // Temporary files are private by default; a result is for whom the user's mask says.
+        // Temporary files are private by default. The permissions of an output follow the user's umask instead.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        // The error's own words would name the temporary file.
+        // The full message of the error would name the temporary file.
         let failed = |error: std::io::Error| Error::writing(path, &error.kind());
         builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
     }
 }
 
-/// Whether something is at `path` that is neither a file nor a folder, such as `/dev/null` or a pipe: it is written to in
-/// place.
+/// Whether `path` is neither a file nor a folder, such as `/dev/null` or a pipe. It is then written in place.
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
@@ -146,7 +145,7 @@ fn stream<E: Display>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<
     file.flush().map_err(|e| failed(&e))
 }
 
-/// Fails where writing `output` would overwrite `other`; `what` says so in words.
+/// Fails if writing `output` would overwrite `other`. `what` is the reason for the message.
 ///
 /// # Errors
 /// [`Error::Request`].
@@ -157,13 +156,14 @@ pub fn check_distinct(other: &Path, output: &Path, what: &str) -> Result<(), Err
     Err(Error::request(output, &format!("it {what}; choose another output")))
 }
 
-/// The path of a file without links and steps up, as far as it exists: two names of one file become equal.
+/// The path of a file without symbolic links and `..`, if it exists, so that two names of one file become equal.
+/// Otherwise its absolute path.
 #[must_use]
 pub fn resolved(path: &Path) -> PathBuf {
     path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or(path.to_owned())
 }
 
-/// Fails where there is a file at `path`, which [`Files::new_file`] would refuse in the end.
+/// Fails if `path` exists, because [`Files::new_file`] would refuse it in the end.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -174,7 +174,7 @@ pub fn check_new(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// Creates a folder and those above it.
+/// Creates a folder and its missing parents.
 ///
 /// # Errors
 /// [`Error::Write`].

@@ -1,35 +1,35 @@
-//! The algorithms, each with the options that it has.
+//! The algorithms and their options.
 
 use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// What is run. The first is ours, the others are those of Doan Van Tuan's PhD thesis (2019).
+/// A matching algorithm. [`Algorithm::Sweep`] is ours; the others are those of Doan Van Tuan's PhD thesis (2019).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case")]
 pub enum Algorithm {
-    /// Coarse to fine with sequential passes ([`Schedule::Sweep`]), one message an edge.
+    /// Coarse to fine with sequential passes ([`Schedule::Sweep`]) and one message per edge.
     Sweep {
-        /// Number of grids; none for five, or fewer where the image is small.
+        /// Number of grids. `None` means five, or fewer if the image is small.
         #[serde(default)]
         grids: Option<u32>,
         /// Loops on each grid.
         #[serde(default = "one")]
         loops: u32,
-        /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].
+        /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
         #[serde(default = "yes")]
         coarse_clip: bool,
     },
     /// Plain belief propagation on one grid.
     Bp {
-        /// How many messages are passed.
+        /// The number of loops.
         #[serde(default)]
         loops: Loops,
     },
     /// Coarse-to-fine belief propagation.
     Cfbp {
-        /// How many messages are passed.
+        /// The number of loops.
         #[serde(default)]
         loops: Loops,
         /// The grids.
@@ -38,62 +38,62 @@ pub enum Algorithm {
     },
     /// Coarse-to-fine constant-space belief propagation: fewer loops.
     Cfcsbp {
-        /// How many messages are passed.
+        /// The number of loops.
         #[serde(default)]
         loops: Loops,
         /// The grids.
         #[serde(default)]
         hierarchy: Hierarchy,
-        /// What [`Loops::Total`] is divided by (Z''); none for 2. It goes with no other way to count.
+        /// The divisor of [`Loops::Total`] (Z''); `None` means 2. Invalid with the other kinds of [`Loops`].
         #[serde(default)]
         z: Option<u32>,
     },
-    /// Census-transform belief propagation: four parts, cut at the image's centre.
+    /// Census-transform belief propagation: four parts, cut at the centre of the image.
     Ctbp {
-        /// How many messages are passed.
+        /// The number of loops.
         #[serde(default)]
         loops: Loops,
-        /// Whether the census match of the centre is a prior.
+        /// Whether the census match of the centre is used as a prior.
         #[serde(default = "yes")]
         seed_start: bool,
     },
     /// Census-transform constant-space belief propagation: four parts and fewer loops.
     Ctcsbp {
-        /// How many messages are passed.
+        /// The number of loops.
         #[serde(default)]
         loops: Loops,
-        /// Whether the census match of the centre is a prior.
+        /// Whether the census match of the centre is used as a prior.
         #[serde(default = "yes")]
         seed_start: bool,
-        /// What [`Loops::Total`] is divided by (Z''''); none for 2. It goes with no other way to count.
+        /// The divisor of [`Loops::Total`] (Z''''); `None` means 2. Invalid with the other kinds of [`Loops`].
         #[serde(default)]
         z: Option<u32>,
     },
 }
 
-/// How many messages the thesis's algorithms pass.
+/// How long the thesis's algorithms pass messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loops {
-    /// So many loops in all (k), from which the algorithm derives those of each grid; none for as many as labels.
+    /// A total number of loops (k). The algorithm derives the number for each grid from it.
     Total {
-        /// Loops.
+        /// The total; `None` means the number of labels.
         k: Option<u32>,
         /// Order of message updates.
         schedule: Schedule,
     },
-    /// So many loops on each grid.
+    /// The same number of loops on each grid.
     OnEachGrid {
-        /// Loops.
+        /// Loops on each grid.
         loops: u32,
         /// Order of message updates.
         schedule: Schedule,
     },
-    /// So many checkerboard half-steps on each grid.
+    /// The same number of checkerboard half-steps on each grid.
     HalfSteps(u32),
 }
 
-/// As many loops as labels, all messages of a loop at once: the thesis's own.
+/// The thesis's choice: as many loops as labels, with all messages of a loop updated at once.
 impl Default for Loops {
     fn default() -> Self {
         Self::Total { k: None, schedule: Schedule::Sync }
@@ -104,11 +104,11 @@ impl Default for Loops {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hierarchy {
-    /// Number of grids; none for the thesis's floor(log2 m), m being the width. Loops must then count on each grid.
+    /// Number of grids; invalid with [`Loops::Total`]. `None` means the thesis's floor(log2 m), where m is the width.
     pub grids: Option<u32>,
-    /// By which side finer grids take over messages.
+    /// The first messages of finer grids.
     pub message_start: MessageStart,
-    /// Whether the data costs of coarse grids are clipped, see [`Settings::coarse_clip`].
+    /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
     pub coarse_clip: bool,
 }
 
@@ -118,16 +118,16 @@ impl Default for Hierarchy {
     }
 }
 
-/// What an algorithm derived its loops from, where it did.
+/// The numbers from which an algorithm derived its loops, if it did.
 #[derive(Default)]
 pub(crate) struct Derived {
-    /// Loops asked for.
+    /// The total number of loops.
     pub(crate) k: Option<u32>,
-    /// What they were divided by.
+    /// Their divisor.
     pub(crate) z: Option<u32>,
 }
 
-/// What the thesis's Z divides loops by where nothing else is said.
+/// The default of the thesis's divisor Z.
 const Z: u32 = 2;
 
 fn one() -> u32 {
@@ -138,7 +138,7 @@ fn yes() -> bool {
     true
 }
 
-/// [`Algorithm::Sweep`] as it comes.
+/// [`Algorithm::Sweep`] with its default options.
 impl Default for Algorithm {
     fn default() -> Self {
         Self::Sweep { grids: None, loops: 1, coarse_clip: true }
@@ -146,7 +146,7 @@ impl Default for Algorithm {
 }
 
 impl Algorithm {
-    /// The same without its options, as [`bp_core`] knows it.
+    /// The algorithm without its options, as [`bp_core`] knows it.
     #[must_use]
     pub fn kind(&self) -> bp_core::Algorithm {
         match self {
@@ -159,12 +159,12 @@ impl Algorithm {
         }
     }
 
-    /// Whether messages are those of the schedule sweep, which keeps none from one pair to the next.
+    /// Whether the schedule is [`Schedule::Sweep`], which keeps no messages from one pair to the next.
     pub(crate) fn is_swept(&self) -> bool {
         self.loops().is_none_or(|loops| loops.schedule() == Schedule::Sweep)
     }
 
-    /// Fails where options contradict each other.
+    /// Fails if options contradict each other.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let is_total = matches!(self.loops(), Some(Loops::Total { .. }));
         if self.hierarchy().is_some_and(|hierarchy| hierarchy.grids.is_some()) && is_total {
@@ -176,7 +176,7 @@ impl Algorithm {
         Ok(())
     }
 
-    /// The settings of a plan for images of this size and so many labels.
+    /// The settings of a plan for images of this size and this number of labels.
     pub(crate) fn settings(&self, size: Size, labels: usize) -> Settings {
         let Some(passing) = self.loops() else { return self.swept(size) };
         let (k, schedule) = (passing.k(labels), passing.schedule());
@@ -202,7 +202,7 @@ impl Algorithm {
         }
     }
 
-    /// What the loops of a plan with so many labels were derived from.
+    /// The numbers from which the loops of a plan with this many labels were derived.
     pub(crate) fn derived(&self, labels: usize) -> Derived {
         match self.loops() {
             Some(passing @ Loops::Total { .. }) => {
@@ -251,7 +251,7 @@ impl Loops {
         }
     }
 
-    /// Loops in all, for an image with so many labels.
+    /// The total number of loops for this number of labels.
     fn k(self, labels: usize) -> u32 {
         match self {
             Self::Total { k: Some(k), .. } => k,
@@ -259,7 +259,7 @@ impl Loops {
         }
     }
 
-    /// Steps on each grid, where they are not derived.
+    /// Steps on each grid, unless the algorithm derives them.
     fn steps(self) -> Option<u32> {
         match self {
             Self::Total { .. } => None,

@@ -1,9 +1,9 @@
-//! Many pairs in one call. Complete pairs are skipped; the others are matched one after another on one device, while the
-//! next is read and the last is written.
+//! Matches many pairs in one call. Complete pairs are skipped. The others are matched one after another on one device,
+//! while the next pair is read and the previous one is written.
 //!
-//! Only files say how far a batch has come, so that it may end at any moment and in any way. Outputs are written whole; the
-//! record of a pair follows them, with checksums of its images and outputs. Processes that share a batch share no other
-//! files.
+//! The state of a batch lives in files alone, so a batch may end at any moment and in any way. Every output is written
+//! whole. The record of a pair is written after its outputs and holds checksums of its images and outputs. Processes
+//! that share a batch need no other files.
 
 mod job;
 mod record;
@@ -22,7 +22,7 @@ pub use summary::{Failed, Summary};
 
 use crate::{Cause, Error, Labels, Making, Options, Watch, pairs::Source};
 
-/// What is matched, and what is written of it.
+/// The pairs of a batch, how they are matched, and what is written.
 #[derive(Clone, Debug)]
 pub struct BatchOptions {
     /// The pairs.
@@ -31,13 +31,13 @@ pub struct BatchOptions {
     pub output: PathBuf,
     /// How each pair is matched.
     pub matching: Options,
-    /// Ending of the maps, which names their format.
+    /// Extension of the maps, which selects their format.
     pub format: String,
-    /// What is written beside each map.
+    /// The other outputs of each pair.
     pub also: Vec<Also>,
     /// Which pairs this process matches.
     pub shard: Shard,
-    /// Frames of a video start from the messages of the frame before; every so many-th starts anew.
+    /// If set, each frame of a video starts from the messages of the previous frame, and every n-th frame starts cold.
     pub warm_start: Option<u32>,
     /// Whether complete pairs are matched again.
     pub force: bool,
@@ -46,28 +46,29 @@ pub struct BatchOptions {
 }
 
 impl BatchOptions {
-    /// How many pairs in turn depend on the first of them: they are done together or not at all.
+    /// The length of a chain: consecutive pairs that depend on the first of them. A chain is matched as a whole or
+    /// skipped.
     fn chain(&self) -> usize {
         self.warm_start.unwrap_or(1) as usize
     }
 }
 
-/// What is written beside a map.
+/// An output beside the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Also {
     /// A coloured picture, NAME.picture.png.
     Picture,
-    /// A depth map, NAME.depth with the ending of the maps.
+    /// A depth map, NAME.depth with the extension of the maps.
     Depth,
     /// A point cloud, NAME.points.ply.
     Points,
-    /// A confidence, NAME.confidence with the ending of the maps.
+    /// A confidence map, NAME.confidence with the extension of the maps.
     Confidence,
 }
 
 impl Also {
-    /// All of these.
+    /// All kinds.
     pub const ALL: [Self; 4] = [Self::Picture, Self::Depth, Self::Points, Self::Confidence];
 
     /// The name used in options.
@@ -82,11 +83,12 @@ impl Also {
     }
 }
 
-/// Matches all pairs of a batch. `watch` hears notes, warnings and failures of single pairs, and progress in pairs.
+/// Matches all pairs of a batch. `watch` receives notes, warnings, failures of single pairs, and progress in pairs.
 ///
 /// # Errors
-/// [`Error::Options`] and [`Error::Input`] before the work begins, [`Error::Stopped`], and what ends all work: an output
-/// that cannot be written, a device that is gone. A pair that fails is an entry of [`Summary::failures`].
+/// [`Error::Options`] and [`Error::Input`] before the work begins, [`Error::Stopped`], and errors that end the batch,
+/// such as an output that cannot be written or a device that is gone. A pair that fails is an entry of
+/// [`Summary::failures`].
 pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
     check(options)?;
     let found = options.source.find(&options.output)?;
@@ -121,7 +123,7 @@ fn match_due(run: &Run<'_>, due: &[&Job]) -> Result<Vec<Failed>, Error> {
     })
 }
 
-/// Fails where options do not go together, or a folder has a name that no record can hold.
+/// Fails if options contradict each other, or if the name of a folder is not UTF-8, which records need.
 fn check(options: &BatchOptions) -> Result<(), Error> {
     options.matching.check()?;
     let folder = if let Source::Path(path) = &options.source { Some(path) } else { None };
@@ -134,7 +136,7 @@ fn check(options: &BatchOptions) -> Result<(), Error> {
     check_warm_start(options)
 }
 
-/// Refuses warm starts where there are no messages to start from.
+/// Refuses a warm start if a frame has no messages to start from.
 fn check_warm_start(options: &BatchOptions) -> Result<(), Error> {
     let matching = &options.matching;
     if options.warm_start.is_none() {

@@ -1,10 +1,10 @@
-//! Plans, devices and answers as files describe them: sidecars of maps, records of batches and experiments, `--json`.
+//! Plans, devices and answers as they appear in files: sidecars of maps, records of batches and experiments, `--json`.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// What a plan runs, and what it predicts.
+/// The settings and predictions of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -19,14 +19,14 @@ pub struct Settings {
     pub slope: u8,
     /// Truncation of the smoothness cost (K).
     pub truncation: u8,
-    /// Grey difference above which edges are weak, where any may be; records from before that option lack it.
+    /// Grey difference above which edges are weak, if that option is used. Records from before the option lack it.
     #[serde(default)]
     pub edge_threshold: Option<u8>,
     /// Algorithm.
     pub algorithm: String,
-    /// Loops asked for (k), where the algorithm derived its own from them.
+    /// Total number of loops (k), if the algorithm derived the loops on each grid from it.
     pub k: Option<u32>,
-    /// What the thesis's coefficient Z divided those by, where it did.
+    /// The thesis's coefficient Z, which divided the total, if the algorithm uses it.
     pub z: Option<u32>,
     /// Number of grids.
     pub grids: usize,
@@ -34,36 +34,36 @@ pub struct Settings {
     pub steps_per_grid: u32,
     /// Schedule.
     pub schedule: String,
-    /// Side by which finer grids take over messages.
+    /// The rule for the first messages of finer grids.
     pub message_start: String,
-    /// Whether the data costs of grids from 1 on are clipped at K + K div 2; records from before that option lack it.
+    /// Whether the data costs of grids from 1 on are clipped at K + K div 2. Records from before the option lack it.
     #[serde(default)]
     pub coarse_clip: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
-    /// What was done to the map after matching, where something was.
+    /// The operations on the map after matching, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finish: Option<Finish>,
-    /// Message entries that the plan predicts to compute.
+    /// Predicted number of message entries to compute.
     pub message_updates: u64,
-    /// Bytes that the plan predicts on this device, or in general where there is none.
+    /// Predicted bytes on the device, or in general if no device is given.
     pub planned_bytes: u64,
 }
 
-/// What was done to a map after matching, in this order.
+/// The operations on a map after matching, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Finish {
     /// Whether a left-right check made pixels unknown.
     pub check: bool,
-    /// Surfaces of fewer pixels were made unknown.
+    /// Surfaces with fewer pixels than this were made unknown.
     pub speckles: Option<usize>,
     /// Whether unknown pixels were filled.
     pub fill: bool,
-    /// Side of the median's window.
+    /// Side of the median filter's window.
     pub median: Option<usize>,
-    /// Whether fractions of disparities were made.
+    /// Whether disparities were refined to fractions of a pixel.
     pub subpixel: bool,
 }
 
@@ -72,9 +72,9 @@ pub struct Finish {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
-    /// First column right of it.
+    /// First column right of the cut.
     pub x: usize,
-    /// First row below it.
+    /// First row below the cut.
     pub y: usize,
     /// Whether the census match was used as a prior.
     pub seed_start: bool,
@@ -85,25 +85,25 @@ pub struct Cut {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Device {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// What it is: "processor", "discrete GPU", "integrated GPU", "virtual GPU", "other device" or "software
-    /// rasteriser"; records from before there were GPU backends lack it.
+    /// The kind: "processor", "discrete GPU", "integrated GPU", "virtual GPU", "other device" or "software rasteriser".
+    /// Records from before the GPU backends lack it.
     #[serde(default)]
     pub kind: Option<String>,
-    /// The interface that reaches it and its version, where there is one.
+    /// The API and its version, if any.
     pub api: Option<String>,
-    /// Its driver and the driver's version, where there is one.
+    /// The driver and its version, if any.
     pub driver: Option<String>,
-    /// Memory of its own in bytes, where it has some.
+    /// Memory of its own in bytes, if any.
     #[serde(default)]
     pub memory_bytes: Option<u64>,
-    /// The universally unique identifier that its driver gives it.
+    /// The universally unique identifier that its driver reports.
     #[serde(default)]
     pub uuid: Option<String>,
-    /// Whether it is a CPU that pretends to be a GPU.
+    /// Whether it is a GPU driver that runs on the CPU.
     pub software_rasteriser: bool,
-    /// How many threads work at once.
+    /// Number of threads that work at once.
     pub workers: usize,
 }
 
@@ -118,7 +118,7 @@ pub enum Clock {
     Device,
 }
 
-/// Stage times by one clock.
+/// Stage times on one clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -147,7 +147,7 @@ pub struct Stages {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Energy {
-    /// Data and smoothness together.
+    /// Sum of the data and smoothness costs.
     pub total: u64,
     /// Sum of the data costs.
     pub data: u64,
@@ -160,27 +160,27 @@ pub struct Energy {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// Pixels of known truth.
+    /// Number of pixels with ground truth.
     pub known: u64,
-    /// Those that were answered.
+    /// Number of those pixels that have a disparity in the map.
     pub answered: u64,
-    /// Root of the mean squared error of answered pixels, in pixels.
+    /// Root mean squared error over answered pixels, in pixels.
     pub rmse: f64,
-    /// Percentages of answered pixels wrong by more than 0.5, 1, 2 and 4 pixels.
+    /// Percentages of answered pixels that are wrong by more than 0.5, 1, 2 and 4 pixels.
     pub bad: [f64; 4],
-    /// The same of known pixels, unanswered ones counted as wrong.
+    /// The same percentages of known pixels, with unanswered pixels counted as wrong.
     pub bad_or_unanswered: [f64; 4],
 }
 
 impl Stages {
-    /// From the stages in their order.
+    /// Stage times from an array, in the order of [`bp_core::Stage::ALL`].
     #[must_use]
     pub fn new(ms: [f64; 5]) -> Self {
         let [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms] = ms;
         Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms }
     }
 
-    /// The stages in their order.
+    /// Stage times as an array, in the order of [`bp_core::Stage::ALL`].
     #[must_use]
     pub fn in_order(&self) -> [f64; 5] {
         let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
@@ -210,8 +210,8 @@ impl From<&bp_core::DeviceInfo> for Device {
 }
 
 impl Settings {
-    /// Describes a plan before it runs. `device` says how many bytes it will allocate for it. `k` and `z` are for the caller
-    /// to fill in: a plan does not know which numbers its loops came from.
+    /// Describes a plan before it runs. If a `device` is given, it predicts the bytes. The caller fills in `k` and `z`,
+    /// because a plan does not know the numbers that its loops were derived from.
     #[must_use]
     pub fn new(plan: &bp_core::Plan, device: Option<&dyn bp_core::Device>, algorithm: bp_core::Algorithm) -> Self {
         let (model, settings) = (plan.model(), plan.settings());
@@ -239,7 +239,7 @@ impl Settings {
 }
 
 impl Finish {
-    /// What a map goes through; `None` where that is nothing.
+    /// Describes the operations on a map; `None` if there are none.
     #[must_use]
     pub fn of(finish: bp_core::finish::Finish) -> Option<Self> {
         let bp_core::finish::Finish { check, speckles, fill, median, subpixel } = finish;
@@ -247,7 +247,7 @@ impl Finish {
     }
 }
 
-/// The stages of a solve by all clocks.
+/// The stage times of a solve on all clocks.
 #[must_use]
 pub fn clocks(times: &bp_core::Times) -> Vec<Clocked> {
     let clocked = |clock, stages: [Duration; 5]| Clocked { clock, stages: Stages::new(stages.map(milliseconds)) };

@@ -1,4 +1,4 @@
-//! The one list of backends, and how options name their devices.
+//! The list of all backends, and how options name their devices.
 
 use std::time::{Duration, Instant};
 
@@ -16,21 +16,21 @@ pub const ALL: &[&dyn Backend] = &[
     &bp_wgpu::Wgpu,
 ];
 
-/// Those that a build may leave out, each by the cargo feature of its name.
+/// The backends that a build may leave out. The cargo feature of each has the same name.
 const OPTIONAL: [&str; 2] = ["vulkan", "wgpu"];
 
-/// The backend of commands that name none.
+/// The default backend.
 pub const DEFAULT: &str = "rayon";
 
 /// An open device.
 pub struct Opened {
-    /// Its name in options and records, see [`device_name`].
+    /// Its name in options and records; see [`device_name`].
     pub name: String,
-    /// What is known of it.
+    /// Information about the device.
     pub info: DeviceInfo,
     /// The device.
     pub device: Box<dyn Device>,
-    /// How long opening took, the test of the device included.
+    /// How long opening took, including the test of the device.
     pub open_time: Duration,
     backend: &'static dyn Backend,
     index: usize,
@@ -38,16 +38,16 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// Opens a device of a backend that is in no list, such as one made for a test.
+    /// Opens a device of a backend that need not be in [`ALL`], such as one made for a test.
     ///
     /// # Errors
-    /// Those of [`Backend::open`], and [`bp_core::Error::Unavailable`] where the backend does not list the device.
+    /// Those of [`Backend::open`], and [`bp_core::Error::Unavailable`] if the backend does not list the device.
     pub fn of(backend: &'static dyn Backend, index: usize) -> Result<Self, bp_core::Error> {
         let info = backend.devices().into_iter().nth(index);
         Chosen { name: device_name(backend, index), backend, index, info }.open()
     }
 
-    /// Remembers an error after which the device refuses all further work.
+    /// Remembers whether an error means that the device is lost.
     pub fn note(&mut self, cause: Cause) {
         self.lost |= cause == Cause::DeviceLost;
     }
@@ -55,13 +55,13 @@ impl Opened {
     /// Opens the device again if it was lost.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] where it is gone.
+    /// [`Error::Unavailable`] if it is gone.
     pub fn recover(&mut self) -> Result<(), Error> {
         if !self.lost {
             return Ok(());
         }
         let failed = |reason| Error::Unavailable(format!("it was lost and cannot be opened again: {reason}"));
-        // Else its numbers could go on as another device's.
+        // Otherwise another device could silently take its place.
         if self.backend.devices().get(self.index) != Some(&self.info) {
             return Err(failed("it is not listed any more".to_owned()));
         }
@@ -73,7 +73,7 @@ impl Opened {
 
 /// A backend and one of its devices, not opened yet.
 pub struct Chosen {
-    /// As for [`Opened`]; what the option says where the backend has no devices.
+    /// See [`Opened::name`]. If the backend has no devices, the option as given.
     pub name: String,
     backend: &'static dyn Backend,
     index: usize,
@@ -103,10 +103,10 @@ pub fn device_name(backend: &dyn Backend, index: usize) -> String {
     if index == 0 { backend.name().to_owned() } else { format!("{}:{index}", backend.name()) }
 }
 
-/// The device that a backend's name, or "NAME:DEVICE", or a name and a device mean.
+/// Finds the device named by a backend, by "BACKEND:DEVICE", or by a backend and a device.
 ///
 /// # Errors
-/// [`Error::Options`] where two devices are named, [`Error::Unavailable`] where there is no such backend or device.
+/// [`Error::Options`] if two devices are named, [`Error::Unavailable`] if the backend or device does not exist.
 pub fn choose(option: &str, device: Option<&str>) -> Result<Chosen, Error> {
     let (name, after_colon) = option.split_once(':').map_or((option, None), |(name, device)| (name, Some(device)));
     if let (Some(_), Some(device)) = (after_colon, device) {
@@ -117,7 +117,7 @@ pub fn choose(option: &str, device: Option<&str>) -> Result<Chosen, Error> {
     let backend = ALL.iter().copied().find(|backend| backend.name() == name).ok_or_else(|| no_backend(name))?;
     let mut devices = backend.devices();
     let index = match device.or(after_colon) {
-        // Opening tells why there are none.
+        // Opening then fails with the reason.
         Some(_) if devices.is_empty() => return Ok(Chosen { name: option.to_owned(), backend, index: 0, info: None }),
         Some(wanted) => match find(&devices, wanted)[..] {
             [index] => index,
@@ -129,7 +129,7 @@ pub fn choose(option: &str, device: Option<&str>) -> Result<Chosen, Error> {
     Ok(Chosen { name: device_name(backend, index), backend, index, info })
 }
 
-/// Opens the device that these options mean.
+/// Opens the device that these options name.
 ///
 /// # Errors
 /// Those of [`choose`], and [`Error::Unavailable`] with the reason.
@@ -145,7 +145,7 @@ pub fn reference() -> Result<Opened, Error> {
     open(ALL[0].name(), None)
 }
 
-/// Why a device could not be opened, where its backend has been named already.
+/// Why a device could not be opened, for messages that already name its backend.
 #[must_use]
 pub fn reason(error: bp_core::Error) -> String {
     match error {
@@ -154,10 +154,10 @@ pub fn reason(error: bp_core::Error) -> String {
     }
 }
 
-/// The indices of the devices that are meant by their index, their name or a part of it, or the beginning of their UUID.
+/// The indices of the devices that match an index, a name or part of a name, or the beginning of a UUID.
 fn find(devices: &[DeviceInfo], wanted: &str) -> Vec<usize> {
     if let Ok(index) = wanted.parse() {
-        // Names and UUIDs have digits too, but a short number means an index: 1 is no device that has "1 thread".
+        // Names and UUIDs have digits too, but a short number is an index: "1" must not match a name with "1 thread".
         if index < devices.len() || wanted.len() <= 2 {
             return Vec::from_iter((index < devices.len()).then_some(index));
         }
@@ -166,7 +166,7 @@ fn find(devices: &[DeviceInfo], wanted: &str) -> Vec<usize> {
     let all = |is_it: &dyn Fn(&DeviceInfo) -> bool| -> Vec<usize> {
         (0..devices.len()).filter(|&index| !wanted.is_empty() && is_it(&devices[index])).collect()
     };
-    // A whole name may be a part of another device's.
+    // An exact match wins, because a name may be part of another device's name.
     let named = all(&|device| device.name.to_lowercase() == wanted);
     let like = |device: &DeviceInfo| {
         let uuid = device.uuid.as_ref().is_some_and(|uuid| uuid.starts_with(&wanted));

@@ -1,58 +1,58 @@
-//! What can go wrong, sorted by who can mend it.
+//! Errors, sorted by who can fix them.
 
 use bytesize::ByteSize;
 
 use crate::watch::Stopped;
 
-/// Why a call ended without its result. Messages name options by their field, as in `` `max_memory` ``; a front end may show
-/// its own names for them.
+/// An error of this crate. Messages name options by their field, such as `` `max_memory` ``; a front end may replace
+/// these names with its own.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The model, a plan, a backend or a device.
+    /// An error of the model, a plan, a backend or a device.
     #[error(transparent)]
     Core(#[from] bp_core::Error),
-    /// A file.
+    /// An error about a file.
     #[error(transparent)]
     File(#[from] bp_io::Error),
-    /// Options that contradict each other or that nothing can follow.
+    /// Options that contradict each other or are impossible.
     #[error("{0}")]
     Options(String),
-    /// Images, lists or patterns that do not fit.
+    /// Images, lists or patterns that cannot be used.
     #[error("{0}")]
     Input(String),
     /// Something that cannot be written, or threads that cannot be started.
     #[error("{0}")]
     System(String),
-    /// A backend or device that is not there.
+    /// A backend or device that does not exist or cannot be opened.
     #[error("{0}")]
     Unavailable(String),
-    /// More memory needed than allowed or free.
+    /// The work needs more memory than is allowed or free.
     #[error("needs at least {}, but only {} is {reason}; {advice}", iec_or_more(*needed), iec(*available))]
     OutOfMemory {
         /// Bytes needed.
         needed: u64,
-        /// Bytes that may be taken.
+        /// Bytes that may be used.
         available: u64,
-        /// Who says so: "available", or "allowed by `max_memory`".
+        /// The source of this limit, in words such as "available" or "allowed by `max_memory`".
         reason: &'static str,
-        /// What would need less.
+        /// How to need less.
         advice: String,
     },
     /// The caller's [`crate::Stop`] asked to stop.
     #[error("interrupted")]
     Stopped,
-    /// An error with the name of what it is about.
+    /// An error together with its subject.
     #[error("{what}: {source}")]
     Of {
-        /// A file, a pair, a device.
+        /// The subject: a file, a pair or a device.
         what: String,
         /// The error.
         source: Box<Error>,
     },
 }
 
-/// Who can mend an [`Error`], and how.
+/// Who can fix an [`Error`], and how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// The caller, with other options.
@@ -61,20 +61,20 @@ pub enum Cause {
     Input,
     /// The caller, with another device or backend.
     Unavailable,
-    /// The caller, with another device or a smaller plan: the device is there, but too small for this one.
+    /// The caller, with another device or a smaller plan: the device works, but is too small for this plan.
     Unsupported,
-    /// Nobody at once: the device went away and must be opened again.
+    /// The caller, by opening the device again: it was lost.
     DeviceLost,
     /// The caller, with a smaller problem or more memory.
     Memory,
-    /// Whoever looks after the machine: a full disk, missing permissions.
+    /// The administrator of the machine: a full disk, missing permissions.
     System,
     /// Nobody: the caller asked to stop.
     Stopped,
 }
 
 impl Error {
-    /// Who can mend it.
+    /// Who can fix it.
     #[must_use]
     pub fn cause(&self) -> Cause {
         match self {
@@ -90,7 +90,7 @@ impl Error {
         }
     }
 
-    /// The same error with the name of what it is about.
+    /// The same error together with its subject: a file, a pair or a device.
     #[must_use]
     pub fn of(self, what: impl Into<String>) -> Self {
         Self::Of { what: what.into(), source: Box::new(self) }
@@ -130,12 +130,12 @@ impl From<Stopped> for Error {
     }
 }
 
-/// Bytes in a unit that people use.
+/// Bytes as text with a binary unit, such as 1.7 GiB.
 pub(crate) fn iec(bytes: u64) -> String {
     ByteSize(bytes).display().iec().to_string()
 }
 
-/// The same rounded up to a tenth of the unit, so that what is shown is enough.
+/// [`iec`], rounded up to a tenth of the unit, so that the shown amount is enough.
 fn iec_or_more(bytes: u64) -> String {
     let unit = 1024_u64.pow(bytes.max(1).ilog(1024));
     let tenths = bytes.saturating_mul(10).div_ceil(unit);

@@ -1,4 +1,4 @@
-//! From both views of a pair to the finished map.
+//! Matches one or both views of a pair and finishes the map.
 
 use std::time::{Duration, Instant};
 
@@ -9,17 +9,17 @@ use bp_core::{
 
 use crate::{Error, Options};
 
-/// What one answer took, by the wall clock.
+/// Wall-clock times of one answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnswerTimes {
-    /// Matching the left image, and the right one where that was needed.
+    /// Matching the left image, and the right one if needed.
     pub matching: Times,
-    /// Everything after that, and mirroring the pair for the right image.
+    /// Everything else: mirroring the pair for the right image, and finishing the map.
     pub finishing: Duration,
 }
 
 impl AnswerTimes {
-    /// From images in memory to the map.
+    /// Time from images in memory to the finished map.
     #[must_use]
     pub fn total(&self) -> Duration {
         self.matching.total + self.finishing
@@ -29,13 +29,14 @@ impl AnswerTimes {
 /// A finished map.
 pub(crate) struct Finished {
     pub(crate) map: DisparityMap,
-    /// See [`finish::confidence`]; 0 where the check or the speckle filter made the disparity unknown. None unless asked for.
+    /// See [`finish::confidence`]; 0 where the check or the speckle filter made the disparity unknown. `None` unless
+    /// the options ask for it.
     pub(crate) confidence: Option<Vec<f32>>,
     pub(crate) times: AnswerTimes,
 }
 
-/// Matches what has to be matched, by `solve`, and finishes the left image's map. The left image comes last, so that its
-/// labels and messages are there afterwards.
+/// Matches the left image with `solve`, and the right one if needed. Then finishes the left image's map. The left image
+/// is matched last, so that its labels and messages remain available.
 pub(crate) fn finished(
     options: &Options,
     pair: &StereoPair,

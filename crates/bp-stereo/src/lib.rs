@@ -17,12 +17,12 @@
 //! # }
 //! ```
 //!
-//! [`Options`] says what is matched and how; every option has a default. A [`Matcher`] opens a device once and matches pair
-//! after pair on it. A [`Disparity`] holds the map, a confidence, times, the energy, the memory taken and [`Warning`]s.
-//! [`Watch`] follows and stops long work; [`batch`] matches folders, lists and videos, and resumes where it was stopped;
-//! [`Outputs`] writes maps, pictures, depth and points. Errors say who can mend them: see [`Error::cause`].
+//! [`Options`] selects the algorithm, labels and device; every option has a default. A [`Matcher`] opens a device once
+//! and matches any number of pairs on it. A [`Disparity`] holds the map, its confidence, times, energy, memory use and
+//! [`Warning`]s. [`Watch`] follows and stops long work. [`batch`] matches folders, lists and videos, and resumes where
+//! it was stopped. [`Outputs`] writes maps, pictures, depth and points. [`Error::cause`] says who can fix an error.
 //!
-//! This crate prints nothing, keeps no state outside of its values and changes no panic hook.
+//! This crate prints nothing, has no global state and does not change the panic hook.
 
 mod algorithm;
 pub mod batch;

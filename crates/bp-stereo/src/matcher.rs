@@ -1,4 +1,4 @@
-//! The matcher: a device that is opened once, and prepared anew only where a pair needs another plan than the one before.
+//! The matcher. It opens a device once, and prepares it again only if a pair needs a different plan.
 
 use std::fmt;
 
@@ -29,26 +29,26 @@ pub struct Matcher {
 /// A tiled plan, prepared on the device.
 struct Prepared {
     tiled: Tiled,
-    /// Bytes that the program was predicted to hold.
+    /// Predicted peak memory of the program, in bytes.
     peak_bytes: u64,
 }
 
-/// What will be run for a pair.
+/// The plan of a pair, with warnings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {
     /// The plan.
     pub plan: Plan,
-    /// What may be wrong with the pair or its labels.
+    /// Possible problems with the pair or its labels.
     pub warnings: Vec<Warning>,
 }
 
-/// From which messages a pair starts.
+/// The messages that a pair starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// From none.
+    /// None.
     #[default]
     Cold,
-    /// From those of the pair before: for the next frame of a video, on the full grid alone.
+    /// Those of the previous pair. For the next frame of a video; matches on the full grid alone.
     Warm,
 }
 
@@ -57,21 +57,21 @@ pub enum Start {
 pub struct Disparity {
     /// The disparity map of the left image.
     pub map: DisparityMap,
-    /// How far each pixel can be trusted, 0 to 1, `[height][width]`; none unless [`Options::confidence`] asks for it.
+    /// The confidence of each pixel, 0 to 1, `[height][width]`; `None` unless [`Options::confidence`] asks for it.
     pub confidence: Option<Vec<f32>>,
-    /// What it took.
+    /// Wall-clock times.
     pub times: AnswerTimes,
     /// The energy of the labels.
     pub energy: Energy,
-    /// What was run.
+    /// The settings that were run.
     pub settings: description::Settings,
-    /// The tiles; none where the pair was matched as a whole.
+    /// The tiles; `None` if the pair was matched as a whole.
     pub tiles: Option<Tiles>,
     /// Bytes that the device allocated for the plan.
     pub allocated_bytes: u64,
-    /// Most bytes that the program was predicted to hold at a time.
+    /// Predicted peak memory of the program, in bytes.
     pub peak_bytes: u64,
-    /// What may be wrong with the pair or its labels.
+    /// Possible problems with the pair or its labels.
     pub warnings: Vec<Warning>,
 }
 
@@ -79,8 +79,8 @@ impl Matcher {
     /// Starts threads and opens the device that the options name.
     ///
     /// # Errors
-    /// [`Error::Options`] where options contradict each other, [`Error::Unavailable`] where there is no such device,
-    /// [`Error::System`] where threads cannot be started.
+    /// [`Error::Options`] if options contradict each other, [`Error::Unavailable`] if the device does not exist or
+    /// cannot be opened, [`Error::System`] if threads cannot be started.
     pub fn new(options: &Options) -> Result<Self, Error> {
         options.check()?;
         let pool = system::thread_pool(options.threads)?;
@@ -92,7 +92,7 @@ impl Matcher {
         Ok(Self { options: options.clone(), pool, opened, beside: Beside::default(), prepared: None })
     }
 
-    /// Says what the program holds beside this matcher; a memory limit then includes it.
+    /// Declares what else the program holds in memory, so that a memory limit includes it.
     #[must_use]
     pub fn beside(self, beside: Beside) -> Self {
         Self { beside, ..self }
@@ -119,25 +119,25 @@ impl Matcher {
     /// Matches two rectified images of one size.
     ///
     /// # Errors
-    /// [`Error::Core`] where the images differ in size, [`Error::OutOfMemory`], and those of the device.
+    /// [`Error::Core`] if the images differ in size, [`Error::OutOfMemory`], and those of the device.
     pub fn compute(&mut self, left: &Image, right: &Image) -> Result<Disparity, Error> {
         let pair = StereoPair::new(left.clone(), right.clone())?;
         let planned = self.plan(&pair)?;
         self.run(&pair, planned, Start::Cold, &Watch::default())
     }
 
-    /// Plans a pair: a quick look at it finds labels, where they are [`crate::Labels::Auto`], and what may be wrong.
+    /// Plans a pair. A quick survey of it finds possible problems, and the labels if they are [`crate::Labels::Auto`].
     ///
     /// # Errors
-    /// [`Error::Core`] where the options ask for an impossible model or plan.
+    /// [`Error::Core`] if the options ask for an impossible model or plan.
     pub fn plan(&self, pair: &StereoPair) -> Result<Planned, Error> {
         self.plan_within(pair, &Survey::of(pair)?, &|_| true)
     }
 
-    /// Plans a pair that was surveyed already, for outputs that `hold` a first disparity or not.
+    /// Plans a pair that was already surveyed. `hold` says whether the outputs can hold a first disparity.
     ///
     /// # Errors
-    /// As [`Matcher::plan`].
+    /// Those of [`Matcher::plan`].
     pub fn plan_within(
         &self,
         pair: &StereoPair,
@@ -153,7 +153,7 @@ impl Matcher {
     /// Matches a pair as planned. Progress goes to `watch`, in message entries.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] where the plan does not fit, [`Error::Stopped`], and those of the device.
+    /// [`Error::OutOfMemory`] if the plan does not fit, [`Error::Stopped`], and those of the device.
     pub fn run(
         &mut self,
         pair: &StereoPair,
@@ -163,7 +163,7 @@ impl Matcher {
     ) -> Result<Disparity, Error> {
         let Self { options, pool, opened, beside, prepared } = self;
         let Planned { plan, warnings } = planned;
-        // What was prepared for another plan is freed first.
+        // A different plan is freed before the new one is prepared.
         let before = prepared.take().filter(|prepared| *prepared.tiled.plan() == plan);
         let (ready, finished, energy) = pool.install(|| {
             let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, opened, watch), Ok)?;
@@ -183,7 +183,7 @@ impl Matcher {
             peak_bytes: ready.peak_bytes,
             warnings,
         };
-        // Labels of tiles make room for writing the answer.
+        // Freeing the labels of tiles makes room for writing the answer.
         *prepared = Some(ready).filter(|ready| ready.tiled.tiling().is_whole());
         Ok(answer)
     }
@@ -191,7 +191,7 @@ impl Matcher {
     /// SHA-256 of all messages of the last pair: from the left, right, up and down, each `[height][width][labels]`.
     ///
     /// # Errors
-    /// [`Error::Core`] where nothing was matched, or the image was matched in tiles, whose messages are gone.
+    /// [`Error::Core`] if nothing was matched, or if the image was matched in tiles, which do not keep their messages.
     pub fn messages_sha256(&mut self) -> Result<String, Error> {
         let gone = bp_core::Error::Plan("messages are kept of images that are matched as a whole only");
         let prepared = self.prepared.as_mut().ok_or(gone)?;
@@ -235,7 +235,7 @@ impl Prepared {
                 Start::Warm => tiled.solve_warm_observed(device, pair, observer)?,
             };
             done = done.saturating_add(updates);
-            // The memory of tiles is for the map.
+            // Freeing the tiles makes room for the map.
             tiled.free_tiles();
             Ok((times, tiled.disparities()))
         })

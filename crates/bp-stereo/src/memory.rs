@@ -1,68 +1,69 @@
-//! The memory that a match takes, known before it begins, and how its plan is tiled to stay within a limit.
+//! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
 use bp_core::{Likeness, Plan, Schedule, Size, Tiling};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory};
 
-/// The program itself, with the stacks of its threads and what allocators keep.
+/// Bytes of the program itself, the stacks of its threads and the reserves of its allocators.
 const PROGRAM: u64 = 16 << 20;
 
-/// Bytes a pixel of both images.
+/// Bytes per pixel of both images.
 const PAIR: u64 = 6;
 
-/// Bytes a pixel of known truth.
+/// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
 
 /// Bytes per pixel of the map, and of the largest output made from it: a picture with a colour bar.
 const MAP: u64 = 4;
 const WRITING: u64 = 8;
 
-/// Bytes a pixel of labels, which are there until the map is to be written.
+/// Bytes per pixel of the labels, which are kept until the map is written.
 const LABELS: u64 = 2;
 
-/// Bytes a pixel of a pair that is read while another is matched: one image, the other one decoded and copied, its file.
+/// Bytes per pixel of a pair that is read while another is matched: one image, and the other as a file, decoded and
+/// copied.
 const READING: u64 = 12;
 
-/// Bytes a pixel of a confidence.
+/// Bytes per pixel of the confidence.
 const TRUST: u64 = 4;
 
-/// Bytes a pixel of depths.
+/// Bytes per pixel of the depths.
 const DEPTH: u64 = 4;
 
-/// Bytes a pixel of the mirrored pair while the right image is matched, more than what is kept of it.
+/// Bytes per pixel of the mirrored pair while the right image is matched. The right map that is kept later needs fewer.
 const RIGHT: u64 = 6;
 
-/// Bytes a pixel of what finishing a map takes for a time: a map with a frame and the next map; for the confidence, with
-/// both maps, two maps with frames and what a pixel is worth.
+/// Temporary bytes per pixel for finishing a map: a map with a frame, and the next map. For the confidence: besides
+/// both maps, two maps with frames and the worth of each pixel.
 const FINISHING: u64 = 8;
 const CONFIDENCE: u64 = 20;
 
-/// Bytes a pixel of what finding surfaces takes.
+/// Temporary bytes per pixel for finding surfaces in the speckle filter.
 const SPECKLE: u64 = 9;
 
-/// What a program holds beside the matcher, so that a memory limit includes it.
+/// What the program holds in memory beside the matcher, so that a memory limit includes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beside {
     /// Whether ground truth is in memory.
     pub truth: bool,
-    /// Whether depths are made of the map.
+    /// Whether depths are made from the map.
     pub depth: bool,
-    /// Whether the next pair is read and the last one written meanwhile.
+    /// Whether the next pair is read and the previous one written at the same time.
     pub batch: bool,
-    /// The option that needs all messages at once, where there is one: then the image cannot be tiled.
+    /// The option that needs all messages at once, if any. The image then cannot be tiled.
     pub whole: Option<&'static str>,
 }
 
-/// How a plan is tiled, and what it takes.
+/// The tiling of a plan, and the memory it needs.
 pub(crate) struct Fitted {
     /// The tiles.
     pub(crate) tiling: Tiling,
-    /// Most bytes that the program will hold at a time, predicted: images, tiles, answer and what is made of it.
+    /// Predicted peak memory of the program in bytes: images, tiles, the answer and the outputs made from it.
     pub(crate) peak_bytes: u64,
 }
 
-/// Tiles `plan` to stay within the options' limit and the memory that there is; tells `watch` where the image is not
-/// matched as a whole. The plan itself stays what it is: tiles cost less accuracy than a smaller plan.
+/// Tiles `plan` to stay within the options' limit and the available memory. Reports to `watch` if the image is not
+/// matched as a whole. The plan itself does not change, because tiles cost less accuracy than a smaller plan.
 pub(crate) fn fitted(
     options: &Options,
     beside: Beside,
@@ -99,7 +100,7 @@ pub(crate) fn fitted(
     Ok(Fitted { tiling, peak_bytes })
 }
 
-/// Refuses an option that needs all messages at once.
+/// Refuses tiles if an option needs all messages at once.
 fn check_whole(beside: Beside, needed: &Result<u64, bp_core::Error>, available: u64) -> Result<(), Error> {
     let Some(option) = beside.whole else { return Ok(()) };
     let needed = needed.clone()?;
@@ -107,13 +108,13 @@ fn check_whole(beside: Beside, needed: &Result<u64, bp_core::Error>, available: 
     Err(Error::OutOfMemory { needed, available, reason: "there for the whole image", advice })
 }
 
-/// Bytes beside those of tiles.
+/// Bytes beside those of the tiles.
 struct Bytes {
-    /// Held already now, and all the time.
+    /// Held now and throughout the match.
     held: u64,
-    /// Held soon, and at any time from then on.
+    /// Allocated later and then held, or reserved, until the end.
     coming: u64,
-    /// Held once the labels are there. Their energy needs less than what comes later.
+    /// Held once the labels are selected. Computing their energy needs less than the steps after it.
     finishing: u64,
 }
 
@@ -125,7 +126,7 @@ impl Bytes {
         let (right, trust) = (if_so(options.needs_right(), RIGHT), if_so(options.confidence, TRUST));
         let finishing = if options.confidence { CONFIDENCE } else { FINISHING };
         let finishing = finishing.max(if_so(options.speckle.is_some(), SPECKLE));
-        // The next pair of a batch and the last one count as this one's size.
+        // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
         Self {
             held: PROGRAM + a_pixel(PAIR + truth),
@@ -134,7 +135,7 @@ impl Bytes {
         }
     }
 
-    /// Most bytes that are held, where tiles need so many.
+    /// The peak memory in bytes, if the tiles need `tiles` bytes.
     fn peak(&self, tiles: u64) -> u64 {
         (self.held + self.coming).saturating_add(tiles.max(self.finishing))
     }
@@ -149,14 +150,15 @@ fn described(tiling: &Tiling) -> String {
 /// How many bytes the program may hold.
 struct Limit {
     bytes: u64,
-    /// Who says so.
+    /// The source of the limit, for messages.
     reason: &'static str,
     /// Whether the caller could allow more.
     can_be_raised: bool,
 }
 
 impl Limit {
-    /// The lower one of `max_memory` and, unless the device has memory of its own, of what is held and what is free.
+    /// The lower of `max_memory` and the memory that is held or free. The latter counts only if the device has no
+    /// memory of its own.
     fn of(options: &Options, opened: &Opened, held: u64) -> Self {
         let free = Memory::available_to(opened.info.kind).map_or(u64::MAX, |free| free.saturating_add(held));
         match options.max_memory.filter(|&allowed| allowed <= free) {

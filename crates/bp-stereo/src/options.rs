@@ -1,4 +1,4 @@
-//! Everything that a caller can choose.
+//! The options of a match.
 
 use bp_core::{
     Profile,
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Algorithm, Error, devices};
 
-/// What is matched, how, and on which device. The default is our own algorithm on the fast backend.
+/// How pairs are matched, and on which device. The default is our own algorithm on the fast backend.
 ///
 /// ```
 /// use bp_stereo::{Algorithm, Labels, Options};
@@ -22,40 +22,42 @@ use crate::{Algorithm, Error, devices};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
-    /// What is run.
+    /// The algorithm.
     pub algorithm: Algorithm,
-    /// Data cost, with the smoothness that goes with it.
+    /// The data cost and its default smoothness.
     pub profile: Profile,
-    /// Slope of the smoothness cost in units of the data cost; none for the profile's.
+    /// Slope of the smoothness cost in units of the data cost; `None` means the profile's.
     pub slope: Option<u8>,
-    /// Truncation K of the smoothness cost, at most [`bp_core::MAX_TRUNCATION`]; none for the profile's.
+    /// Truncation K of the smoothness cost, at most [`bp_core::MAX_TRUNCATION`]; `None` means the profile's.
     pub truncation: Option<u8>,
-    /// Weak edges: half slope and truncation where neighbouring grey values of the left image differ by more.
+    /// Weak edges: halves slope and truncation where neighbouring grey values of the left image differ by more than
+    /// this.
     pub edge_threshold: Option<u8>,
     /// The labels.
     pub labels: Labels,
-    /// Disparity of the first label in pixels; may be negative. None for 0, or with [`Labels::Auto`] what the images need.
+    /// Disparity of the first label in pixels; may be negative. `None` means 0, or with [`Labels::Auto`] what the
+    /// images need.
     pub min_disparity: Option<i32>,
-    /// Whether the right image is matched too, and what the two maps do not agree on becomes unknown.
+    /// Whether the right image is matched too, and pixels on which the two maps disagree become unknown.
     pub check: bool,
-    /// Surfaces of fewer pixels become unknown.
+    /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
     /// Whether pixels that the check or the speckle filter made unknown are filled from their row.
     pub fill: bool,
     /// Side of a median filter's window: 3, 5 or 7.
     pub median: Option<usize>,
-    /// Whether disparities get fractions.
+    /// Whether disparities are refined to fractions of a pixel.
     pub subpixel: bool,
     /// Whether each pixel gets a confidence from 0 to 1; matches the right image too.
     pub confidence: bool,
     /// Backend: "rayon", "scalar", "vulkan" or "wgpu", or "NAME:DEVICE".
     pub backend: String,
-    /// Device of the backend: its index, a part of its name or the beginning of its UUID; none for its first.
+    /// Device of the backend: its index, a part of its name or the beginning of its UUID; `None` means the first.
     pub device: Option<String>,
-    /// Threads of the backend rayon; none for RAYON_NUM_THREADS, else one for each processor.
+    /// Threads of the backend rayon; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor.
     pub threads: Option<usize>,
-    /// Most bytes that the program may hold, images and answer included: larger pairs are matched in strips or tiles. None for
-    /// what is free.
+    /// Most bytes that the program may hold, including images and answer. Larger pairs are matched in strips or tiles.
+    /// `None` means the free memory.
     pub max_memory: Option<u64>,
 }
 
@@ -66,9 +68,9 @@ pub enum Labels {
     /// A quarter of the width, rounded up to a multiple of 16, as OpenCV recommends for belief propagation.
     #[default]
     QuarterOfWidth,
-    /// As many as a coarse look at the images finds.
+    /// The labels that a coarse survey of the images finds.
     Auto,
-    /// So many.
+    /// This number of labels.
     Count(usize),
 }
 
@@ -96,7 +98,7 @@ impl Default for Options {
     }
 }
 
-/// Sets one option after another.
+/// Defines builder methods for options.
 macro_rules! setters {
     ($($(#[$doc:meta])+ $name:ident: $type:ty => $field:ident = $value:expr;)+) => {
         impl Options {
@@ -115,7 +117,7 @@ setters! {
     with_algorithm: Algorithm => algorithm = std::convert::identity;
     /// With [`Options::profile`].
     with_profile: Profile => profile = std::convert::identity;
-    /// With so many labels, see [`Options::labels`].
+    /// With this number of labels; see [`Options::labels`].
     with_labels: usize => labels = Labels::Count;
     /// With [`Options::min_disparity`].
     with_min_disparity: i32 => min_disparity = Some;
@@ -140,7 +142,7 @@ setters! {
 }
 
 impl Options {
-    /// Fails where options contradict each other or nothing can follow them.
+    /// Fails if options contradict each other or are impossible.
     ///
     /// # Errors
     /// [`Error::Options`], which names them.
@@ -152,7 +154,7 @@ impl Options {
         }
     }
 
-    /// What is done to a map after matching.
+    /// The operations on a map after matching.
     #[must_use]
     pub fn finish(&self) -> Finish {
         Finish {

@@ -1,4 +1,4 @@
-//! The files that are made of a map.
+//! The files that are made from a map.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use bp_io::{
 
 use crate::{Error, Watch, description};
 
-/// Where the files of one map go.
+/// The paths of the files that are made from one map.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     /// The disparity map.
@@ -21,11 +21,11 @@ pub struct Outputs {
     pub depth: Option<PathBuf>,
     /// A point cloud.
     pub points: Option<PathBuf>,
-    /// How far the map can be trusted.
+    /// A map of the confidence.
     pub confidence: Option<PathBuf>,
 }
 
-/// How files are made, the same for every pair.
+/// How the files of every pair are made.
 #[derive(Clone, Debug, Default)]
 pub struct Making {
     /// How pictures look.
@@ -34,22 +34,22 @@ pub struct Making {
     pub no_sidecar: bool,
     /// The geometry of the cameras, which depth and points need.
     pub geometry: Option<Geometry>,
-    /// How files get to their place.
+    /// How files are written.
     pub files: Files,
 }
 
-/// What files are made of.
+/// The data that files are made from.
 #[derive(Clone, Copy, Debug)]
 pub struct Content<'a> {
     /// The map.
     pub map: &'a DisparityMap,
-    /// How far it can be trusted, `[height][width]`.
+    /// The confidence of each pixel, `[height][width]`.
     pub confidence: Option<&'a [f32]>,
-    /// The left image, where points take its colours.
+    /// The left image, which gives points their colours.
     pub image: Option<&'a Image>,
-    /// What was matched, where it was.
+    /// The settings of the match, if known.
     pub plan: Option<&'a description::Settings>,
-    /// The files that the map was made of.
+    /// The files that the map was made from.
     pub inputs: &'a [&'a Path],
 }
 
@@ -59,15 +59,15 @@ impl Making {
         !self.no_sidecar && !is_stream(path)
     }
 
-    /// The geometry of images of some size, where an option gives one.
+    /// The calibration of images of this size, if a geometry is given.
     fn calibration(&self, size: Size) -> Result<Option<Calibration>, Error> {
         Ok(self.geometry.as_ref().map(|geometry| geometry.of(size)).transpose()?)
     }
 }
 
 impl Outputs {
-    /// Fails where a file could not be written, would overwrite an input or another output, or lacks what it is made of, so
-    /// that a caller can say so before the work is done.
+    /// Fails if a file could not be written, would overwrite an input or another output, or lacks the data it is made
+    /// from. A caller can report this before the work begins.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Options`].
@@ -88,7 +88,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Fails where a format cannot hold the disparities of a plan, or the calibration is for images of another size.
+    /// Fails if a format cannot hold the disparities of a plan, or if the calibration is for images of another size.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -98,7 +98,7 @@ impl Outputs {
         self.check_map(making, (low, high), plan.image_size())
     }
 
-    /// The same for a map of disparities from the first to the second of `range`.
+    /// The same check for a map with disparities from the first to the second value of `range`.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -107,7 +107,7 @@ impl Outputs {
         making.calibration(size).map(drop)
     }
 
-    /// Fails where a format cannot hold disparities from `low` to `high`.
+    /// Fails if a format cannot hold disparities from `low` to `high`.
     fn check_range(&self, low: f32, high: f32) -> Result<(), Error> {
         Ok(self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))?)
     }
@@ -118,7 +118,7 @@ impl Outputs {
         self.check_range(disparity as f32, disparity as f32).is_ok()
     }
 
-    /// Writes all files. `watch` hears what is odd about them.
+    /// Writes all files. `watch` receives warnings about their contents.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -146,13 +146,13 @@ impl Outputs {
         files.cloned().chain(sidecars).collect()
     }
 
-    /// The files that hold a value a pixel.
+    /// The files that hold one value per pixel.
     fn maps(&self) -> impl Iterator<Item = &Path> {
         [&self.map, &self.depth, &self.confidence].into_iter().flatten().map(PathBuf::as_path)
     }
 }
 
-/// Writes one file after another.
+/// Writes the files of one map.
 struct Writer<'a> {
     making: &'a Making,
     content: &'a Content<'a>,
@@ -160,7 +160,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Where maps come from, for their sidecars.
+    /// The origin of the maps, for their sidecars.
     fn origin<'b>(&'b self, calibration: Option<&'b Calibration>) -> Origin<'b, description::Settings> {
         let Content { plan, inputs, .. } = *self.content;
         let labels = |plan: &description::Settings| {
@@ -172,7 +172,7 @@ impl Writer<'_> {
 
     /// Writes a map and its sidecar.
     fn map(&self, path: &Path, raster: &Raster<'_>, calibration: Option<&Calibration>) -> Result<(), Error> {
-        // The sidecar of an earlier map must not stand beside the new one, even where this ends in between.
+        // Removed first, so that an old sidecar never lies beside a new map, even if the program ends in between.
         remove_sidecar(path)?;
         if raster.range().is_none() {
             self.watch.warn(&format!("{}: no pixel is known", path.display()));

@@ -1,4 +1,4 @@
-//! Where many pairs come from: a list, a folder in which they lie in a known layout, or the frames of a video.
+//! Finds many pairs: in a list, in a folder with a known layout, or in the frames of a video.
 
 mod list;
 mod natural;
@@ -11,10 +11,10 @@ pub use list::parse;
 
 use crate::Error;
 
-/// A pair, and what its outputs are named after.
+/// A pair and its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pair {
-    /// A relative path without ending.
+    /// The name of its outputs: a relative path without extension.
     pub name: PathBuf,
     /// The left image.
     pub left: PathBuf,
@@ -22,31 +22,32 @@ pub struct Pair {
     pub right: PathBuf,
 }
 
-/// Pairs in their order, and what is to be told of files that make none.
+/// Pairs in order, and notes on files that are not part of a pair.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// The pairs.
     pub pairs: Vec<Pair>,
-    /// A line each.
+    /// The notes, a line each.
     pub notes: Vec<String>,
 }
 
-/// Where pairs are looked for.
+/// Where pairs come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A list, or a folder that is searched.
     Path(PathBuf),
     /// Two patterns with one `%d`, `%04d` or `*` each, left and right.
     Video([String; 2]),
-    /// These pairs; messages call where they are from by this name.
+    /// Given pairs, and the name of their source for messages.
     Pairs(Vec<Pair>, String),
 }
 
 impl Source {
-    /// The pairs, at least one. What lies in `output` is none.
+    /// Finds the pairs, at least one. The search of a folder skips `output`.
     ///
     /// # Errors
-    /// [`Error::Input`] where there is no pair or a list is broken, [`Error::Options`] for a pattern without a place.
+    /// [`Error::Input`] if there is no pair or a list is broken, [`Error::Options`] for a pattern without a
+    /// placeholder.
     pub fn find(&self, output: &Path) -> Result<Found, Error> {
         let (found, source) = match self {
             Self::Path(path) if path.is_dir() => (search::search(path, output), path.display().to_string()),
@@ -67,8 +68,7 @@ fn listed(path: &Path) -> Result<Found, Error> {
     Ok(Found { pairs: parse(&bytes, &path.display().to_string())?, notes: Vec::new() })
 }
 
-/// What a pair is named after that has no name of its own: the path of its left image without its root, steps up and
-/// ending.
+/// The default name of a pair: the path of its left image without root, `..` and extension.
 fn name_of(left: &Path) -> PathBuf {
     let below: PathBuf = left.components().filter(|part| matches!(part, Component::Normal(_))).collect();
     below.with_extension("")

@@ -1,4 +1,4 @@
-//! From options to the plan of a pair.
+//! Makes the plan of a pair from options.
 
 use bp_core::{
     MAX_LABELS, Model, Plan, Size, Tiling,
@@ -16,8 +16,8 @@ pub(crate) fn plan(options: &Options, size: Size, range: DisparityRange) -> Resu
     Ok(Plan::new(size, model, options.algorithm.settings(size, range.labels))?)
 }
 
-/// The labels that the options ask for, where outputs `hold` a first disparity. `None` where [`Labels::Auto`] finds none:
-/// [`quarter_of_width`] stands in.
+/// The labels that the options ask for. `hold` says whether the outputs can hold a first disparity. `None` if
+/// [`Labels::Auto`] finds none; the caller then uses [`quarter_of_width`].
 pub(crate) fn labels(
     options: &Options,
     size: Size,
@@ -41,7 +41,7 @@ pub(crate) fn quarter_of_width(options: &Options, size: Size) -> DisparityRange 
     DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels }
 }
 
-/// The first disparity: 0 where only the margin is negative and outputs hold no negative disparities.
+/// The first disparity. It is 0 if only the margin is negative and the outputs cannot hold negative disparities.
 fn first(seen: SeenDisparities, hold: &dyn Fn(i32) -> bool) -> i32 {
     let first = seen.range().min_disparity;
     if first < 0 && seen.least >= -seen.step && !hold(first) { 0 } else { first }

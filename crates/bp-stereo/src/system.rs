@@ -9,14 +9,14 @@ use crate::Error;
 /// Main memory in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// What the machine has.
+    /// The memory of the machine.
     pub total: u64,
-    /// What this process can still get.
+    /// The memory that this process can still get.
     pub available: u64,
 }
 
 impl Memory {
-    /// This machine's memory, where the system tells.
+    /// This machine's memory, if the system reports it.
     #[must_use]
     pub fn of_machine() -> Option<Self> {
         let what = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
@@ -25,8 +25,8 @@ impl Memory {
         Some(Self { total: system.total_memory(), available: system.available_memory().min(allowed) })
     }
 
-    /// Bytes of this machine's memory that a device of this kind can get now. `None` where the system does not tell, and
-    /// for a device that has, or may have, memory of its own.
+    /// Bytes of this machine's memory that a device of this kind can get now. `None` if the system does not report
+    /// them, or if the device has, or may have, memory of its own.
     #[must_use]
     pub fn available_to(kind: DeviceKind) -> Option<u64> {
         let shares = matches!(kind, DeviceKind::Processor | DeviceKind::IntegratedGpu | DeviceKind::SoftwareRasteriser);
@@ -34,8 +34,8 @@ impl Memory {
     }
 }
 
-/// Bytes left to the control group of this process, such as a container or a cluster's job. Cached files do not count as
-/// used, since the system gives them up. `None` where there is no limit.
+/// Bytes left to the control group of this process, such as a container or a cluster job. Cached files do not count as
+/// used, since the system can drop them. `None` if there is no limit.
 fn left_to_group(system: &mut System) -> Option<u64> {
     let own = sysinfo::get_current_pid().ok()?;
     system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, ProcessRefreshKind::nothing());
@@ -43,11 +43,11 @@ fn left_to_group(system: &mut System) -> Option<u64> {
     Some(limits.total_memory.saturating_sub(limits.rss))
 }
 
-/// A pool of so many threads; by default as many as RAYON_NUM_THREADS says, else one for each processor. The backend `rayon`
-/// works in the pool that it is called in.
+/// A pool with this number of threads; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor. The
+/// backend `rayon` works in the pool that it is called in.
 ///
 /// # Errors
-/// [`Error::System`] where the threads cannot be started.
+/// [`Error::System`] if the threads cannot be started.
 pub fn thread_pool(threads: Option<usize>) -> Result<ThreadPool, Error> {
     let failed = |error| Error::System(format!("cannot start the threads: {error}; fewer `threads` may do"));
     ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build().map_err(failed)

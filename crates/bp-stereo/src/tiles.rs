@@ -1,25 +1,25 @@
-//! What a pair was cut into, as files describe it.
+//! The tiles of a pair, as files describe them.
 
 use bp_core::Tiling;
 use serde::{Deserialize, Serialize};
 
-/// What a pair was cut into.
+/// The tiles that a pair was cut into.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tiles {
-    /// Beside each other.
+    /// Number of columns.
     pub columns: usize,
-    /// Above each other.
+    /// Number of rows.
     pub rows: usize,
-    /// The widest tile in pixels.
+    /// Width of the widest tile in pixels.
     pub width: usize,
-    /// The highest tile in pixels.
+    /// Height of the highest tile in pixels.
     pub height: usize,
-    /// How near the answer is to the whole image's.
+    /// How close the answer is to that of the whole image, in words.
     pub answer: String,
 }
 
 impl Tiles {
-    /// Describes a tiling; none where it is the whole image.
+    /// Describes a tiling; `None` if its only tile is the whole image.
     pub(crate) fn of(tiling: &Tiling) -> Option<Self> {
         let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
         let answer = tiling.likeness().name().to_owned();

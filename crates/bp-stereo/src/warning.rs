@@ -1,4 +1,4 @@
-//! What may be wrong with a pair or its labels, found before it is matched.
+//! Warnings about a pair or its labels, found before the pair is matched.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use bp_core::{
 
 use crate::{Labels, Options};
 
-/// Something that may be wrong.
+/// A possible problem with a pair or its labels.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
@@ -17,13 +17,13 @@ pub enum Warning {
     Identical,
     /// Hardly anything matches.
     Unlike,
-    /// Too little matches to find labels; the default is taken.
+    /// Too little matches to find labels; the default is used.
     NoLabelsFound,
     /// The images look exchanged.
     Exchanged,
-    /// Corresponding rows are apart.
+    /// Corresponding points are not on the same row.
     Rows(RowOffsets),
-    /// There are disparities beyond the labels.
+    /// The pair has disparities beyond the labels.
     Beyond(Beyond),
     /// Some labels match nothing inside the right image.
     Unused(Unused),
@@ -36,9 +36,9 @@ pub struct Beyond {
     pub seen: [i32; 2],
     /// The disparity of the first and of the last label.
     pub labels: [i32; 2],
-    /// What would include them.
+    /// A change of options that would include them.
     advice: &'static str,
-    /// What would find labels by itself, where that was not asked for.
+    /// A hint at automatic labels; empty if they are already in use.
     automatic: &'static str,
 }
 
@@ -47,15 +47,15 @@ pub struct Beyond {
 pub struct Unused {
     /// Number of labels.
     pub labels: usize,
-    /// Pixels of a row.
+    /// Width of the images in pixels.
     pub width: usize,
-    /// Which of them: "first", "last" or "all".
+    /// Which labels match nothing: "first", "last" or "all".
     pub which: &'static str,
 }
 
-/// Warnings of a coarse look at a pair, of its plan, and of labels that were not found.
+/// The warnings from the survey of a pair, from its plan, and from a failed search for labels.
 pub(crate) fn of(options: &Options, survey: &Survey, plan: &Plan, found_labels: bool) -> Vec<Warning> {
-    // Who asks for negative disparities means them.
+    // A negative `min_disparity` shows that the order of the images is intended.
     let exchanged = survey.exchanged && options.min_disparity.is_none_or(|first| first >= 0);
     let mut warnings = Vec::new();
     let mut add = |is_so: bool, warning| warnings.extend(is_so.then_some(warning));
@@ -64,7 +64,7 @@ pub(crate) fn of(options: &Options, survey: &Survey, plan: &Plan, found_labels: 
     add(!found_labels, Warning::NoLabelsFound);
     add(exchanged, Warning::Exchanged);
     warnings.extend(survey.rows.map(Warning::Rows));
-    // What was seen of other pairs is not to be relied on, or would be told twice.
+    // Disparities are unreliable if rows do not correspond, and exchanged images have their own warning.
     let trusted = survey.rows.is_none() && !exchanged;
     let beyond = survey.seen.filter(|_| trusted).and_then(|seen| beyond(options, seen, plan));
     warnings.extend(beyond.map(Warning::Beyond));
@@ -107,7 +107,7 @@ fn unused(plan: &Plan) -> Option<Unused> {
 }
 
 impl Warning {
-    /// What pairs with this warning have in common, as the end of a sentence that begins with "3 more pairs".
+    /// The warning as the end of a sentence that begins with "3 more pairs".
     #[must_use]
     pub fn of_many(&self) -> &'static str {
         match self {
@@ -121,7 +121,7 @@ impl Warning {
         }
     }
 
-    /// The warning about a pair of this name, in a sentence.
+    /// The warning as a sentence about a pair with this name.
     #[must_use]
     pub fn about(&self, pair: &str) -> String {
         match self {
@@ -156,7 +156,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// How rows are apart, in words.
+/// The row offsets in words.
 fn apart(RowOffsets { whole, left, right, top, bottom }: RowOffsets) -> String {
     let off = |rows: i32| format!("{} px too {}", rows.abs(), if rows < 0 { "high" } else { "low" });
     if whole != 0 && [left, right, top, bottom].iter().all(|&part| part == whole) {

@@ -1,4 +1,4 @@
-//! How a caller follows work that takes a while, and stops it.
+//! Lets a caller follow and stop long work.
 
 use std::{
     fmt,
@@ -9,52 +9,52 @@ use std::{
     },
 };
 
-/// Asks work to stop at its next step. Clones ask together.
+/// A request to stop work at its next step. All clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Asks to stop; returns whether somebody had asked before.
+    /// Requests a stop. Returns whether one was requested before.
     pub fn stop(&self) -> bool {
         self.0.swap(true, Ordering::Relaxed)
     }
 
-    /// Whether somebody has asked.
+    /// Whether a stop was requested.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Work ended before its result because its [`Stop`] asked for it.
+/// The error of work that ended before its result because of its [`Stop`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
 pub struct Stopped;
 
-/// Something that happens while work goes on.
+/// Something that happens during the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Event<'a> {
-    /// How far the work has come. The unit differs between calls: message entries, or pairs.
+    /// Progress. The unit depends on the call: message entries or pairs.
     Progress {
         /// Units done.
         done: u64,
-        /// Units in all; may change while the work goes on.
+        /// Units in all; may change during the work.
         total: u64,
     },
-    /// What is being worked on from now on, in a few words.
+    /// The task that begins now, in a few words.
     Task(&'a str),
-    /// A result on the way, as a line of text.
+    /// An intermediate result, as a line of text.
     Line(&'a str),
-    /// A sentence that is good to know.
+    /// A sentence with useful information.
     Note(&'a str),
-    /// A sentence about something that may be wrong.
+    /// A sentence about a possible problem.
     Warning(&'a str),
-    /// A part of the work failed, as this sentence says; the rest goes on.
+    /// A sentence about a part of the work that failed; the rest continues.
     Failed(&'a str),
 }
 
-/// A caller's ear and hand: events go to it, and its [`Stop`] is obeyed.
+/// How a caller follows and stops work: it receives the events, and the work obeys its [`Stop`].
 #[derive(Clone, Copy)]
 pub struct Watch<'a> {
     events: &'a (dyn Fn(Event<'_>) + Sync),
@@ -68,7 +68,7 @@ impl<'a> Watch<'a> {
         Self { events, stop: Some(stop) }
     }
 
-    /// The same stop with other ears.
+    /// The same stop with another receiver of events.
     #[must_use]
     pub fn with_events<'b>(&'b self, events: &'b (dyn Fn(Event<'_>) + Sync)) -> Watch<'b> {
         Watch { events, stop: self.stop }
@@ -89,7 +89,7 @@ impl<'a> Watch<'a> {
         self.tell(Event::Warning(text));
     }
 
-    /// Sends how far the work has come; breaks where it should stop.
+    /// Sends the progress. Breaks if the work should stop.
     pub fn progress(&self, done: u64, total: u64) -> ControlFlow<()> {
         self.tell(Event::Progress { done, total });
         if self.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -101,7 +101,7 @@ impl<'a> Watch<'a> {
         self.stop.is_some_and(Stop::is_stopped)
     }
 
-    /// Fails where the work should stop.
+    /// Fails if the work should stop.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -110,7 +110,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Nobody listens, and nobody stops the work.
+/// Ignores all events and never stops.
 impl Default for Watch<'_> {
     fn default() -> Self {
         Self { events: &|_| (), stop: None }

@@ -1,7 +1,7 @@
 //! Renders the sample pair: `cargo run -p bp-testkit --example sample_pair -- bench-data/sample`.
 //!
-//! The pair is the project's own, so anybody may use it for anything. It is the synthetic scene "doll" at half size, with
-//! its ground truth and a calibration. The files are the same on every machine.
+//! The pair is the project's own, so anybody may use it for anything. It is the synthetic scene "doll" at half size,
+//! with its ground truth and a calibration. The files are the same on every machine.
 
 use std::{env, error::Error, fs, path::Path};
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let colours: Vec<u8> = image.pixels().iter().flatten().copied().collect();
         write_png(&folder.join(name), size, ExtendedColorType::Rgb8, &colours)?;
     }
-    // KITTI's format, which `bp evaluate` expects of 16 bits: 256 times the disparity.
+    // KITTI's format, which `bp evaluate` expects in 16-bit files: 256 times the disparity.
     let truth = scene.truth_left.values().iter().map(|disparity| (disparity * 256.0).round() as u16);
     let truth: Vec<u8> = truth.flat_map(u16::to_ne_bytes).collect();
     write_png(&folder.join("truth.png"), size, ExtendedColorType::L16, &truth)?;
@@ -41,8 +41,8 @@ fn write_png(path: &Path, size: Size, colours: ExtendedColorType, bytes: &[u8]) 
     Ok(encoder.write_image(bytes, size.width as u32, size.height as u32, colours)?)
 }
 
-/// A calibration in Middlebury's format. The scene fixes disparities only, so its cameras are ours to choose: with these
-/// the doll is half a metre tall, sits 80 cm away, and is as deep as it is round.
+/// A calibration in Middlebury's format. The scene fixes disparities only, so its cameras are ours to choose. With
+/// these, the doll is half a metre tall, sits 80 cm away, and is as deep as it looks round.
 fn calibration(size: Size) -> String {
     let Size { width, height } = size;
     let (focal, doffs, baseline, labels) = (400, 60, 160, 40);

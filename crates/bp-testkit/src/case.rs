@@ -21,7 +21,7 @@ impl Case {
     }
 }
 
-/// What a backend computed for a case.
+/// A backend's answer to a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// Labels `[height][width]`.

@@ -4,9 +4,9 @@ use bp_core::{Algorithm, Cut, MessageStart, Model, Profile, Schedule, Settings, 
 
 use crate::{Case, noise_pair};
 
-/// All cases. They cover every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few and
-/// many labels, with weak edges, and with the smoothness that strains 8 bits most; then strips of a higher image with
-/// every kind of apron.
+/// All cases. They cover every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few
+/// and many labels, with weak edges, and with the smoothness that strains 8 bits most. Strips of a higher image with
+/// every kind of apron follow.
 pub fn cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
     let small = sizes.into_iter().flat_map(|size| [1, 2, 3, 16].map(|labels| (size, labels)));
@@ -14,8 +14,8 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let every = small
         .chain(many_labels)
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
-    // Wide enough for several tiles of the widest vectors, high enough for several bands also on coarser grids, the
-    // last one short; fewer models, since the oracle is slow.
+    // Wide enough for several tiles of the widest vectors, or high enough for several bands, the last one short, on
+    // coarser grids too. Models are fewer, since the oracle is slow.
     let wide_or_high = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
@@ -76,8 +76,8 @@ fn settings(size: Size) -> Vec<Settings> {
     all
 }
 
-/// Settings for the schedule `sweep`: one and two loops, one grid and several, clipped and not, cuts on a seam and beside
-/// it.
+/// Settings for the schedule `sweep`: one and two loops, one and several grids, clipped and not, cuts on and beside a
+/// seam.
 fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
     let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
     let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });

@@ -11,7 +11,7 @@ use crate::{Answer, Case};
 /// `Debug` prints the same words as `Display`, so that a test that returns a difference fails with them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Difference {
-    /// What the device did wrong.
+    /// The fault.
     pub fault: Box<Fault>,
     /// The plan that it ran.
     pub plan: Box<Plan>,
@@ -19,7 +19,7 @@ pub struct Difference {
     pub seed: Option<u64>,
 }
 
-/// What a device can do wrong.
+/// A fault of a device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
     /// A message differs.

@@ -1,6 +1,6 @@
-//! What tests and experiments need, and users do not: a suite that every backend passes, and made-up stereo scenes.
+//! Tools for tests and experiments, not for users: a suite that every backend passes, and synthetic stereo scenes.
 //!
-//! A backend's own test opens its device and returns what [`conform`] returns:
+//! A backend's own test opens its device and returns the result of [`conform`]. This example compares one case only:
 //!
 //! ```
 //! use bp_core::Backend;
@@ -12,7 +12,7 @@
 //! # }
 //! ```
 //!
-//! The [`Oracle`] is slow and obviously right. A backend may also be compared with a device that passed the suite itself.
+//! The [`Oracle`] is slow and obviously right. A backend may also be compared with a device that passed the suite.
 
 mod case;
 mod cases;

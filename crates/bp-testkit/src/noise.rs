@@ -6,7 +6,7 @@ use bp_core::{Image, StereoPair};
 /// children of a coarse node disagree strongly; every fifth pixel matches nothing.
 ///
 /// # Panics
-/// If the size is no image's.
+/// If no image can have this size.
 #[must_use]
 pub fn noise_pair(width: usize, height: usize, seed: u64) -> StereoPair {
     let hash = |i: u64| {

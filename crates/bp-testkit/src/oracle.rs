@@ -1,5 +1,5 @@
-//! The same model computed the obvious way: in unbounded integers, with messages by their definition, and clipped only
-//! where the definition says so.
+//! The same model computed the obvious way: in wide integers, with messages by their definition, and clipped only where
+//! the definition says so.
 
 mod state;
 mod sweep;
@@ -9,8 +9,8 @@ use std::ops::Range;
 use bp_core::{DataCost, Device, Error, MessageStart, Node, Plan, Schedule, Seed, Side, Solver, StereoPair};
 use state::{Grid, State};
 
-/// A device that computes in `i64` and takes O(L^2) time for a message. It neither normalises nor clips data costs, except
-/// under [`Settings::coarse_clip`](bp_core::Settings::coarse_clip).
+/// A device that computes in `i64` and takes O(L^2) time for a message. It neither normalises nor clips data costs,
+/// except under [`Settings::coarse_clip`](bp_core::Settings::coarse_clip).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Oracle;
 
@@ -21,8 +21,8 @@ impl Device for Oracle {
 }
 
 impl State {
-    /// Runs one step that reads only messages from before it. Under `checkerboard` that equals an update in place, because
-    /// the nodes that send receive nothing in that half-step.
+    /// Runs one step that reads only messages from before it. Under `checkerboard` that equals an update in place,
+    /// because the nodes that send receive nothing in that half-step.
     fn step(&mut self, grid: usize, step: u32) {
         let before = self.grids[grid].received.clone();
         for node in self.plan.size(grid).nodes() {

@@ -6,12 +6,12 @@ use bp_core::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile
 
 use crate::{Case, noise_pair};
 
-/// The most data costs of a case, unless one row has more. The reference takes 0.1 s for them.
+/// The largest number of data costs of a case, unless one row has more. The reference takes 0.1 s for them.
 const VOLUME: usize = 60_000;
 
-/// A random case. The same seed gives the same case as long as `fastrand` does not change. Sizes lie around one and several
-/// vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, and half of the
-/// models have weak edges.
+/// A random case. The same seed gives the same case as long as `fastrand` does not change. Sizes lie around one and
+/// several vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, and
+/// half of the models have weak edges.
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
@@ -64,7 +64,7 @@ fn settings(random: &mut Rng, width: usize, height: usize) -> Settings {
         _ => random.usize(1..6) as u32,
     };
     let start = one_of(random, &MessageStart::ALL);
-    // A sweep has no other message start, and three sweeps show as much as more would.
+    // A sweep has only one message start, and more than three sweeps show nothing new.
     let sweep = schedule == Schedule::Sweep;
     Settings {
         grids: if is_cut { 1 } else { grids },

@@ -1,4 +1,4 @@
-//! The suite that every backend passes: labels and messages equal to the bit, on every kind of plan.
+//! The suite that every backend passes: bit-identical labels and messages on every kind of plan.
 
 use std::ops::ControlFlow;
 
@@ -8,7 +8,7 @@ use crate::{
     Answer, Case, Difference, Fault, cases, difference::same, noise_pair, random_case, solve, videos::compare_videos,
 };
 
-/// Bytes that a device may allocate beside its plan: scratch memory.
+/// Bytes of scratch memory that a device may allocate beyond its plan.
 const SCRATCH_BYTES: u64 = 4096;
 
 /// Runs the whole suite on the `tested` device.
@@ -65,7 +65,7 @@ fn compare_answer(reference: &dyn Device, found: Result<Answer, Error>, case: &C
     same(&solve(reference, case).map_err(failed)?, &found, case)
 }
 
-/// Every algorithm, schedule and profile with one loop, after which the traces of old messages are not yet washed out.
+/// Every algorithm, schedule and profile with one loop, so that traces of old messages are not yet washed out.
 fn short_cases() -> impl Iterator<Item = Case> {
     let pair = noise_pair(21, 17, 1);
     let schedules = Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|schedule| (a, schedule)));
@@ -77,7 +77,7 @@ fn short_cases() -> impl Iterator<Item = Case> {
     })
 }
 
-/// Checks that a driver answers as a fresh one does, after another pair and after a solve that was stopped.
+/// Checks that a driver answers like a fresh one, both after another pair and after a stopped solve.
 fn forgets(device: &dyn Device, case: &Case) -> Result<(), Difference> {
     let other = noise_pair(case.pair.size().width, case.pair.size().height, 2);
     let again = || -> Result<[Answer; 2], Fault> {

@@ -1,9 +1,9 @@
 //! Six synthetic stereo scenes with exact ground truth. Every machine renders the same bits.
 //!
-//! They replace six Middlebury scenes that need a download. They resemble those in size, range of disparity, content and
-//! difficulty, but show other things. A scene is a list of surfaces over the left image. Each surface knows which pixels it
-//! covers, its disparity there as a continuous function, and its texture. Both views show the same surfaces, so the truth
-//! is exact to single precision, even for occluded pixels.
+//! They replace six Middlebury scenes that need a download. They resemble those in size, range of disparity, content
+//! and difficulty, but show other things. A scene is a list of surfaces over the left image. Each surface knows which
+//! pixels it covers, its disparity there as a continuous function, and its texture. Both views show the same surfaces,
+//! so the truth is exact to single precision, even for occluded pixels.
 
 mod render;
 mod scenes;
@@ -31,7 +31,7 @@ pub const MAX_DISPARITY: f64 = 111.0;
 pub struct Scene {
     /// What the scene shows, one of [`NAMES`].
     pub name: &'static str,
-    /// The two views: different noise and a slightly different exposure.
+    /// The two views, with different noise and slightly different exposures.
     pub pair: StereoPair,
     /// The true disparity of each left pixel, in pixels of this scene's size. It is known everywhere.
     pub truth_left: DisparityMap,
@@ -75,7 +75,7 @@ fn centre(i: usize, divisor: usize) -> f64 {
     (i as f64 + 0.5) * divisor as f64 - 0.5
 }
 
-/// One value a pixel, from its centre in full-size coordinates, `[height][width]`.
+/// One value per pixel, from its centre in full-size coordinates, `[height][width]`.
 fn per_pixel<T>(size: Size, divisor: usize, value: impl Fn(f64, f64) -> T) -> Vec<T> {
     let pixels = 0..size.pixels();
     pixels.map(|i| value(centre(i % size.width, divisor), centre(i / size.width, divisor))).collect()
@@ -91,7 +91,7 @@ fn visible(world: &World, size: Size, divisor: usize) -> Vec<bool> {
     per_pixel(size, divisor, |x, y| world.is_shared(x, y, &columns))
 }
 
-/// The exposures of both views. They differ as much as two shots with one camera. Shrinking an image averages its noise.
+/// The exposures of both views. They differ like two shots with one camera. Shrinking an image averages its noise.
 fn exposures(index: usize, divisor: usize) -> [Exposure; 2] {
     let (gain, offset) = [(1.02, -1.0), (0.98, 1.5), (1.03, 0.5), (0.985, 0.5), (1.01, 0.5), (0.985, -1.0)][index];
     let (noise, seed) = (1.6 / divisor as f64, 2 * index as u32);

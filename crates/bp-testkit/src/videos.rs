@@ -1,4 +1,4 @@
-//! Frames of a video that start from the messages of the frame before.
+//! Videos, in which frames start from the messages of the frame before.
 
 use std::ops::ControlFlow;
 
@@ -6,14 +6,14 @@ use bp_core::{Algorithm, Cut, Device, Driver, Error, Model, Plan, Profile, Sched
 
 use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve};
 
-/// Frames of a video: each but the first starts warm.
+/// Frames per video. All but the first start warm.
 const FRAMES: u64 = 3;
 
-/// Checks that devices give the same labels and messages on videos, and that the tested one forgets them.
+/// Checks that devices give the same labels and messages on videos, and that no trace of them stays in the tested one.
 ///
 /// # Errors
-/// The first difference. The tested device must also run the schedule `checkerboard`, and `sync` with an even number of
-/// steps.
+/// The first difference. The tested device may refuse only the schedule `sweep`, if the reference does too, and `sync`
+/// with an odd number of steps.
 pub(crate) fn compare_videos(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
     plans().try_for_each(|plan| {
         let Size { width, height } = plan.image_size();
@@ -49,7 +49,7 @@ fn plans() -> impl Iterator<Item = Plan> {
     })
 }
 
-/// The answers to all frames, each but the first from a warm start.
+/// The answers to all frames. All but the first start warm.
 fn video(device: &dyn Device, plan: &Plan, frames: &[StereoPair]) -> Result<Vec<Answer>, Error> {
     let mut driver = Driver::new(device, plan.clone())?;
     let mut solve = |pair: &StereoPair| {

@@ -1,4 +1,4 @@
-//! The devices that drivers offer.
+//! The devices that the drivers provide.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::ffi::CStr;
@@ -9,10 +9,10 @@ use uuid::Uuid;
 
 use crate::memory;
 
-/// A device that a driver offers.
+/// A device that a driver provides.
 #[derive(Clone)]
 pub(crate) struct Adapter {
-    /// Its handle, valid as long as the instance.
+    /// Its handle, which is valid as long as the instance.
     pub(crate) raw: vk::PhysicalDevice,
     /// Its description for users.
     pub(crate) info: DeviceInfo,
@@ -32,7 +32,7 @@ pub(crate) struct MostBytes {
 impl Adapter {
     /// Describes a device of this instance.
     pub(crate) fn of(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Self {
-        // SAFETY: the device is one of this instance's.
+        // SAFETY: the device belongs to this instance.
         let properties = unsafe { instance.get_physical_device_properties(raw) };
         // SAFETY: the same.
         let memory = unsafe { instance.get_physical_device_memory_properties(raw) };
@@ -54,7 +54,7 @@ impl Adapter {
         Self { raw, info, properties }
     }
 
-    /// The size limits of a device that has Vulkan 1.2.
+    /// The size limits of a device that supports Vulkan 1.2.
     pub(crate) fn most_bytes(&self, instance: &ash::Instance) -> MostBytes {
         let mut allocation = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut buffer = vk::PhysicalDeviceMaintenance4Properties::default();
@@ -64,8 +64,8 @@ impl Adapter {
         if tells_buffers {
             both = both.push_next(&mut buffer);
         }
-        // SAFETY: the device is one of this instance's and has what these structures are of: the first is part of
-        // Vulkan 1.1, the second was asked for above.
+        // SAFETY: the device belongs to this instance and supports these structures: the first is part of Vulkan 1.1,
+        // and support for the second was checked above.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut both) };
         let allocation = allocation.max_memory_allocation_size;
         MostBytes {
@@ -81,18 +81,18 @@ impl Adapter {
         }
         let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
         let mut memory = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
-        // SAFETY: the device is one of this instance's and has the extension of the structure.
+        // SAFETY: the device belongs to this instance and has the extension that defines the structure.
         unsafe { instance.get_physical_device_memory_properties2(self.raw, &mut memory) };
         Some(budget.heap_budget[heap].saturating_sub(budget.heap_usage[heap]))
     }
 }
 
-/// The driver and the UUID of a device that has Vulkan 1.2.
+/// The driver and the UUID of a device that supports Vulkan 1.2.
 fn driver_and_uuid(instance: &ash::Instance, raw: vk::PhysicalDevice) -> (Option<String>, Option<String>) {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut id = vk::PhysicalDeviceIDProperties::default();
     let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id);
-    // SAFETY: the device is one of this instance's and has Vulkan 1.2, of which these structures are.
+    // SAFETY: the device belongs to this instance and supports Vulkan 1.2, which includes these structures.
     unsafe { instance.get_physical_device_properties2(raw, &mut both) };
     let version = version_text(both.properties.driver_version);
     let (name, mut told) = (text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str()));
@@ -104,7 +104,7 @@ fn driver_and_uuid(instance: &ash::Instance, raw: vk::PhysicalDevice) -> (Option
 
 /// Whether a device has an extension.
 fn has_extension(instance: &ash::Instance, device: vk::PhysicalDevice, name: &CStr) -> bool {
-    // SAFETY: the device is one of this instance's.
+    // SAFETY: the device belongs to this instance.
     let extensions = unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default();
     extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name))
 }

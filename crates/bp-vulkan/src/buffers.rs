@@ -1,4 +1,4 @@
-//! The buffers of a program and the memory they lie in: as few allocations as the device allows.
+//! The buffers of a program and their memory, in as few allocations as the device allows.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::{ptr::NonNull, slice, sync::Arc};
@@ -17,20 +17,20 @@ pub(crate) struct Buffers {
     bytes: u64,
 }
 
-/// A buffer in memory.
+/// A buffer that is bound to memory.
 struct Placed {
     raw: Owned<vk::Buffer>,
     memory: Memory,
     bytes: u64,
-    /// The host's address of it, if it is mapped.
+    /// Its address on the host, if it is mapped.
     mapped: Option<NonNull<u8>>,
 }
 
-// SAFETY: the host's view of a buffer belongs to the buffer alone, and is read and written only through references to it.
+// SAFETY: only the buffer has its mapped address, which is read and written only through references to the buffer.
 unsafe impl Send for Placed {}
 
 impl Buffers {
-    /// Makes buffers. Those mapped to the host are set to zeros, so that no page is first touched while a solve is timed.
+    /// Makes buffers. Sets mapped ones to zeros, so that no page is first touched while a solve is timed.
     pub(crate) fn new(gpu: &Arc<Gpu>, wanted: &[Buffer]) -> Result<Self, Error> {
         let buffers = wanted.iter().map(|buffer| create(gpu, buffer)).collect::<Result<_, _>>()?;
         let mut buffers = Self { buffers, blocks: Vec::new(), bytes: 0 };
@@ -43,15 +43,15 @@ impl Buffers {
     /// Allocates memory for the buffers of one kind.
     fn place(&mut self, gpu: &Arc<Gpu>, memory: Memory) -> Result<(), Error> {
         let members: Vec<_> = (0..self.buffers.len()).filter(|&i| self.buffers[i].memory == memory).collect();
-        // SAFETY: the buffers are this device's.
+        // SAFETY: the buffers belong to this device.
         let needs = |&i: &usize| unsafe { gpu.raw().get_buffer_memory_requirements(self.buffers[i].raw.raw) };
         let needs: Vec<_> = members.iter().map(needs).collect();
         for block in blocks(&needs, gpu.most_bytes.allocation) {
             let memory_block = allocate(gpu, memory, &block)?;
             for &(member, offset) in &block.members {
                 let buffer = &mut self.buffers[members[member]];
-                // SAFETY: the buffer has no memory yet, and its part of the block is of a type, size and alignment that
-                // it asked for.
+                // SAFETY: the buffer has no memory yet, and its part of the block has the type, size and alignment that
+                // it requires.
                 let bound = unsafe { gpu.raw().bind_buffer_memory(buffer.raw.raw, memory_block.raw, offset) };
                 gpu.allocated("buffers", block.bytes, bound)?;
             }
@@ -109,18 +109,18 @@ impl Buffers {
     /// No work that writes the buffer is under way.
     pub(crate) unsafe fn host(&self, buffer: usize) -> &[u8] {
         let Placed { mapped, bytes, .. } = &self.buffers[buffer];
-        // SAFETY: the pointer is to as many bytes, which were written when they were mapped and stay mapped as long as
-        // the buffer; the caller promises that nobody writes them.
+        // SAFETY: the pointer refers to this many bytes. They were written when they were mapped, and stay mapped as
+        // long as the buffer exists. The caller promises that nobody writes them.
         mapped.map_or(&[], |start| unsafe { slice::from_raw_parts(start.as_ptr(), *bytes as usize) })
     }
 
-    /// The same, for writing.
+    /// As [`Buffers::host`], for writing.
     ///
     /// # Safety
     /// No work that uses the buffer is under way.
     pub(crate) unsafe fn host_mut(&mut self, buffer: usize) -> &mut [u8] {
         let Placed { mapped, bytes, .. } = &mut self.buffers[buffer];
-        // SAFETY: as above, and the caller promises that nobody reads them.
+        // SAFETY: as in `host`, and the caller promises that nobody reads them.
         mapped.map_or(&mut [], |start| unsafe { slice::from_raw_parts_mut(start.as_ptr(), *bytes as usize) })
     }
 
@@ -137,7 +137,7 @@ fn create(gpu: &Arc<Gpu>, wanted: &Buffer) -> Result<Placed, Error> {
         Memory::Upload | Memory::Download => copied,
     };
     let info = vk::BufferCreateInfo::default().size(wanted.bytes).usage(usage);
-    // SAFETY: the device is open, and the program keeps to its limits.
+    // SAFETY: the device is open, and the program stays within its limits.
     let raw = unsafe { gpu.raw().create_buffer(&info, None) };
     let raw = Owned::new(gpu, gpu.allocated(wanted.name, wanted.bytes, raw)?);
     Ok(Placed { raw, memory: wanted.memory, bytes: wanted.bytes, mapped: None })
@@ -158,9 +158,9 @@ fn allocate(gpu: &Arc<Gpu>, memory: Memory, block: &Block) -> Result<Owned<vk::D
 #[derive(Debug, PartialEq, Eq)]
 struct Block {
     bytes: u64,
-    /// The types of memory that suit all members, one bit each.
+    /// The types of memory that all members can use, one bit each.
     types: u32,
-    /// Its buffers, by index and offset.
+    /// Its buffers: index and offset.
     members: Vec<(usize, u64)>,
 }
 

@@ -1,4 +1,4 @@
-//! Command buffers, and recording commands into them.
+//! Allocates command buffers and records commands into them.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use bp_gpu::{Command, Memory, Program};
 
 use crate::{gpu::Gpu, object::Owned, resources::Resources};
 
-/// The most bytes that a command itself can write to a buffer.
+/// The most bytes of data that a single command can carry to a buffer.
 const CARRIED_BYTES: usize = 65_536;
 
 /// Command buffers.
@@ -19,7 +19,7 @@ pub(crate) struct Commands {
 }
 
 impl Commands {
-    /// None yet.
+    /// Starts without command buffers.
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
         let flags = vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family).flags(flags);
@@ -28,15 +28,15 @@ impl Commands {
         Ok(Self { pool: Owned::new(gpu, pool), gpu: Arc::clone(gpu) })
     }
 
-    /// Makes an empty command buffer, which lives as long as the pool.
+    /// Makes an empty command buffer that lives as long as the pool.
     pub(crate) fn make(&mut self) -> Result<vk::CommandBuffer, Error> {
         let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool.raw).command_buffer_count(1);
-        // SAFETY: the pool is the device's and alive.
+        // SAFETY: the pool belongs to the device and is alive.
         let made = unsafe { self.gpu.raw().allocate_command_buffers(&info) };
         Ok(self.gpu.checked("making a command buffer", made)?[0])
     }
 
-    /// Records a command buffer of this pool again, while the device does not use it. It may then be submitted many times.
+    /// Records a command buffer of this pool, which the device must not be using. It can then be submitted many times.
     pub(crate) fn record(
         &mut self,
         commands: vk::CommandBuffer,
@@ -44,7 +44,7 @@ impl Commands {
     ) -> Result<(), Error> {
         let flags = vk::CommandBufferUsageFlags::SIMULTANEOUS_USE;
         let info = vk::CommandBufferBeginInfo::default().flags(flags);
-        // SAFETY: the command buffer is of this pool, which nobody else uses, and it is not at work.
+        // SAFETY: the command buffer belongs to this pool, which nobody else uses, and is not in use.
         let begun = unsafe { self.gpu.raw().begin_command_buffer(commands, &info) };
         self.gpu.checked("recording", begun)?;
         record(&Recorder { gpu: &self.gpu, commands });
@@ -53,8 +53,8 @@ impl Commands {
     }
 }
 
-/// A command buffer that is being recorded. Its functions rely on this, and on the resources they name: those have to exist
-/// until the commands have run for the last time. The owner of the command buffers also owns the resources.
+/// A command buffer that is being recorded. Its functions rely on this, and on the resources that they name: these must
+/// exist until the commands have run for the last time. The owner of the command buffers also owns the resources.
 pub(crate) struct Recorder<'a> {
     gpu: &'a Gpu,
     commands: vk::CommandBuffer,
@@ -98,7 +98,8 @@ impl Recorder<'_> {
         let (raw, point) = (self.gpu.raw(), vk::PipelineBindPoint::COMPUTE);
         let (pipeline, sets) = (&resources.pipelines[pipeline], &resources.sets[bind_group..=bind_group]);
         let layout = pipeline.layout.pipeline.raw;
-        // SAFETY: the set is of the pipeline's layout, and the program keeps offset and number within the limits.
+        // SAFETY: the set has the pipeline's layout, and the program keeps the offset and the number of workgroups
+        // within the limits.
         unsafe {
             raw.cmd_bind_pipeline(self.commands, point, pipeline.raw.raw);
             raw.cmd_bind_descriptor_sets(self.commands, point, layout, 0, sets, &[parameters]);
@@ -108,7 +109,7 @@ impl Recorder<'_> {
 
     /// Copies between buffers.
     pub(crate) fn copy(&self, from: vk::Buffer, to: vk::Buffer, region: vk::BufferCopy) {
-        // SAFETY: all buffers can be copied from and to, and the region is within both and does not overlap itself.
+        // SAFETY: all buffers can be copied from and to. The region lies within both and does not overlap itself.
         unsafe { self.gpu.raw().cmd_copy_buffer(self.commands, from, to, &[region]) }
     }
 
@@ -125,13 +126,13 @@ impl Recorder<'_> {
         }
         let to = resources.buffers.raw(Program::PARAMETERS);
         for (data, offset) in parameters.chunks(CARRIED_BYTES).zip((0..).step_by(CARRIED_BYTES)) {
-            // SAFETY: the buffer is as large as the parameters, which come in blocks whose size is a multiple of 4.
+            // SAFETY: the buffer is as large as the parameters, whose blocks have sizes that are multiples of 4.
             unsafe { self.gpu.raw().cmd_update_buffer(self.commands, to, offset, data) }
         }
         self.barrier();
     }
 
-    /// Lets later kernels and copies see all earlier writes, in this command buffer and in those before it.
+    /// Makes all earlier writes, in this command buffer and in those before it, visible to later kernels and copies.
     pub(crate) fn barrier(&self) {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
@@ -139,7 +140,7 @@ impl Recorder<'_> {
         self.dependency((stages, written), (stages, used));
     }
 
-    /// Lets the host see copied data after it has waited.
+    /// Makes copied data visible to the host after it has waited.
     pub(crate) fn show_host(&self) {
         let copied = (vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         self.dependency(copied, (vk::PipelineStageFlags::HOST, vk::AccessFlags::HOST_READ));
@@ -152,14 +153,14 @@ impl Recorder<'_> {
     ) {
         let barrier = [vk::MemoryBarrier::default().src_access_mask(before.1).dst_access_mask(after.1)];
         let none = vk::DependencyFlags::empty();
-        // SAFETY: the queue computes and so knows these stages.
+        // SAFETY: the queue supports compute, so it supports these stages.
         unsafe { self.gpu.raw().cmd_pipeline_barrier(self.commands, before.0, after.0, none, &barrier, &[], &[]) }
     }
 
     /// Writes a timestamp when everything before it is done.
     pub(crate) fn timestamp(&self, queries: vk::QueryPool, query: u32) {
         let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
-        // SAFETY: the pool has the query, and the queue keeps time.
+        // SAFETY: the pool contains the query, and the queue supports timestamps.
         unsafe {
             self.gpu.raw().cmd_reset_query_pool(self.commands, queries, query, 1);
             self.gpu.raw().cmd_write_timestamp(self.commands, end, queries, query);

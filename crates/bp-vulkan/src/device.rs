@@ -15,7 +15,7 @@ pub(crate) struct VulkanDevice {
 }
 
 impl VulkanDevice {
-    /// Opens a device. The error is the reason in words.
+    /// Opens a device. The error is the reason as text.
     pub(crate) fn open(instance: Instance, adapter: Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
         let gpu = Arc::new(Gpu::open(instance, adapter)?);
         let pipelines = Pipelines::new(&gpu).map_err(|error| error.to_string())?;
@@ -24,7 +24,7 @@ impl VulkanDevice {
         Ok(Self { gpu, pipelines: Mutex::new(pipelines), limits })
     }
 
-    /// Its limits, with no more memory than is free now.
+    /// Its limits, with memory limited to what is free now.
     fn limits(&self) -> Limits {
         let bytes = [self.limits.memory_bytes, limits::free_bytes(&self.gpu)];
         Limits { memory_bytes: bytes.into_iter().flatten().min(), ..self.limits.clone() }

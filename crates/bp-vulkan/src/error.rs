@@ -1,4 +1,4 @@
-//! Results of Vulkan calls, turned into errors that say who can fix them.
+//! Turns the results of Vulkan calls into errors, sorted by who can fix them.
 
 use ash::vk;
 use bp_core::Error;
@@ -23,7 +23,7 @@ pub(crate) fn not_allocated(device: &str, what: &'static str, bytes: u64, result
     failed(device, what, result)
 }
 
-/// Whether something is used up: memory, addresses to map it to, or allocations. A smaller plan may run.
+/// Whether a resource is exhausted: memory, addresses to map it to, or allocations. A smaller plan may run.
 fn is_out_of_memory(result: vk::Result) -> bool {
     [
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,

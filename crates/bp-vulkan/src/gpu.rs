@@ -1,4 +1,4 @@
-//! An open device with one queue that computes.
+//! An open device with one compute queue.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::{
@@ -30,7 +30,7 @@ pub(crate) struct Gpu {
     pub(crate) adapter: Adapter,
     /// Its types of memory.
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
-    /// The most bytes of an allocation and of a buffer.
+    /// The size limits of an allocation and of a buffer.
     pub(crate) most_bytes: MostBytes,
     /// Destroyed after the device, or never.
     instance: ManuallyDrop<Instance>,
@@ -38,13 +38,13 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// Opens a device. The error is the reason in words.
+    /// Opens a device. The error is the reason as text.
     pub(crate) fn open(instance: Instance, adapter: Adapter) -> Result<Self, String> {
         if adapter.properties.api_version < vk::API_VERSION_1_2 {
             let (name, api) = (&adapter.info.name, adapter.info.api.as_deref().unwrap_or_default());
             return Err(format!("{name} has {api} where 1.2 is needed; a newer driver may have it"));
         }
-        // SAFETY: the device is one of this instance's, here and below.
+        // SAFETY: the device belongs to this instance, here and below.
         let families = unsafe { instance.raw().get_physical_device_queue_family_properties(adapter.raw) };
         let family = best_family(&families).ok_or_else(|| format!("{} does not compute", adapter.info.name))?;
         let raw = make(&instance, &adapter, family)?;
@@ -81,7 +81,7 @@ impl Gpu {
     /// Submits work to the queue, which all solvers of the device share.
     pub(crate) fn submit(&self, work: &vk::SubmitInfo<'_>) -> Result<(), Error> {
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        // SAFETY: the lock keeps others from the queue; who calls keeps what the work uses until it is done.
+        // SAFETY: the lock gives exclusive access to the queue. The caller keeps what the work uses until it is done.
         let submitted = unsafe { self.raw.queue_submit(*queue, std::slice::from_ref(work), vk::Fence::null()) };
         self.checked("submitting work", submitted)
     }
@@ -94,7 +94,7 @@ impl Gpu {
         })
     }
 
-    /// The same for a call that allocates.
+    /// As [`Gpu::checked`], for a call that allocates.
     pub(crate) fn allocated<T>(&self, what: &'static str, bytes: u64, answer: VkResult<T>) -> Result<T, Error> {
         answer.map_err(|result| {
             self.abandon_if_lost(result);
@@ -108,7 +108,7 @@ impl Gpu {
         }
     }
 
-    /// Abandons the device: from now on nothing of it is destroyed.
+    /// Abandons the device: from now on none of its objects are destroyed.
     pub(crate) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
     }
@@ -130,13 +130,13 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // An abandoned device may still be at work, and destroying it would wait for that: it and its instance stay
-        // until the process ends.
+        // An abandoned device may still be working, and destroying it would wait for that. So the device and its
+        // instance stay until the process ends.
         if self.is_abandoned() {
             return;
         }
-        // SAFETY: every object of the device kept it open and is gone, no work is under way, because who submits waits;
-        // the instance is dropped once, after its only device.
+        // SAFETY: every object of the device kept it open, so all of them are gone. No work is under way, because
+        // whoever submits work waits for it. The instance is dropped once, after its only device.
         unsafe {
             self.raw.destroy_device(None);
             ManuallyDrop::drop(&mut self.instance);
@@ -144,18 +144,18 @@ impl Drop for Gpu {
     }
 }
 
-/// Makes a logical device with one queue of this family; the device has Vulkan 1.2.
+/// Makes a logical device with one queue of this family. The device must support Vulkan 1.2.
 fn make(instance: &Instance, adapter: &Adapter, family: u32) -> Result<ash::Device, String> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
     let mut features = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
     let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features);
-    // SAFETY: the device is this instance's and has the family; timeline semaphores are part of Vulkan 1.2.
+    // SAFETY: the device belongs to this instance and has the family. Timeline semaphores are part of Vulkan 1.2.
     let raw = unsafe { instance.raw().create_device(adapter.raw, &info, None) };
     raw.map_err(|error| format!("{} cannot be opened: {error}", adapter.info.name))
 }
 
-/// The queue family to compute on: preferably one with a clock, and then one without graphics. Work on such a queue does not
-/// block the desktop, and drivers allow it more time before they report a hang.
+/// The queue family to compute on: preferably one with a clock and, among those, one without graphics. Work on a queue
+/// without graphics does not block the desktop, and drivers allow it more time before they report a hang.
 fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     let computes = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
     let draws = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);

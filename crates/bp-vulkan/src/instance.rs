@@ -16,7 +16,7 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    /// Connects to the drivers. The error is the reason in words.
+    /// Connects to the drivers. The error is the reason as text.
     pub(crate) fn new() -> Result<Self, String> {
         let entry = entry()?;
         // SAFETY: the loader allows the call at any time.
@@ -40,7 +40,7 @@ impl Instance {
         &self.raw
     }
 
-    /// Lists the devices, the probably fastest kind first, and within a kind in the order of their drivers.
+    /// Lists the devices, starting with the probably fastest kind. Devices of a kind are in the order of their drivers.
     pub(crate) fn adapters(&self) -> Result<Vec<Adapter>, String> {
         // SAFETY: the instance is alive.
         let devices = unsafe { self.raw.enumerate_physical_devices() };
@@ -57,7 +57,7 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: whatever was made from the instance is gone: who makes something keeps the instance longer.
+        // SAFETY: everything made from the instance is gone, because its owners keep the instance longer.
         unsafe {
             if let Some((listeners, messenger)) = self.messenger.take() {
                 listeners.destroy_debug_utils_messenger(messenger, None);
@@ -68,7 +68,7 @@ impl Drop for Instance {
 }
 
 fn create(entry: &Entry, validated: bool) -> Result<ash::Instance, String> {
-    // The highest version whose functions are asked for; what a device has is looked at before it is used.
+    // The highest version whose functions are used. Before each use, the code checks what the device supports.
     let application =
         vk::ApplicationInfo::default().application_name(c"belief-propagation-stereo").api_version(vk::API_VERSION_1_3);
     let mut info = vk::InstanceCreateInfo::default().application_info(&application);
@@ -78,7 +78,7 @@ fn create(entry: &Entry, validated: bool) -> Result<ash::Instance, String> {
     if validated {
         info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).push_next(&mut features);
     }
-    // SAFETY: all that the structure points to lives until the end of the function.
+    // SAFETY: everything that the structure points to lives until the end of the function.
     unsafe { entry.create_instance(&info, None) }.map_err(|error| match error {
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => missing::driver(),
         _ => format!("the Vulkan loader makes no instance: {error}"),

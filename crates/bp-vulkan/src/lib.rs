@@ -1,7 +1,7 @@
 //! The GPU backend through Vulkan, with raw ash. It allocates, compiles, records and submits the programs of `bp_gpu`.
 //!
 //! * `loader` finds the Vulkan library, `instance` connects to the drivers, and `adapter` describes their devices.
-//! * `gpu` is an open device with its queue, and `device` prepares plans on it. `limits` and `memory` say what it allows.
+//! * `gpu` is an open device with its queue, and `device` prepares plans on it. `limits` and `memory` describe it.
 //! * A prepared program is a `queue` of work over its `resources`: `buffers`, bind groups and `pipelines`, which naga
 //!   translates in `spirv`.
 //! * `commands` records, `timeline` submits and waits, and `timer` reads the device's clock.

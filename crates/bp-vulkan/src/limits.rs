@@ -23,7 +23,7 @@ pub(crate) fn of(gpu: &Gpu) -> Limits {
     }
 }
 
-/// The bytes of device memory that are free now, if its driver reports them.
+/// The bytes of device memory that are free now, if the driver reports them.
 pub(crate) fn free_bytes(gpu: &Gpu) -> Option<u64> {
     gpu.adapter.free_bytes(gpu.instance().raw(), device_heap(&gpu.memory)?)
 }

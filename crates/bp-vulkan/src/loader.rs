@@ -6,9 +6,9 @@ use std::sync::LazyLock;
 use ash::Entry;
 use bp_gpu::missing;
 
-/// The loader. It is never unloaded, because drivers may leave code behind that threads run when they end.
+/// The loader. It is never unloaded, because drivers may leave behind code that threads run when they exit.
 static ENTRY: LazyLock<Result<Entry, String>> = LazyLock::new(|| {
-    // SAFETY: a Vulkan loader may be loaded at any time; nothing else is loaded under its name.
+    // SAFETY: a Vulkan loader may be loaded at any time, and nothing else is loaded under its name.
     unsafe { Entry::load() }.map_err(|error| format!("{} ({error})", missing::loader()))
 });
 

@@ -9,7 +9,7 @@ pub(crate) fn device_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option
     Some(memory.memory_types[kind as usize].heap_index as usize)
 }
 
-/// The type of memory for such buffers, among those allowed. It is the first one with all desired properties, else the first
+/// The type of memory for such buffers, among those allowed: the first with all desired properties, otherwise the first
 /// with the required ones. Drivers list the fastest types first.
 pub(crate) fn memory_type(
     properties: &vk::PhysicalDeviceMemoryProperties,

@@ -1,4 +1,4 @@
-//! Vulkan objects with an owner. Dropping the owner destroys the object, so errors leak nothing.
+//! Vulkan objects with an owner. Dropping the owner destroys the object, so nothing leaks on errors.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -23,10 +23,10 @@ impl<T: Destroy> Owned<T> {
 
 impl<T: Destroy> Drop for Owned<T> {
     fn drop(&mut self) {
-        // A device that was lost or does not answer may still use the object, and waiting for it could take for ever:
+        // A device that was lost or does not answer may still use the object, and waiting for it could take forever. So
         // the object stays until the process ends.
         if !self.gpu.is_abandoned() {
-            // SAFETY: the device made the object and is open; the handle has no other owner; and who submits work waits
+            // SAFETY: the device made the object and is open. The handle has no other owner. Whoever submits work waits
             // for it before dropping what it uses, or abandons the device.
             unsafe { self.raw.destroy(self.gpu.raw()) }
         }
@@ -38,7 +38,7 @@ pub(crate) trait Destroy: Copy {
     /// Destroys the object.
     ///
     /// # Safety
-    /// The device made it, nothing uses it any more, and it is destroyed once.
+    /// The device must have made it, nothing may use it any more, and it must be destroyed only once.
     unsafe fn destroy(self, device: &ash::Device);
 }
 
@@ -46,7 +46,7 @@ macro_rules! destroyed_by {
     ($($handle:ty: $function:ident,)*) => {$(
         impl Destroy for $handle {
             unsafe fn destroy(self, device: &ash::Device) {
-                // SAFETY: the caller promises what the function demands.
+                // SAFETY: the caller guarantees what the function requires.
                 unsafe { device.$function(self, None) }
             }
         }

@@ -1,4 +1,4 @@
-//! Compiled kernels. They are kept as long as their device, and between runs if the driver supports that.
+//! Compiled kernels. They live as long as their device, and are kept between runs if the driver supports that.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::{
@@ -61,13 +61,13 @@ impl Pipelines {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Error> {
         let stored = cache::load(&cache_key(gpu)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&stored);
-        // SAFETY: the data is empty or what this driver once stored for this device, whole.
+        // SAFETY: the data is empty, or it is the complete data that this driver once returned for this device.
         let cache = gpu.checked("making a pipeline cache", unsafe { gpu.raw().create_pipeline_cache(&info, None) })?;
         let cache = Owned::new(gpu, cache);
         Ok(Self { gpu: Arc::clone(gpu), cache, stored, layouts: HashMap::new(), compiled: HashMap::new() })
     }
 
-    /// Gets these kernels, and the time spent on compiling the missing ones.
+    /// Returns these kernels, and the time spent on compiling the missing ones.
     pub(crate) fn get(&mut self, wanted: &[Pipeline]) -> Result<(Vec<Arc<Compiled>>, Duration), Error> {
         let start = Instant::now();
         let before = self.compiled.len();
@@ -87,7 +87,7 @@ impl Pipelines {
         Ok(compiled)
     }
 
-    /// What a kernel is given.
+    /// The layout of a kernel's bind groups.
     pub(crate) fn layout(&mut self, kernel: Kernel) -> Result<Arc<Layout>, Error> {
         if let Some(layout) = self.layouts.get(&kernel) {
             return Ok(Arc::clone(layout));
@@ -99,7 +99,7 @@ impl Pipelines {
 
     /// Stores the driver's cache for the next run, unless it is unchanged.
     pub(crate) fn store(&mut self) {
-        // SAFETY: the cache is alive, and whoever compiles has it alone.
+        // SAFETY: the cache is alive, and whoever compiles has exclusive access to it.
         let data = unsafe { self.gpu.raw().get_pipeline_cache_data(self.cache.raw) }.unwrap_or_default();
         if data != self.stored {
             cache::store(&cache_key(&self.gpu), &data);
@@ -128,11 +128,11 @@ fn lay_out(gpu: &Arc<Gpu>, kernel: Kernel) -> Result<Layout, Error> {
     let all = std::iter::once(vk::DescriptorType::STORAGE_BUFFER_DYNAMIC).chain(buffers);
     let bindings: Vec<_> = (0_u32..).zip(all).map(binding).collect();
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-    // SAFETY: the device is open; the program keeps to its number of bindings.
+    // SAFETY: the device is open, and the program stays within its limit of bindings.
     let set = unsafe { gpu.raw().create_descriptor_set_layout(&info, None) };
     let set = Owned::new(gpu, gpu.checked("making a descriptor set layout", set)?);
     let info = vk::PipelineLayoutCreateInfo::default().set_layouts(std::slice::from_ref(&set.raw));
-    // SAFETY: the set layout is the device's and alive.
+    // SAFETY: the set layout belongs to the device and is alive.
     let pipeline = unsafe { gpu.raw().create_pipeline_layout(&info, None) };
     let pipeline = Owned::new(gpu, gpu.checked("making a pipeline layout", pipeline)?);
     Ok(Layout { set, pipeline })
@@ -147,15 +147,15 @@ fn compile(
     let device = || gpu.name().to_owned();
     let words = spirv::translate(wanted).map_err(|reason| Error::Device { device: device(), reason })?;
     let info = vk::ShaderModuleCreateInfo::default().code(&words);
-    // SAFETY: the words are a module that naga validated.
+    // SAFETY: naga validated the module from which it wrote these words.
     let module = unsafe { gpu.raw().create_shader_module(&info, None) };
     let module = Owned::new(gpu, gpu.checked("loading a kernel", module)?);
     let name = CString::new(wanted.kernel.name()).unwrap_or_default();
     let stage = vk::PipelineShaderStageCreateInfo::default();
     let stage = stage.stage(vk::ShaderStageFlags::COMPUTE).module(module.raw).name(&name);
     let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
-    // SAFETY: the layout has what the module declares, both are the device's and alive, and whoever compiles has the
-    // cache alone.
+    // SAFETY: the layout matches what the module declares. Both belong to the device and are alive. Whoever compiles
+    // has exclusive access to the cache.
     let made = unsafe { gpu.raw().create_compute_pipelines(cache, &[info], None) };
     let made = made.map_err(|(_, result)| result);
     let pipelines = gpu.checked("compiling a kernel", made)?;

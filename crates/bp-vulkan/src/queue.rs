@@ -22,15 +22,15 @@ use crate::{
 
 /// A prepared program.
 pub(crate) struct VulkanQueue {
-    /// The first field, because it is dropped first: that waits for work that uses all the others.
+    /// The first field is dropped first. Its drop waits for work that uses all other fields.
     timeline: Timeline,
     /// The command buffer of every segment.
     segments: Vec<vk::CommandBuffer>,
-    /// A command buffer for rare work, which is recorded and run at once.
+    /// A command buffer for rare work, which is recorded and run immediately.
     scratch: vk::CommandBuffer,
-    /// Command buffers that are appended but not submitted.
+    /// Command buffers appended but not yet submitted.
     pending: Vec<vk::CommandBuffer>,
-    /// Work up to the last [`Queue::submit`].
+    /// The number of pieces of work submitted up to the last [`Queue::submit`].
     last_submit: u64,
     timer: Option<Timer>,
     commands: Commands,
@@ -77,7 +77,7 @@ impl VulkanQueue {
         self.run(|recorder, resources| recorder.start(resources, &program.parameters))
     }
 
-    /// Runs one workgroup of every pipeline that has never run. Returns whether there was one.
+    /// Runs one workgroup of every pipeline that has never run. Returns whether there was such a pipeline.
     fn warm_up(&mut self, program: &Program) -> Result<bool, Error> {
         let before = Instant::now();
         let mut any = false;
@@ -97,7 +97,7 @@ impl VulkanQueue {
         Ok(any)
     }
 
-    /// Records commands and runs them at once.
+    /// Records commands and runs them immediately.
     fn run(&mut self, record: impl FnOnce(&Recorder<'_>, &Resources)) -> Result<(), Error> {
         self.timeline.wait_for_all()?;
         self.commands.record(self.scratch, |recorder| record(recorder, &self.resources))?;
@@ -106,7 +106,7 @@ impl VulkanQueue {
     }
 
     fn push(&mut self, commands: vk::CommandBuffer) -> Result<(), Error> {
-        // The list never grows, so that nothing is allocated.
+        // The list never grows, so it allocates nothing.
         if self.pending.len() == self.pending.capacity() {
             self.flush()?;
         }
@@ -178,7 +178,7 @@ impl Queue for VulkanQueue {
             recorder.copy(resources.buffers.raw(buffer), copy.raw(0), region);
             recorder.show_host();
         })?;
-        // SAFETY: the copy was waited for.
+        // SAFETY: `run` waited for the copy.
         Ok(unsafe { copy.host(0) }.to_vec())
     }
 

@@ -29,7 +29,7 @@ pub(crate) struct Resources {
 }
 
 impl Resources {
-    /// Allocates first, because that fails early, then compiles the missing kernels. Also returns the time spent on that.
+    /// Allocates first, to fail early, then compiles the missing kernels. Also returns the time spent on compiling.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         pipelines: &Mutex<Pipelines>,
@@ -68,11 +68,11 @@ fn make_sets(gpu: &Gpu, pool: vk::DescriptorPool, layouts: &[Arc<Layout>]) -> Re
     }
     let layouts: Vec<_> = layouts.iter().map(|layout| layout.set.raw).collect();
     let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-    // SAFETY: pool and layouts are the device's, and the pool has room for the sets of these layouts.
+    // SAFETY: the pool and the layouts belong to the device, and the pool has room for the sets of these layouts.
     gpu.checked("making descriptor sets", unsafe { gpu.raw().allocate_descriptor_sets(&info) })
 }
 
-/// Points a set to one block of the parameters and to the buffers of a bind group.
+/// Binds one block of the parameters and the buffers of a bind group to a set.
 fn bind(gpu: &Gpu, buffers: &Buffers, group: &BindGroup, set: vk::DescriptorSet) {
     let whole =
         |&buffer: &usize| vk::DescriptorBufferInfo { buffer: buffers.raw(buffer), offset: 0, range: vk::WHOLE_SIZE };
@@ -81,9 +81,9 @@ fn bind(gpu: &Gpu, buffers: &Buffers, group: &BindGroup, set: vk::DescriptorSet)
     let write = vk::WriteDescriptorSet::default().dst_set(set);
     let writes = [
         write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER_DYNAMIC).buffer_info(std::slice::from_ref(&block)),
-        // Goes on from binding to binding, since all have one descriptor of the same kind.
+        // Continues from binding to binding, because each has one descriptor of the same kind.
         write.dst_binding(1).descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(&others),
     ];
-    // SAFETY: the set has as many bindings of these kinds, and no work uses it yet.
+    // SAFETY: the set has this many bindings of these kinds, and no work uses it yet.
     unsafe { gpu.raw().update_descriptor_sets(&writes, &[]) }
 }

@@ -1,4 +1,4 @@
-//! Translation of WGSL to SPIR-V, by naga.
+//! Translates WGSL to SPIR-V with naga.
 
 use std::fmt;
 
@@ -36,14 +36,14 @@ fn describe(error: impl fmt::Display) -> String {
     error.to_string()
 }
 
-/// Options for plain code, without checks that the kernels do not need: their loops end, and their indices stay within the
+/// Options for plain code without checks. The kernels need none: their loops end, and their indices stay within the
 /// buffers. Variables start as zeros, because some kernels rely on it.
 fn options() -> spv::Options<'static> {
     let unchecked = BoundsCheckPolicy::Unchecked;
     spv::Options {
         lang_version: (1, 3),
         flags: spv::WriterFlags::empty(),
-        // What every device can do: naga spells out what it would else use special instructions for.
+        // Every device supports this. naga then emits plain code instead of special instructions.
         capabilities: Some([Capability::Shader].into_iter().collect()),
         bounds_check_policies: BoundsCheckPolicies {
             index: unchecked,
@@ -65,7 +65,7 @@ mod tests {
 
     use super::*;
 
-    /// Every pipeline that plans of all profiles, schedules and algorithms ask for.
+    /// Every pipeline that plans of all profiles, schedules and algorithms need.
     fn pipelines() -> HashSet<Pipeline> {
         let size = Size { width: 90, height: 70 };
         let limits = Limits::roomy();
@@ -75,7 +75,7 @@ mod tests {
         plans.flat_map(|plan| Program::new(&plan.unwrap(), &limits).unwrap().pipelines).collect()
     }
 
-    /// By the Khronos validator (Debian: spirv-tools), where it is installed.
+    /// Uses the Khronos validator (Debian: spirv-tools), if it is installed.
     #[test]
     fn all_kernels_are_valid_spirv() {
         for pipeline in pipelines() {

@@ -1,4 +1,4 @@
-//! Submitted work, and waiting for it.
+//! Submits work and waits for it.
 #![expect(unsafe_code, reason = "Vulkan is a C interface")]
 
 use std::sync::Arc;
@@ -51,10 +51,10 @@ impl Timeline {
         let info = vk::SemaphoreWaitInfo::default();
         let (semaphores, values) = ([self.semaphore.raw], [done]);
         let info = info.semaphores(&semaphores).values(&values);
-        // SAFETY: the semaphore is the device's and alive.
+        // SAFETY: the semaphore belongs to the device and is alive.
         let waited = unsafe { self.gpu.raw().wait_semaphores(&info, PATIENCE.as_nanos() as u64) };
         if waited.is_err() {
-            // Whatever the reason, the work may still be under way.
+            // For whatever reason it failed, the work may still be under way.
             self.gpu.abandon();
         }
         self.gpu.checked("waiting for its work", waited)?;
@@ -72,7 +72,8 @@ impl Timeline {
 
 impl Drop for Timeline {
     fn drop(&mut self) {
-        // What the work uses is destroyed next. If waiting fails, the device is given up and nothing is destroyed.
+        // The resources that the work uses are destroyed next. If waiting fails, it abandons the device, so nothing is
+        // destroyed.
         _ = self.wait_for_all();
     }
 }

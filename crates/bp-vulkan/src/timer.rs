@@ -61,7 +61,7 @@ impl Timer {
             return Ok(());
         }
         let flags = vk::QueryResultFlags::TYPE_64;
-        // SAFETY: the pool has as many queries, each of which answers with 64 bits.
+        // SAFETY: the pool has this many queries, each of which returns 64 bits.
         let read = unsafe { self.gpu.raw().get_query_pool_results(self.queries.raw, 0, ticks, flags) };
         self.gpu.checked("reading the device's clock", read)?;
         let (bits, period) = (self.gpu.timestamp_bits, self.gpu.adapter.properties.limits.timestamp_period);
@@ -77,7 +77,7 @@ impl Timer {
 
 /// The time between two readings of a clock with this many bits and a tick of `period` nanoseconds.
 fn between(start: u64, end: u64, bits: u32, period: f32) -> Duration {
-    // Bits beyond are 0 by the specification; a clock that ran over in between still gives the right difference.
+    // The other bits are 0 by the specification. If the clock wrapped around once, the difference is still right.
     let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.min(64)));
     Duration::from_nanos((ticks as f64 * f64::from(period)) as u64)
 }

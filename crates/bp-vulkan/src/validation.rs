@@ -1,7 +1,7 @@
 //! The Khronos validation layer, for tests. It checks that every call and every access follows the rules of Vulkan.
 //!
 //! `BP_VULKAN_VALIDATION=1` in the environment, or [`turn_on`], loads it for all devices opened from then on. Its messages
-//! are counted, and the next call that waits for the device fails.
+//! are counted. After a message, the next call that waits for the device fails.
 #![expect(unsafe_code, reason = "the layer calls back through a C interface")]
 
 use std::{
@@ -20,7 +20,7 @@ pub(crate) const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 /// The extensions of the layer: the first delivers its messages, the second configures its checks.
 pub(crate) const EXTENSIONS: [&CStr; 2] = [ext::debug_utils::NAME, ext::validation_features::NAME];
 
-/// Checks besides the default ones.
+/// Checks in addition to the default ones.
 pub(crate) const EXTRAS: [vk::ValidationFeatureEnableEXT; 1] =
     [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
 
@@ -31,9 +31,9 @@ static MESSAGES: Mutex<Messages> = Mutex::new(Messages { count: 0, first: None }
 /// The messages of the layer in this process.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Messages {
-    /// How many warnings and errors there were.
+    /// The number of warnings and errors.
     pub count: usize,
-    /// The first of them.
+    /// The first message.
     pub first: Option<String>,
 }
 
@@ -66,7 +66,7 @@ fn has_layer(entry: &Entry) -> bool {
     layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER))
 }
 
-/// The description of a listener to the layer.
+/// Describes the callback that receives the layer's messages.
 pub(crate) fn listener() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
@@ -74,14 +74,14 @@ pub(crate) fn listener() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
         .pfn_user_callback(Some(keep))
 }
 
-/// Keeps a message.
+/// Records a message.
 unsafe extern "system" fn keep(
     _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _kind: vk::DebugUtilsMessageTypeFlagsEXT,
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     _user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer passes a valid structure, whose message is null or ends in a zero.
+    // SAFETY: the layer passes a valid structure, whose message is null or ends in a zero byte.
     let message = unsafe { data.as_ref().and_then(|data| data.message_as_c_str()) };
     let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
     messages.count += 1;

@@ -1,4 +1,4 @@
-//! The Vulkan backend on the first device there is: skipped where there is none, unless `BP_REQUIRE_GPU` is set.
+//! Tests the Vulkan backend on the first device. Without one, tests are skipped, unless `BP_REQUIRE_GPU` is set.
 
 use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
@@ -44,7 +44,7 @@ fn a_device_that_is_not_there_is_refused() {
     assert!(matches!(&error, Error::Unavailable { backend: "vulkan", device: 99, .. }), "{error}");
 }
 
-/// Runs itself again where no driver can be found.
+/// Runs itself again in an environment without a driver.
 #[test]
 fn without_a_driver_there_is_a_reason() {
     const NOWHERE: &str = "/nonexistent/icd.json";

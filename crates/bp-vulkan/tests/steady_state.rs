@@ -1,4 +1,4 @@
-//! A prepared driver matches pair after pair without allocating on the host. A driver's own memory is not counted.
+//! A prepared `Driver` matches pair after pair without allocating on the host. Memory of the GPU driver is not counted.
 
 use std::alloc::System;
 
@@ -16,7 +16,7 @@ fn matching_allocates_nothing() -> Result<(), Error> {
         eprintln!("skipped: there is no device");
         return Ok(());
     }
-    // One that submits once a solve, and one that does so after every step, on strips.
+    // One that submits once per solve, and one that submits after every step, on strips.
     let devices = [
         Vulkan.open(0)?,
         Vulkan.open_with(0, |limits| (limits.binding_bytes, limits.dispatch_entries) = (17_000, 1 << 10))?,

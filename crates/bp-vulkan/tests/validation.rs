@@ -1,4 +1,4 @@
-//! Plans under the Khronos validation layer, synchronisation included: it has nothing to say.
+//! Runs plans under the Khronos validation layer, including its synchronisation checks. It must report nothing.
 
 use bp_core::{Algorithm, Backend, Model, Plan, Profile, Schedule};
 use bp_testkit::{Case, noise_pair, solve};
@@ -17,7 +17,7 @@ fn the_validation_layer_has_nothing_to_say() {
         return;
     }
     let device = Vulkan.open(0).unwrap();
-    // One that cuts images into strips.
+    // A device with small buffers, which cuts images into strips.
     let small = Vulkan.open_with(0, |limits| limits.binding_bytes = 17_000).unwrap();
     let pair = noise_pair(21, 97, 5);
     for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {

@@ -57,7 +57,7 @@ pub(crate) fn clear(encoder: &mut CommandEncoder, program: &Program, buffers: &[
     });
 }
 
-/// Writes a whole buffer of [`Memory::Upload`] after `last`, the last submission that reads it. Call it under
+/// Writes a whole buffer of [`Memory::Upload`] after `last`, the last submission that reads it. Call this under
 /// [`Gpu::guard`].
 pub(crate) fn write(gpu: &Gpu, buffer: &Buffer, last: &SubmissionIndex, bytes: &[u8]) -> Result<(), Error> {
     buffer.map_async(MapMode::Write, .., |_| ());
@@ -68,8 +68,7 @@ pub(crate) fn write(gpu: &Gpu, buffer: &Buffer, last: &SubmissionIndex, bytes: &
     Ok(())
 }
 
-/// Reads a whole buffer that can be mapped, after `last`, the last submission that writes it. Call it under
-/// [`Gpu::guard`].
+/// Reads a whole mappable buffer after `last`, the last submission that writes it. Call this under [`Gpu::guard`].
 pub(crate) fn read<T>(
     gpu: &Gpu,
     buffer: &Buffer,

@@ -10,7 +10,7 @@ use wgpu::{
 
 use crate::{buffers, gpu::Gpu};
 
-/// Writes the device's time at marks.
+/// Records the device's time at marks.
 pub(crate) struct Clock {
     queries: QuerySet,
     /// The buffer that queries are resolved to. wgpu does not allow mapping it.
@@ -23,7 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// The features that a device needs for it.
+    /// The device features that it needs.
     pub(crate) const FEATURES: Features = Features::TIMESTAMP_QUERY.union(Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
     /// Makes a clock for this many marks, if the device has one.
@@ -46,13 +46,13 @@ impl Clock {
         })
     }
 
-    /// Forgets all marks.
+    /// Discards all marks.
     pub(crate) fn reset(&mut self) {
         self.marks = 0;
         self.times.clear();
     }
 
-    /// Makes a mark, if there is room for it.
+    /// Adds a mark, if there is room for it.
     pub(crate) fn mark(&mut self, encoder: &mut CommandEncoder) {
         if self.marks < self.queries.count() {
             encoder.write_timestamp(&self.queries, self.marks);
@@ -60,7 +60,7 @@ impl Clock {
         }
     }
 
-    /// Makes the marks readable.
+    /// Copies the marks to a buffer that the host can read.
     pub(crate) fn resolve(&self, encoder: &mut CommandEncoder) {
         if self.marks > 0 {
             encoder.resolve_query_set(&self.queries, 0..self.marks, &self.resolved, 0);
@@ -89,8 +89,8 @@ impl Clock {
     }
 }
 
-/// The times between readings of a clock with a tick of `period` nanoseconds. None if the clock wrapped around: wgpu does not
-/// say at which number it does.
+/// The times between readings of a clock with a tick of `period` nanoseconds. Empty if the clock wrapped around,
+/// because wgpu does not report at which value it does.
 fn between(ticks: impl Iterator<Item = u64> + Clone, period: f64) -> impl Iterator<Item = Duration> {
     let kept = if ticks.clone().is_sorted() { usize::MAX } else { 0 };
     let pairs = ticks.clone().zip(ticks.skip(1)).take(kept);

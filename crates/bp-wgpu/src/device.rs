@@ -17,13 +17,13 @@ pub(crate) struct WgpuDevice {
 }
 
 impl WgpuDevice {
-    /// Opens an adapter with all its limits, changed by `change`. The error is the reason in words.
+    /// Opens an adapter with all its limits, modified by `change`. The error is the reason as text.
     pub(crate) fn open(adapter: &Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
         let descriptor = DeviceDescriptor {
             label: None,
             required_features: adapter.features() & (Clock::FEATURES | Features::PIPELINE_CACHE),
             required_limits: adapter.limits(),
-            // A few large buffers: blocks to take small ones from would only be memory unused.
+            // We allocate a few large buffers. Blocks to suballocate from would only waste memory.
             memory_hints: MemoryHints::MemoryUsage,
             ..DeviceDescriptor::default()
         };
@@ -36,7 +36,7 @@ impl WgpuDevice {
         Ok(Self { gpu, adapter: adapter.clone(), limits, pipelines })
     }
 
-    /// Its limits, with no more memory than is free now. Drivers allow larger allocations, and then swap or end the program.
+    /// Its limits, with memory limited to what is free now. Drivers allow more, but then swap or end the program.
     fn limits(&self) -> Limits {
         let bytes = [self.limits.memory_bytes, vulkan::free_bytes(&self.adapter)];
         Limits { memory_bytes: bytes.into_iter().flatten().min(), ..self.limits.clone() }
@@ -68,7 +68,7 @@ impl Device for WgpuDevice {
     }
 
     fn planned_bytes(&self, plan: &Plan) -> u64 {
-        // What is uploaded lies in host memory once more; see `WgpuQueue`.
+        // Host memory holds a second copy of the upload buffer; see `WgpuQueue`.
         let upload = Program::new(plan, &self.limits).map_or(0, |program| program.buffers[Program::UPLOAD].bytes);
         Program::planned_bytes(plan, &self.limits).saturating_add(upload)
     }

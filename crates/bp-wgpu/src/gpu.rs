@@ -24,7 +24,7 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// Listens to errors that wgpu reports outside of calls.
+    /// Takes an open device, and registers callbacks for errors that wgpu reports outside of calls.
     pub(crate) fn new(name: String, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let end = Arc::new(OnceLock::new());
         let (lost, lost_name) = (Arc::clone(&end), name.clone());
@@ -38,19 +38,18 @@ impl Gpu {
         Self { name, device, queue, end }
     }
 
-    /// Does `work` and returns its errors. `bytes` is what the work allocates, or has allocated before.
+    /// Runs `work` and returns its errors. `bytes` is the memory that the work allocates or has allocated before.
     pub(crate) fn guard<T>(&self, bytes: u64, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         self.alive()?;
         let filters = [ErrorFilter::Validation, ErrorFilter::Internal, ErrorFilter::OutOfMemory];
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
-        // wgpu panics where it notices during a wait that the device is lost. Whatever it panics for, it may have left
-        // something half done.
+        // wgpu panics if it notices during a wait that the device is lost. Any panic may leave its state inconsistent.
         let result = catch_unwind(AssertUnwindSafe(work));
         let result = result.unwrap_or_else(|panic| Err(self.ended(self.lost(message(panic.as_ref())))));
-        // Lack of memory is asked for first: what could not be allocated is reported as invalid wherever it is used.
+        // Check for lack of memory first: wgpu reports a buffer that it could not allocate as invalid at every use.
         let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
         let error = errors.fold(None, Option::or);
-        // wgpu also takes a device for lost that lacks memory.
+        // wgpu also considers a device lost if it lacks memory.
         if let Some(wgpu::Error::OutOfMemory { .. }) = error {
             return Err(Error::OutOfMemory { what: "buffers on the device", needed: bytes, available: None });
         }
@@ -61,18 +60,18 @@ impl Gpu {
         }
     }
 
-    /// Waits until a submission is done. Call it under [`Gpu::guard`].
+    /// Waits until a submission is done. Call this under [`Gpu::guard`].
     pub(crate) fn wait(&self, submission: &SubmissionIndex) -> Result<(), Error> {
         self.wait_for(Some(submission.clone()))
     }
 
-    /// The same; without a submission, waits for all.
+    /// As [`Gpu::wait`]; `None` waits for all submissions.
     fn wait_for(&self, submission_index: Option<SubmissionIndex>) -> Result<(), Error> {
         let wait = PollType::Wait { submission_index, timeout: Some(PATIENCE) };
         let end = match self.device.poll(wait) {
             Ok(_) => return Ok(()),
             Err(PollError::Timeout) => Error::Timeout { device: self.name.clone(), seconds: PATIENCE.as_secs() },
-            // The index of a submission that a lost device did not take.
+            // The index belongs to a submission that a lost device did not accept.
             Err(error) => self.lost(error.to_string()),
         };
         Err(self.ended(end))
@@ -99,8 +98,8 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // With its last handle, wgpu waits for the device without end. One that does not answer stays until the process
-        // ends.
+        // Dropping the last handle makes wgpu wait for the device without a time limit. So a device that does not
+        // answer stays until the process ends.
         if self.guard(0, || self.wait_for(None)).is_err() {
             mem::forget((self.device.clone(), self.queue.clone()));
         }

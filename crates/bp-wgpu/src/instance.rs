@@ -9,9 +9,9 @@ use crate::vulkan;
 /// The APIs through which wgpu may reach devices.
 const BACKENDS: Backends = Backends::VULKAN;
 
-/// All adapters, the probably fastest first. Empty without a driver.
+/// All adapters, starting with the probably fastest one. Empty without a driver.
 pub(crate) fn adapters() -> Vec<Adapter> {
-    // Without a backend for this system compiled in, wgpu panics.
+    // wgpu panics if no backend for this system is compiled in.
     if !Instance::enabled_backend_features().intersects(BACKENDS) {
         return Vec::new();
     }
@@ -19,8 +19,8 @@ pub(crate) fn adapters() -> Vec<Adapter> {
         backends: BACKENDS,
         // A debug build would otherwise load validation layers.
         flags: InstanceFlags::empty().with_env(),
-        // No thresholds of memory: wgpu would refuse to upload more than fits the host's small window to a GPU's memory,
-        // though it can lie outside. `WgpuDevice` itself asks what is free.
+        // No memory thresholds. With them, wgpu refuses to upload more than fits into the host's small window to a
+        // GPU's memory, although the data can lie outside it. `WgpuDevice` itself checks how much is free.
         ..InstanceDescriptor::new_without_display_handle()
     });
     let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
@@ -49,7 +49,7 @@ pub(crate) fn info(adapter: &Adapter) -> DeviceInfo {
         kind,
         api: vulkan::api(adapter),
         driver: Some(driver).filter(|driver| !driver.is_empty()),
-        // A software rasteriser has none of its own.
+        // A software rasteriser has no memory of its own.
         memory_bytes: vulkan::memory_bytes(adapter).filter(|_| kind != DeviceKind::SoftwareRasteriser),
         uuid: vulkan::uuid(adapter),
         workers: 1,

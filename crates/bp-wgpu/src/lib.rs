@@ -1,12 +1,12 @@
-//! The GPU backend through wgpu. Its labels and messages equal those of the scalar backend to the bit.
+//! The GPU backend through wgpu. Its labels and messages are bit-identical to those of the scalar backend.
 //!
 //! It allocates, compiles, encodes and submits the programs of `bp_gpu`, and turns all failures into errors. Its devices are
 //! those with a Vulkan driver.
 //!
-//! * `instance` lists adapters, and `device` opens them. `vulkan` asks Vulkan for properties that wgpu does not report.
+//! * `instance` lists adapters, and `device` opens them. `vulkan` queries properties that wgpu does not report.
 //! * `gpu` is an open device. It keeps wgpu from ending the program.
 //! * `buffers` and `pipelines` make the resources of a program. `recording` encodes its commands, `queue` runs them, and
-//!   `clock` takes their times.
+//!   `clock` measures their times.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffers;

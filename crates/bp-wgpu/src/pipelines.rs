@@ -38,7 +38,7 @@ impl Pipelines {
         Ok(Self { made: Mutex::default(), cache: gpu.guard(0, || Ok(load(gpu, adapter)))? })
     }
 
-    /// Gets a pipeline, and whether it was compiled just now.
+    /// Returns a pipeline, and whether it was compiled just now.
     pub(crate) fn get(&self, gpu: &Gpu, pipeline: &Pipeline) -> Result<(ComputePipeline, bool), Error> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = made.get(pipeline) {
@@ -70,8 +70,8 @@ fn load(gpu: &Gpu, adapter: &Adapter) -> Option<Cache> {
     let stored = cache::load(&key);
     let descriptor = PipelineCacheDescriptor { label: None, data: stored.as_deref(), fallback: true };
     #[expect(unsafe_code, reason = "wgpu cannot check what a driver wrote")]
-    // SAFETY: `Pipelines::store` alone stores data under this key, all of which `PipelineCache::get_data` returned, and
-    // `cache::load` found it to be the same by its SHA-256 sum. wgpu itself drops data of another device or driver.
+    // SAFETY: only `Pipelines::store` stores data under this key: all of what `PipelineCache::get_data` returned.
+    // `cache::load` has compared its SHA-256 sum. wgpu itself drops data of another device or driver.
     let pipelines = unsafe { gpu.device.create_pipeline_cache(&descriptor) };
     Some(Cache { key, pipelines, stored: Mutex::new(stored.unwrap_or_default()) })
 }
@@ -79,7 +79,7 @@ fn load(gpu: &Gpu, adapter: &Adapter) -> Option<Cache> {
 fn compile(gpu: &Gpu, pipeline: &Pipeline, cache: Option<&PipelineCache>) -> ComputePipeline {
     let label = pipeline.to_string();
     let source = ShaderSource::Wgsl(pipeline.kernel.source().into());
-    // With wgpu's checks: on lavapipe, kernels without bounds on loops and indices take 1 % fewer instructions and the
+    // Keeps wgpu's checks: on lavapipe, kernels without bounds on loops and indices take 1 % fewer instructions but the
     // same time.
     let module = gpu.device.create_shader_module(ShaderModuleDescriptor { label: Some(&label), source });
     let layout = gpu.device.create_pipeline_layout(&PipelineLayoutDescriptor {

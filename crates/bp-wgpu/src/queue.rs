@@ -23,10 +23,10 @@ pub(crate) struct WgpuQueue {
     gpu: Arc<Gpu>,
     recording: Recording,
     clock: Option<Clock>,
-    /// The data to upload. It needs memory of its own: wgpu's mapped memory cannot be read, but a function that fills a slice
-    /// may read it.
+    /// The data to upload. It needs its own memory: a function that fills a slice may read it, but wgpu's mapped memory
+    /// cannot be read.
     upload: Vec<u8>,
-    /// The encoder of commands that are appended but not submitted, if there are any.
+    /// The encoder of commands that were appended but not yet submitted, if there are any.
     encoder: Option<CommandEncoder>,
     last: SubmissionIndex,
     compile_time: Duration,
@@ -34,7 +34,7 @@ pub(crate) struct WgpuQueue {
 }
 
 impl WgpuQueue {
-    /// Allocates and clears buffers, compiles kernels.
+    /// Allocates and clears buffers, and compiles kernels.
     pub(crate) fn new(gpu: &Arc<Gpu>, pipelines: &Pipelines, program: &Program) -> Result<Self, Error> {
         let buffers = buffers::make(gpu, program)?;
         let upload = memory::filled("what is uploaded", buffers[Program::UPLOAD].size() as usize, 0)?;
@@ -51,7 +51,7 @@ impl WgpuQueue {
         Ok(Self { gpu: Arc::clone(gpu), recording, clock, upload, encoder: None, last, compile_time, bytes })
     }
 
-    /// Submits the appended commands, and returns the submission before.
+    /// Submits the appended commands, and returns the previous submission.
     fn flush(&mut self) -> SubmissionIndex {
         match self.encoder.take() {
             Some(encoder) => mem::replace(&mut self.last, recording::submit(&self.gpu, encoder)),
@@ -59,7 +59,7 @@ impl WgpuQueue {
         }
     }
 
-    /// Does `work` under [`Gpu::guard`].
+    /// Runs `work` under [`Gpu::guard`].
     fn guard<T>(&mut self, work: impl FnOnce(&mut Self, &Gpu) -> Result<T, Error>) -> Result<T, Error> {
         let gpu = Arc::clone(&self.gpu);
         gpu.guard(self.bytes, || work(self, &gpu))
@@ -71,7 +71,7 @@ fn open<'a>(gpu: &Gpu, encoder: &'a mut Option<CommandEncoder>) -> &'a mut Comma
     encoder.get_or_insert_with(|| recording::encoder(gpu))
 }
 
-/// Compiles the kernels of a program, and returns the time spent on it. It leaves arbitrary values in the buffers.
+/// Compiles the kernels of a program. Also returns the time that this took. Leaves arbitrary values in the buffers.
 fn compile(
     gpu: &Gpu,
     pipelines: &Pipelines,

@@ -19,10 +19,10 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// Binds the buffers of a program. Call it under [`Gpu::guard`].
+    /// Binds the buffers of a program. Call this under [`Gpu::guard`].
     pub(crate) fn new(gpu: &Gpu, program: &Program, buffers: Vec<Buffer>, pipelines: Vec<ComputePipeline>) -> Self {
         let bind_groups = program.bind_groups.iter().map(|group| buffers::bind(gpu, group, &buffers)).collect();
-        // wgpu itself finds where barriers are needed.
+        // wgpu inserts barriers itself.
         let commands = program.segments.iter().map(|segment| segment.commands.iter());
         let segments = commands.map(|all| all.filter(|command| **command != Command::Barrier).cloned().collect());
         Self { bind_groups, segments: segments.collect(), buffers, pipelines }
@@ -54,8 +54,8 @@ impl Recording {
         }
     }
 
-    /// Runs one workgroup of each of these pipelines, because some drivers compile a kernel at its first run. Call it under
-    /// [`Gpu::guard`].
+    /// Runs one workgroup of each of these pipelines, because some drivers compile a kernel at its first run. Call this
+    /// under [`Gpu::guard`].
     pub(crate) fn warm_up(&self, gpu: &Gpu, pipelines: &[usize]) -> Result<(), Error> {
         for &wanted in pipelines {
             let first = self.segments.iter().flatten().find_map(|command| match *command {
@@ -66,7 +66,7 @@ impl Recording {
             });
             let mut encoder = encoder(gpu);
             self.dispatch(&mut encoder, first.as_slice());
-            // One at a time: a wait must not last for the compilation of all of them.
+            // One at a time, so that no wait lasts for the compilation of all of them.
             gpu.wait(&submit(gpu, encoder))?;
         }
         Ok(())

@@ -12,24 +12,24 @@ use wgpu::{
 
 /// Whether there is a Vulkan loader.
 pub(crate) fn has_loader() -> bool {
-    // SAFETY: a Vulkan loader may be loaded at any time; nothing else is loaded under its name.
+    // SAFETY: a Vulkan loader may be loaded at any time, and nothing else is loaded under its name.
     unsafe { Entry::load() }.is_ok()
 }
 
-/// The Vulkan version of a device, and the interface that reports it.
+/// The API description of a device: its Vulkan version, through wgpu.
 pub(crate) fn api(adapter: &Adapter) -> Option<String> {
     let version = properties(adapter)?.api_version;
     let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
     Some(format!("Vulkan {major}.{minor}.{} through wgpu", vk::api_version_patch(version)))
 }
 
-/// The device's identifier.
+/// The device's UUID.
 pub(crate) fn uuid(adapter: &Adapter) -> Option<String> {
     let hal = raw(adapter).filter(|hal| answers_more(hal))?;
     let mut id = vk::PhysicalDeviceIDProperties::default();
     let mut both = vk::PhysicalDeviceProperties2::default().push_next(&mut id);
     let instance = hal.shared_instance().raw_instance();
-    // SAFETY: the device is one of this instance's, and both have Vulkan 1.1, of which the structure is.
+    // SAFETY: the device belongs to this instance, and both support Vulkan 1.1, which includes the structure.
     unsafe { instance.get_physical_device_properties2(hal.raw_physical_device(), &mut both) };
     Some(Uuid::from_bytes(id.device_uuid).to_string())
 }
@@ -58,14 +58,14 @@ pub(crate) fn free_bytes(adapter: &Adapter) -> Option<u64> {
     let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
     let mut both = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
     let instance = hal.shared_instance().raw_instance();
-    // SAFETY: the device is one of this instance's, both have Vulkan 1.1, and the device has the structure's extension.
+    // SAFETY: the device belongs to this instance, both support Vulkan 1.1, and the device has the extension.
     unsafe { instance.get_physical_device_memory_properties2(hal.raw_physical_device(), &mut both) };
     Some(budget.heap_budget[heap].saturating_sub(budget.heap_usage[heap]))
 }
 
 /// The Vulkan side of an adapter.
 fn raw(adapter: &Adapter) -> Option<impl Deref<Target = hal::vulkan::Adapter>> {
-    // SAFETY: this module only asks the adapter for what it is, and destroys nothing.
+    // SAFETY: this module only queries the adapter and destroys nothing.
     unsafe { adapter.as_hal::<Vulkan>() }
 }
 
@@ -73,7 +73,7 @@ fn properties(adapter: &Adapter) -> Option<vk::PhysicalDeviceProperties> {
     Some(raw(adapter)?.physical_device_capabilities().properties())
 }
 
-/// Whether instance and device have Vulkan 1.1 or later. Earlier versions cannot answer extended queries.
+/// Whether instance and device support Vulkan 1.1 or later. Earlier versions cannot answer extended queries.
 fn answers_more(hal: &hal::vulkan::Adapter) -> bool {
     let device = hal.physical_device_capabilities().properties().api_version;
     hal.shared_instance().instance_api_version().min(device) >= vk::API_VERSION_1_1
@@ -81,7 +81,7 @@ fn answers_more(hal: &hal::vulkan::Adapter) -> bool {
 
 fn memory(hal: &hal::vulkan::Adapter) -> vk::PhysicalDeviceMemoryProperties {
     let instance = hal.shared_instance().raw_instance();
-    // SAFETY: the device is one of this instance's.
+    // SAFETY: the device belongs to this instance.
     unsafe { instance.get_physical_device_memory_properties(hal.raw_physical_device()) }
 }
 
@@ -107,7 +107,7 @@ mod tests {
             }
             device_heap(&memory)
         };
-        // The last is the small window to a GPU's memory that the host sees.
+        // The last one is the small window through which the host sees a GPU's memory.
         assert_eq!(heap(&[(host, 1), (local, 0), (local | host, 2)]), Some(0));
         assert_eq!(heap(&[(host, 1)]), Some(1));
         assert_eq!(heap(&[]), None);

@@ -1,6 +1,6 @@
-//! What `cargo bench` measures: the cells of the thesis's tables and some kernels, each by the same code as `bp
-//! reproduce` and `bp speed`. Criterion itself would measure one contestant after another, with the machine's drift
-//! between them; here they take turns first, and criterion is handed the samples.
+//! The measurements of `cargo bench`: the cells of the thesis's tables and some kernels, measured by the code of `bp
+//! reproduce` and `bp speed`. Criterion itself would measure one contestant after another, and the machine would drift
+//! between them. Here the contestants take turns first, and then criterion receives the samples.
 
 mod list;
 mod settings;
@@ -24,20 +24,20 @@ use crate::{
     threads,
 };
 
-/// Reads a variable of the environment, by its name.
+/// Reads an environment variable by its name.
 pub type Environment<'a> = dyn Fn(&str) -> Option<OsString> + Sync + 'a;
 
-/// All benches that there may be, without samples: whether a device has a clock shows when it is used.
+/// All possible benches, without samples. Only a measurement shows whether a device has a clock.
 ///
 /// # Errors
-/// A message that names the variable of the environment that cannot be followed.
+/// A message that names the invalid environment variable.
 pub fn possible(environment: &Environment<'_>, watch: &Watch<'_>) -> Result<Vec<Bench>, String> {
     let job = Settings::read(environment).and_then(|settings| Job::new(settings, watch));
     Ok(job.map_err(|failure| failure.to_string())?.possible)
 }
 
-/// Measures every scene and problem that a bench whose name `is_asked` is of, writes records, tables and charts to a new
-/// folder in `results`, and lets `show` have all benches.
+/// Measures the scenes and problems of all benches whose names satisfy `is_asked`. Writes records, tables and charts to
+/// a new folder in `results`, and passes all benches to `show`.
 ///
 /// # Errors
 /// A message that says what could not be measured or written.
@@ -65,10 +65,10 @@ struct Job {
     possible: Vec<Bench>,
 }
 
-/// What was.
+/// What was measured.
 struct Measured {
     storage: reproduce::Storage,
-    /// Whether any scene was.
+    /// Whether any scene was measured.
     scenes: bool,
     late: Vec<String>,
     speed: Option<Speed>,
@@ -115,7 +115,7 @@ impl Job {
     }
 }
 
-/// Measures problems, if there are any.
+/// Measures the problems, if any.
 fn kernels(
     settings: &Settings,
     problems: Vec<String>,
@@ -128,7 +128,7 @@ fn kernels(
 }
 
 impl Measured {
-    /// Shows the benches and tells where the tables and charts are; fails where something could not be measured.
+    /// Shows the benches and reports where the tables and charts are; fails if something could not be measured.
     fn shown(self, watch: &Watch<'_>, show: impl FnOnce(&[Bench])) -> Result<(), Failure> {
         show(&self.benches);
         if self.scenes {

@@ -1,4 +1,4 @@
-//! Several records beside one another: what `bp compare` prints.
+//! Compares several records for `bp compare`.
 
 mod speed_ups;
 mod tables;
@@ -16,7 +16,7 @@ use crate::{
     summary::{Group, groups, interval, mean, mean_of_medians, ratio_interval, samples},
 };
 
-/// What several records say about the same plans and scenes.
+/// The results of several records for the same plans and scenes.
 #[derive(Serialize)]
 pub struct Comparison<'a> {
     data: &'a str,
@@ -26,11 +26,11 @@ pub struct Comparison<'a> {
     records: Vec<Source<'a>>,
     rows: Vec<Row<'a>>,
     speed_ups: SpeedUps<'a>,
-    /// How the numbers are to be read.
+    /// How to read the numbers.
     note: &'static str,
 }
 
-/// Where a column comes from.
+/// The record that a column comes from.
 #[derive(Serialize)]
 struct Source<'a> {
     path: String,
@@ -48,27 +48,27 @@ struct Used<'a> {
     device: &'a Device,
 }
 
-/// A plan on a backend in every record.
+/// A plan on a backend, with its values in every record.
 #[derive(Serialize)]
 struct Row<'a> {
     plan: &'a str,
     backend: &'a str,
-    /// The place, from 0, of the only record that has it, where there is but one.
+    /// The index of the record that has this row, if only one does.
     only_in: Option<usize>,
-    /// One a record, in their order.
+    /// One value per record, in the order of the records.
     values: Vec<Value<'a>>,
 }
 
 /// A plan on a backend in a record.
 #[derive(Serialize)]
 struct Value<'a> {
-    /// Scenes with numbers.
+    /// How many scenes have measurements.
     measured_scenes: usize,
-    /// The means over the scenes, where all of them have numbers.
+    /// The means over the scenes; `None` unless all of them have measurements.
     means: Option<Means>,
-    /// Scenes whose labels differ from those of the first record, or backend of it, that has this plan.
+    /// Scenes whose labels differ from those of the first cell with this plan, see `Firsts`.
     other_labels: Vec<&'a str>,
-    /// Scenes on which it is of other settings than there.
+    /// Scenes whose settings differ from those of that cell.
     other_settings: Vec<&'a str>,
 }
 
@@ -81,7 +81,7 @@ struct Means {
     energy: f64,
 }
 
-/// A mean over the scenes of medians.
+/// The mean over the scenes of each scene's median.
 #[derive(Serialize)]
 struct Time {
     ms: f64,
@@ -91,7 +91,7 @@ struct Time {
     ratio_interval: Option<[f64; 2]>,
 }
 
-/// How the numbers are to be read.
+/// How to read the numbers.
 const NOTE: &str = "Times are means over the scenes of the median of each; message passing is timed by the \
                     device's own clock where it has one. Ratios are a record's time over that of record 1, so that \
                     less than 1 is faster. In brackets stand 95 % intervals of the ratios by the percentile \
@@ -101,7 +101,7 @@ const NOTE: &str = "Times are means over the scenes of the median of each; messa
                     rather too narrow.";
 
 impl<'a> Comparison<'a> {
-    /// Sets records beside one another, the first of them as the one to compare with.
+    /// Compares records. The first one is the baseline.
     pub fn new(records: &'a [(&'a Path, Record)]) -> Result<Self, Failure> {
         let Some(((first_path, first), others)) = records.split_first() else {
             return Err(Failure::usage("no record to compare"));
@@ -123,7 +123,7 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// Fails where numbers of two records would stand in one table without being of the same problem.
+/// Fails unless both records are of the same problem, so that one table can hold their numbers.
 fn check_same(path: &Path, record: &Record, first_path: &Path, first: &Record) -> Result<(), Failure> {
     let (run, other) = (&record.run, &first.run);
     let differs = |what: &str, here: String, there: String| {
@@ -169,7 +169,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Every plan on every backend that any record has, in the order in which they come up.
+/// Every plan on every backend that any record measured. Plans keep the order in which they first appear.
 fn rows<'a>(records: &'a [(&'a Path, Record)]) -> Vec<Row<'a>> {
     let mut sought = Vec::new();
     let mut found = HashMap::new();
@@ -197,8 +197,8 @@ fn rows<'a>(records: &'a [(&'a Path, Record)]) -> Vec<Row<'a>> {
     placed.into_iter().map(row).collect()
 }
 
-/// What came first: the order of the plans, and the cell of each plan and scene that others are held against. Backends
-/// and commits give the same labels, so it matters little whose that is.
+/// The order in which plans first appear, and the first measured cell of each plan and scene. All others are compared
+/// with that cell. Backends and commits give the same labels, so it matters little whose cell it is.
 #[derive(Default)]
 struct Firsts<'a> {
     plans: Vec<&'a str>,
@@ -236,7 +236,7 @@ fn value<'a>(group: Option<&Group<'a>>, base: Option<&[&Measurement]>, firsts: &
     value
 }
 
-/// What a plan computes, without the bytes that it takes on one device or another.
+/// The settings that define the computation: all but `planned_bytes`, which depend on the device.
 fn problem(settings: &Settings) -> Settings {
     Settings { planned_bytes: 0, ..settings.clone() }
 }

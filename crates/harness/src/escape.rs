@@ -1,18 +1,18 @@
-//! Strings from records where they are shown: a record may be a stranger's, and so may be every name in it.
+//! Escapes strings from records for display: a record, and so every name in it, may come from a stranger.
 
-/// Text for a terminal: what would move its cursor, or the order of its letters, is replaced.
+/// Text for a terminal. Replaces characters that would move the cursor or change the order of letters.
 pub(crate) fn printable(text: &str) -> String {
     text.chars().map(|c| if is_shown(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
-/// Whether a character stands in its place and does nothing else: no control character, no separator of lines, and
-/// none of those that turn the direction of writing around.
+/// Whether a character is only displayed: it is not a control character or a line separator, and it does not change the
+/// writing direction.
 fn is_shown(c: char) -> bool {
     let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     !c.is_control() && !turns && !matches!(c, '\u{2028}' | '\u{2029}')
 }
 
-/// Text within a line or a cell of Markdown, where it neither ends the cell nor becomes HTML, a link or emphasis.
+/// Text for a line or a table cell of Markdown. It neither ends the cell nor becomes HTML, a link or emphasis.
 /// Entities, unlike backslashes, mean the same inside and outside tables.
 pub(crate) fn markdown(text: &str) -> String {
     let text: Vec<char> = printable(text).chars().collect();
@@ -21,7 +21,7 @@ pub(crate) fn markdown(text: &str) -> String {
         let is =
             |place: Option<usize>, what: fn(char) -> bool| place.and_then(|at| text.get(at)).is_some_and(|&c| what(c));
         let within_word = is(i.checked_sub(1), char::is_alphanumeric) && is(Some(i + 1), char::is_alphanumeric);
-        // An address links itself.
+        // A bare URL becomes a link.
         let of_address = c == ':' && is(Some(i + 1), |next| next == '/');
         let special = matches!(c, '&' | '<' | '|' | '\\' | '`' | '*' | '[' | ']' | '~') || of_address;
         let special = special || (c == '@' && !are_threads(&text[i + 1..]));
@@ -34,7 +34,7 @@ pub(crate) fn markdown(text: &str) -> String {
     escaped
 }
 
-/// Whether the word after an @ is a number, as in `rayon@2`: then it names no person and no address.
+/// Whether the word after an @ is a number, as in `rayon@2`, and so neither a person nor an address.
 fn are_threads(text: &[char]) -> bool {
     let word = || text.iter().take_while(|c| c.is_alphanumeric() || matches!(c, '.' | '-' | '_'));
     word().count() > 0 && word().all(char::is_ascii_digit)

@@ -28,7 +28,7 @@ impl Format {
     /// All formats.
     pub const ALL: [Self; 4] = [Self::GithubActionBenchmark, Self::Bencher, Self::Csv, Self::VegaLite];
 
-    /// What `--format` takes.
+    /// Its name in `--format`.
     pub fn name(self) -> &'static str {
         match self {
             Self::GithubActionBenchmark => "github-action-benchmark",
@@ -39,7 +39,7 @@ impl Format {
     }
 }
 
-/// A record in a format.
+/// Exports a record in a format.
 pub fn export(record: &Record, format: Format) -> Result<String, Failure> {
     let json = |value: serde_json::Value| format!("{value:#}\n");
     match format {
@@ -53,10 +53,10 @@ pub fn export(record: &Record, format: Format) -> Result<String, Failure> {
 /// A time of a plan on a backend: a mean over all scenes.
 struct Timed<'a> {
     group: Group<'a>,
-    /// Which part of a solve it is of.
+    /// The part of a solve that was timed.
     part: &'static str,
     ms: f64,
-    /// A 95 % interval, where there are samples enough.
+    /// A 95 % interval, if there are enough samples.
     interval_ms: Option<[f64; 2]>,
 }
 
@@ -65,7 +65,7 @@ type Part = (&'static str, fn(&Sample) -> f64);
 
 const PARTS: [Part; 2] = [("total", |sample| sample.total_ms), ("message passing", Sample::message_passing_ms)];
 
-/// All times of a record; a plan that lacks numbers of a scene has none.
+/// All times of a record. Skips plans that lack results for a scene.
 fn times(record: &Record) -> Vec<Timed<'_>> {
     let timed = |(part, ms)| {
         groups(record).into_iter().filter_map(move |group| {
@@ -82,7 +82,7 @@ impl Timed<'_> {
         device(&self.group)
     }
 
-    /// A name that stays the same from run to run, and is another one for other images.
+    /// A name that is the same for every run, but differs between data sets.
     fn name(&self, record: &Record) -> String {
         printable(&format!("{}/{}/{}", record.run.data, self.group.plan, self.group.backend))
     }
@@ -93,7 +93,7 @@ fn device(group: &Group<'_>) -> String {
     device.map_or_else(String::new, |device| printable(&device.name))
 }
 
-/// What a reader of a number must know of the run.
+/// Describes the run for readers of its numbers.
 fn setting(record: &Record) -> String {
     let (run, machine, program) = (&record.run, &record.machine, &record.program);
     let quick = if run.quick { ", a quick run" } else { "" };

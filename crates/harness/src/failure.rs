@@ -1,4 +1,4 @@
-//! How an experiment fails: a message that says what to do, and a kind that says who can mend it.
+//! Failures of experiments: a message that says what to do, and a kind that says who can fix it.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ pub struct Failure {
 /// What went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A full disk, or an output that cannot be written.
+    /// Anything else, such as a full disk or an output that cannot be written.
     Other,
     /// Options that contradict each other.
     Usage,
@@ -21,11 +21,11 @@ pub enum Kind {
     Input,
     /// Something is worse than a baseline allows.
     Gate,
-    /// A backend or device that is not there.
+    /// A backend or device that is not available.
     Unavailable,
-    /// A plan beyond what a device can run.
+    /// A plan that the device cannot run.
     Unsupported,
-    /// A device that went away.
+    /// A device that was lost.
     DeviceLost,
     /// Too little memory.
     OutOfMemory,
@@ -38,7 +38,7 @@ impl Failure {
         Self { kind, message: message.into() }
     }
 
-    /// The fault of none of the below: a full disk, an output that cannot be written.
+    /// Anything else, such as a full disk or an output that cannot be written.
     pub fn other(message: impl Into<String>) -> Self {
         Self::new(Kind::Other, message)
     }
@@ -73,12 +73,12 @@ impl Failure {
         Self::new(Kind::OutOfMemory, message)
     }
 
-    /// A backend or device that is not there.
+    /// A backend or device that is not available.
     pub fn unavailable(message: impl Into<String>) -> Self {
         Self::new(Kind::Unavailable, message)
     }
 
-    /// The same, told of something.
+    /// The same failure, with `what` in front of its message.
     pub fn of(self, what: &str) -> Self {
         Self { message: format!("{what}: {}", self.message), ..self }
     }
@@ -88,18 +88,18 @@ impl Failure {
         Self::new(Kind::Interrupted, "interrupted")
     }
 
-    /// What went wrong, and so who can mend it.
+    /// What went wrong, and so who can fix it.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Whether the device is there, but the plan is more than it can run.
+    /// Whether the device is available but cannot run the plan.
     pub fn is_beyond_device(&self) -> bool {
         matches!(self.kind, Kind::Unsupported | Kind::OutOfMemory)
     }
 
-    /// Who can mend it, as devices ask.
+    /// The cause, which only distinguishes a lost device from everything else.
     pub fn cause(&self) -> bp_stereo::Cause {
         if self.kind == Kind::DeviceLost { bp_stereo::Cause::DeviceLost } else { bp_stereo::Cause::System }
     }

@@ -1,4 +1,4 @@
-//! Files as the experiments write them.
+//! Reads and writes the files of the experiments.
 
 use std::{fmt::Display, io::Write, path::Path};
 
@@ -26,28 +26,28 @@ pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Fail
     Ok(Files::default().json(path, value)?)
 }
 
-/// The text of such a file.
+/// The text that [`write_json`] writes.
 pub(crate) fn json_text(path: &Path, value: &impl Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Failure::writing(path, &error))?;
     Ok(text + "\n")
 }
 
-/// Writes a file that is not there yet.
+/// Writes a new file; fails if it exists.
 pub(crate) fn write_new(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     Ok(Files::default().new_file(path, contents)?)
 }
 
-/// Fails where no file could be written at `path`.
+/// Fails if no file could be written at `path`.
 pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
     Ok(Files::default().check_writable(path)?)
 }
 
-/// Fails where there is a file at `path`.
+/// Fails if a file exists at `path`.
 pub(crate) fn check_new(path: &Path) -> Result<(), Failure> {
     Ok(bp_io::check_new(path)?)
 }
 
-/// Creates a folder and those above it.
+/// Creates a folder and its parents.
 pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
     Ok(bp_io::create_folder(path)?)
 }

@@ -1,7 +1,7 @@
-//! What fuzzers call, with the feature `fuzzing`: every reader of files, and matching itself, on any bytes.
+//! Fuzz targets, with the feature `fuzzing`: every file reader, and matching itself, on any bytes.
 //!
-//! A reader may refuse a file but not panic, and what it reads keeps what it promises; `fuzz/README.md` says how to run
-//! them. Whatever goes wrong is a panic.
+//! A reader may refuse a file, but it must not panic, and its results must keep their promises. Every broken promise is
+//! a panic. `fuzz/README.md` says how to run the targets.
 
 mod tiny;
 
@@ -19,16 +19,16 @@ use crate::{
     report,
 };
 
-/// The most pixels that a file may hold here, so that none takes long.
+/// Maximum number of pixels in a file, so that none takes long.
 const LIMIT: Limits = Limits { pixels: 1 << 16, memory: None };
 
-/// What messages call the bytes.
+/// The file name of the bytes in messages.
 const NAME: &str = "bytes";
 
-/// Something that takes any bytes, and tells whether it took them for what it reads.
+/// Takes any bytes, and returns whether they were valid input.
 pub type Target = fn(&[u8]) -> bool;
 
-/// All targets, each by the name of its folder in `fuzz/corpus`.
+/// All targets, each with the name of its folder in `fuzz/corpus`.
 pub const TARGETS: [(&str, Target); 8] = [
     ("image", image),
     ("map", map),
@@ -43,7 +43,7 @@ pub const TARGETS: [(&str, Target); 8] = [
 /// Reads an image: PNG, PNM, TIFF, JPEG or PFM.
 ///
 /// # Panics
-/// Where it is larger than allowed.
+/// If it is larger than allowed.
 pub fn image(bytes: &[u8]) -> bool {
     let Ok(image) = parse_image(Path::new(NAME), bytes, LIMIT) else { return false };
     assert!(image.pixels().len() as u64 <= LIMIT.pixels, "{} pixels", image.size());
@@ -53,7 +53,7 @@ pub fn image(bytes: &[u8]) -> bool {
 /// Reads a map: PFM, NPY, TIFF, PNG or PNM.
 ///
 /// # Panics
-/// Where a map is another one after it was written and read again.
+/// If a map changes when it is written and read again.
 pub fn map(bytes: &[u8]) -> bool {
     let Ok(map) = parse_map(Path::new(NAME), bytes, None, LIMIT) else { return false };
     let formats = [MapFormat::Pfm, MapFormat::Npy, MapFormat::Tiff];
@@ -70,17 +70,17 @@ pub fn map(bytes: &[u8]) -> bool {
 /// Reads a mask.
 ///
 /// # Panics
-/// Where there is not one value a pixel.
+/// If the mask does not have one value per pixel.
 pub fn mask(bytes: &[u8]) -> bool {
     let Ok(Mask { size, values }) = parse_mask(Path::new(NAME), bytes, LIMIT) else { return false };
     assert_eq!(values.len(), size.pixels());
     true
 }
 
-/// Reads a calibration, and makes depths of a map by it.
+/// Reads a calibration, and uses it to convert a map to depths.
 ///
 /// # Panics
-/// Where a depth is negative or no number.
+/// If a depth is negative or not a number.
 pub fn calibration(bytes: &[u8]) -> bool {
     let Ok(geometry) = Geometry::parse(Path::new(NAME), bytes) else { return false };
     let size = geometry.file.as_ref().and_then(|file| file.size);
@@ -94,7 +94,7 @@ pub fn calibration(bytes: &[u8]) -> bool {
 /// Reads a list of pairs.
 ///
 /// # Panics
-/// Where a name leads out of the output's folder.
+/// If a name leads out of the output folder.
 pub fn pair_list(bytes: &[u8]) -> bool {
     let Ok(found) = pairs::parse(bytes, NAME) else { return false };
     for name in found.iter().map(|pair| &pair.name) {
@@ -104,15 +104,15 @@ pub fn pair_list(bytes: &[u8]) -> bool {
     true
 }
 
-/// Reads a record, and makes of it all that is made of records.
+/// Reads a record, and makes every export, report and comparison from it.
 ///
 /// # Panics
-/// Where that goes wrong.
+/// If one of these panics, or if the comparison is empty.
 pub fn record(bytes: &[u8]) -> bool {
     let path = Path::new(NAME);
     let Some(record) = std::str::from_utf8(bytes).ok().and_then(|text| parse(path, text).ok()) else { return false };
     Format::ALL.into_iter().for_each(|format| drop(export(&record, format)));
-    // It may be refused, in words.
+    // An error is allowed.
     drop(report::pages_without_maps(&record));
     let twice = [(path, record.clone()), (path, record)];
     if let Ok(comparison) = Comparison::new(&twice) {
@@ -121,16 +121,16 @@ pub fn record(bytes: &[u8]) -> bool {
     true
 }
 
-/// Reads a file of baselines, of times or of instructions.
+/// Reads a baseline file, of speed-ups or of instruction counts.
 pub fn baseline(bytes: &[u8]) -> bool {
     std::str::from_utf8(bytes).is_ok_and(|text| gate::is_baseline(Path::new(NAME), text))
 }
 
-/// Matches a tiny pair that is drawn from the bytes with everything else: size, model, settings, what is done
-/// afterwards, and a memory limit.
+/// Matches a tiny pair. The pair, its size, the model, the settings, the finishing steps and a memory limit are all
+/// derived from the bytes.
 ///
 /// # Panics
-/// Where backends differ in a label or a message, tiles in a label that they promise, or a map in what it promises.
+/// If backends differ in a label or a message, tiles differ in a label that they promise, or a map breaks a promise.
 pub fn tiny_match(bytes: &[u8]) -> bool {
     tiny::run(bytes)
 }

@@ -1,5 +1,5 @@
-//! `bp gate`: speed-ups measured in turns and in one process, held against committed baselines; and held against them
-//! exactly, what does not vary. `instructions` counts instructions instead of taking times.
+//! `bp gate`: compares speed-ups, measured in turns within one process, with committed baselines. Results that do not
+//! vary must equal their baselines exactly. `instructions` counts instructions instead of measuring time.
 
 mod baseline;
 mod callgrind;
@@ -29,23 +29,23 @@ use subject::Gate;
 pub use subject::{GateOptions, Renewal};
 pub use table::page;
 
-/// Whether the text of a file holds baselines, of one kind or the other.
+/// Whether the text of a file is a baseline, of speed-ups or of instruction counts.
 #[cfg(feature = "fuzzing")]
 pub fn is_baseline(path: &std::path::Path, text: &str) -> bool {
     file::parse::<baseline::Baseline>(path, text).is_ok() || file::parse::<callgrind::Counts>(path, text).is_ok()
 }
 
-/// What the sides of the scene are divided by, labels, and loops of BP.
+/// Divisor of the scene's width and height, number of labels, and iterations of BP.
 const FULL: (usize, usize, u32) = (2, 56, 56);
 
 /// The same for a quick run.
 const QUICK: (usize, usize, u32) = (3, 40, 18);
 
-/// Measurements that a baseline is the median of: each makes everything ready anew, and where memory happens to lie
-/// is a part of the noise.
+/// A baseline is the median of this many measurements. Each sets up everything again, because memory placement is part
+/// of the noise.
 const MEASUREMENTS_OF_A_BASELINE: usize = 3;
 
-/// Measures and judges, or renews the baselines if that is asked for.
+/// Measures and judges. Renews the baselines if asked.
 pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failure> {
     let machine = machine::machine(None);
     let mut baselines = Baselines::read(&options.baselines, &machine, options.update.is_some())?;
@@ -66,7 +66,7 @@ pub fn gate(options: &GateOptions, watch: &Watch<'_>) -> Result<Judgement, Failu
     Ok(judgement)
 }
 
-/// A synthetic scene: the same on every machine.
+/// A synthetic scene, which is the same on every machine.
 fn problem(quick: bool) -> Result<Problem, Failure> {
     let (divisor, labels, k) = if quick { QUICK } else { FULL };
     Ok(Problem { scene: scenes::made_up(0, divisor)?, labels, k })

@@ -1,8 +1,8 @@
 //! The experiments: the thesis's tables, speed, the gate.
 //!
-//! `reproduce` runs the thesis's experiments, `speed` times devices against each other, `gate` holds speed-ups against
-//! committed baselines, and `bench` is what `cargo bench` runs. All take their times by the one loop of `measure`, and write
-//! the records of `record`. Everything that anybody looks at is made from a record alone: `report`, `compare` and `export`.
+//! `reproduce` runs the thesis's experiments, `speed` times devices against each other, `gate` compares speed-ups with
+//! committed baselines, and `cargo bench` runs `bench`. All measure with the one loop in `measure`; all but `gate`
+//! write the records of `record`. `report`, `compare` and `export` make everything that people read from records alone.
 
 mod backends;
 pub mod bench;

@@ -1,4 +1,4 @@
-//! This machine and this program, as records name them.
+//! This machine and this program, as records describe them.
 
 use std::{fs, io};
 
@@ -15,10 +15,10 @@ use crate::{
     record::{Machine, Program},
 };
 
-/// The machine; `name` replaces the one made from the processor's.
+/// Describes the machine. `name` replaces the default name, which is made from the CPU's.
 pub fn machine(name: Option<&str>) -> Machine {
     let what = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
-    // Where the system does not tell, the record says so rather than the run failing.
+    // If the system does not name its CPU, the record says so and the run goes on.
     let system = System::new_with_specifics(what).ok();
     let cpu = system.and_then(|system| Some(system.cpus().first()?.brand().trim().to_owned()));
     let cpu = cpu.unwrap_or_else(|| "unknown processor".to_owned());
@@ -29,7 +29,7 @@ pub fn machine(name: Option<&str>) -> Machine {
     Machine { name, cpu, cores, memory_bytes, system: system_name }
 }
 
-/// The processor told apart from others that go by the same name, as rented ones do.
+/// The CPU with family and model, since different CPUs of rented machines may share a name.
 pub fn processor(machine: &Machine) -> String {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(id) = raw_cpuid::CpuId::new().get_feature_info() {
@@ -38,13 +38,13 @@ pub fn processor(machine: &Machine) -> String {
     machine.cpu.clone()
 }
 
-/// The kind of a machine: alike are those of one processor and as many cores.
+/// The kind of a machine. Machines with the same CPU and number of cores are of the same kind.
 pub fn kind(machine: &Machine) -> String {
     slug(&format!("{} {} cores", processor(machine), machine.cores))
 }
 
-/// Refuses what does not fit into the memory that a device can have now, before anything is allocated. Where that is not
-/// known, allocating will.
+/// Fails, before anything is allocated, if `needed` bytes exceed the memory now available to the device. If that is not
+/// known, the allocation itself will fail.
 pub fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), Failure> {
     let iec = |bytes| ByteSize(bytes).display().iec();
     match Memory::available_to(kind) {
@@ -70,7 +70,7 @@ pub fn program() -> Result<Program, Failure> {
     })
 }
 
-/// The commit that the running program was built from, and whether with changes.
+/// The commit that the running program was built from, and whether the sources had changes.
 pub fn commit() -> String {
     let changes = if env!("BP_CLEAN_TREE") == "true" { "" } else { " with changes" };
     format!("{}{changes}", env!("BP_COMMIT"))

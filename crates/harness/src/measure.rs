@@ -1,7 +1,7 @@
-//! The one way to take a time. Contestants take turns, round after round, so that whatever else the machine does meets
-//! all of them alike. Every comparison is made from their samples.
+//! The only code that takes times. Contestants take turns, round after round, so that other load on the machine affects
+//! all of them alike. Every comparison uses their samples.
 //!
-//! * `runner` opens a device on a pool of threads and opens it again after it was lost.
+//! * `runner` opens a device on a pool of threads, and reopens it if it was lost.
 //! * `solve` prepares a plan on a runner and times it.
 //! * `turns` is the loop. It takes any contestant: a solve, or a closure that returns a sample.
 //! * `meter` reports how far the loop has come and stops it.

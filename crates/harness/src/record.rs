@@ -1,5 +1,5 @@
-//! What a recorded run holds. These types are the JSON of `results/*/record.json`; `results/schema.json` is their
-//! schema.
+//! The record of a run. These types define the JSON of `results/*/record.json`. Its schema is `results/schema.json`,
+//! which includes their doc comments.
 
 mod load;
 mod sample;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 
-/// Version of the schema; changes with every change of meaning.
+/// Version of the schema. It changes with every change of meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// A run of `bp reproduce`.
@@ -26,21 +26,21 @@ pub struct Record {
     pub schema_version: u32,
     /// Whether every cell has been run.
     pub complete: bool,
-    /// When it was begun, RFC 3339.
+    /// When the run started, RFC 3339.
     pub started: String,
-    /// When it was last written to, RFC 3339.
+    /// When the record was last written, RFC 3339.
     pub updated: String,
     /// The program.
     pub program: Program,
     /// The machine.
     pub machine: Machine,
-    /// What was asked for.
+    /// The requested run.
     pub run: Run,
     /// The scenes, in order.
     pub scenes: Vec<Scene>,
     /// Every plan on every scene and backend.
     pub cells: Vec<Cell>,
-    /// Labellings by others and ours under one energy (profile `mrf`), where the data holds theirs.
+    /// Our labellings and those of others under one energy (profile `mrf`), if the data includes the latter.
     pub labellings: Vec<Labelling>,
 }
 
@@ -50,13 +50,13 @@ pub struct Record {
 pub struct Program {
     /// Package version.
     pub version: String,
-    /// Git commit it was built from, or "unknown".
+    /// Git commit that it was built from, or "unknown".
     pub commit: String,
-    /// Whether the sources were those of the commit.
+    /// Whether the sources were exactly those of the commit.
     pub clean_tree: bool,
     /// SHA-256 of the program file.
     pub sha256: String,
-    /// Compiler.
+    /// The compiler.
     pub rustc: String,
     /// Optimisation level, target and flags.
     pub flags: String,
@@ -66,7 +66,7 @@ pub struct Program {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Machine {
-    /// Name used for the folder.
+    /// Its name in the folder's name.
     pub name: String,
     /// Processor model.
     pub cpu: String,
@@ -78,7 +78,7 @@ pub struct Machine {
     pub system: String,
 }
 
-/// What was asked for.
+/// The requested run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
@@ -90,11 +90,11 @@ pub struct Run {
     pub labels: usize,
     /// Loops of plain BP (k).
     pub k: u32,
-    /// Samples of a cell that takes less than [`crate::reproduce::ONE_SAMPLE_ABOVE_MS`]; longer ones get one.
+    /// Samples of a cell that takes less than [`crate::reproduce::ONE_SAMPLE_ABOVE_MS`]; slower cells get one.
     pub samples: u32,
     /// Backends, in order.
     pub backends: Vec<String>,
-    /// Threads that those share which have threads; records from before there was one lack it.
+    /// Threads that the multi-threaded backends share. Older records lack it.
     pub threads: Option<usize>,
 }
 
@@ -112,7 +112,7 @@ pub struct Scene {
     pub largest_disparity: f32,
     /// Pixels of known truth.
     pub known: u64,
-    /// Pixels of known truth that both cameras see.
+    /// Non-occluded pixels of known truth, which both cameras see.
     pub visible: u64,
     /// SHA-256 of the decoded pixels of each image.
     pub images: Vec<ImageSum>,
@@ -122,7 +122,7 @@ pub struct Scene {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSum {
-    /// Path below the data folder, or which view of a synthetic scene.
+    /// Path below the data folder, or the view of a synthetic scene.
     pub path: String,
     /// SHA-256 of its decoded pixels, row by row, red, green and blue.
     pub sha256: String,
@@ -138,15 +138,15 @@ pub struct Cell {
     pub plan: String,
     /// Name of the backend, with the device's index unless that is 0.
     pub backend: String,
-    /// The device; none where the backend could not open it.
+    /// The device, unless the backend could not open it.
     pub device: Option<Device>,
-    /// What was run.
+    /// The settings of the run.
     pub settings: Settings,
-    /// What came of it.
+    /// The result.
     pub outcome: Outcome,
 }
 
-/// Numbers, or why there are none.
+/// A measurement, or why it is missing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Outcome")]
@@ -157,11 +157,11 @@ pub enum Outcome<M = Measurement> {
     Measured(Box<M>),
     /// It failed.
     Error(String),
-    /// This machine lacks the backend's device, or the device is too small for the plan; no fault of the run.
+    /// This machine lacks the backend's device, or the device is too small for the plan. The run is not at fault.
     Unavailable(String),
 }
 
-/// What was measured.
+/// The measured values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
@@ -173,7 +173,7 @@ pub struct Measurement {
     pub energy: Energy,
     /// Errors over all pixels of known truth.
     pub all: Errors,
-    /// Errors over those that both cameras see.
+    /// Errors over the non-occluded ones, which both cameras see.
     pub visible: Errors,
     /// SHA-256 of the labels, two bytes each, low byte first.
     pub labels_sha256: String,
@@ -187,22 +187,22 @@ pub struct Measurement {
 pub struct Labelling {
     /// Name of the scene.
     pub scene: String,
-    /// Who made it, by which method.
+    /// Its author and method.
     pub method: String,
-    /// Whether this program did.
+    /// Whether this program made it.
     pub ours: bool,
     /// Its energy.
     pub energy: Energy,
 }
 
 impl<M> Outcome<M> {
-    /// What a failure leaves: a device that is too small for the plan is no fault of the run.
+    /// The outcome of a failure. A device that is too small for the plan is not the run's fault.
     pub fn failed(failure: &Failure) -> Self {
         let reason = failure.to_string();
         if failure.is_beyond_device() { Self::Unavailable(reason) } else { Self::Error(reason) }
     }
 
-    /// The measurement, where there is one.
+    /// The measurement, if there is one.
     #[must_use]
     pub fn measured(&self) -> Option<&M> {
         match self {
@@ -213,7 +213,7 @@ impl<M> Outcome<M> {
 }
 
 impl Cell {
-    /// The measurement, where there is one.
+    /// The measurement, if there is one.
     #[must_use]
     pub fn measured(&self) -> Option<&Measurement> {
         self.outcome.measured()

@@ -1,4 +1,4 @@
-//! Tables, charts and pages, made from a record and from nothing else.
+//! Tables, charts and pages, made from a record and the maps beside it.
 
 mod diagrams;
 mod figures;
@@ -35,17 +35,17 @@ use results::Results;
 /// Name of the self-contained page, written last.
 pub const PAGE_FILE: &str = "report.html";
 
-/// A drawing and the words around it.
+/// A drawing with its heading, its caption and its numbers.
 struct Drawing {
-    /// File name without ending, such as "diagram-4.1".
+    /// File name without extension, such as "diagram-4.1".
     name: String,
     /// Its heading.
     title: String,
-    /// What it shows and where that comes from.
+    /// Its description, and the source of its data.
     caption: String,
     /// The picture.
     svg: String,
-    /// The same in numbers.
+    /// Its numbers.
     table: Option<tables::Table>,
 }
 
@@ -54,9 +54,9 @@ struct Report<'a> {
     results: Results<'a>,
     tables: Vec<tables::Table>,
     figures: Vec<Drawing>,
-    /// Those of the thesis.
+    /// The diagrams of the thesis.
     diagrams: Vec<Drawing>,
-    /// Ours.
+    /// Our own diagrams.
     tradeoffs: Vec<Drawing>,
 }
 
@@ -100,14 +100,14 @@ pub fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
     write_text(&folder.join(PAGE_FILE), &html::page(&report))
 }
 
-/// The pages of a record whose maps are not there, and what stands in a README.
+/// The pages of a record without its maps, and the part for a README.
 #[cfg(feature = "fuzzing")]
 pub fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
     let report = Report::of(Results::new(record)?, Vec::new())?;
     Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), Path::new(""), &report.results)])
 }
 
-/// Writes the report of a recorded run again; returns its page.
+/// Writes the report of a recorded run again. Returns the path of its page.
 ///
 /// # Errors
 /// A message that names the file.
@@ -123,7 +123,7 @@ pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
 /// Writes the part of a page that comes from a recorded run, between its markers.
 ///
 /// # Errors
-/// A message that names the file, also where it has no markers.
+/// A message that names the file, also if it lacks the markers.
 pub fn renew_page(run: &Path, page: &Path) -> Result<(), Failure> {
     let record = load(run)?;
     let text = std::fs::read_to_string(page).map_err(|error| Failure::reading(page, &error))?;
@@ -132,14 +132,13 @@ pub fn renew_page(run: &Path, page: &Path) -> Result<(), Failure> {
     write_text(page, &readme::splice(&text, &part).ok_or_else(missing)?)
 }
 
-/// The folder of a run that was named by it or by its record.
+/// The folder of a run, given that folder or its record.
 fn folder(run: &Path) -> &Path {
     if run.ends_with(RECORD_FILE) { run.parent().unwrap_or(run) } else { run }
 }
 
-/// The text of a page with the part that comes from a run made anew; `None` where it has no markers or the run cannot be
-/// read. `root` is the folder that the paths of page and run start from. For checking that what is committed is what the
-/// record says.
+/// The text of a page with a renewed part from a run; `None` if it lacks the markers or the run cannot be read. The
+/// paths of page and run start at `root`. A test uses this to check that the committed page matches its record.
 #[must_use]
 pub fn renewed_page(text: &str, root: &Path, page: &Path, run: &Path) -> Option<String> {
     let record = load(&root.join(run)).ok()?;

@@ -1,4 +1,4 @@
-//! `bp reproduce`: the thesis's experiments, run and recorded.
+//! `bp reproduce`: runs and records the thesis's experiments.
 
 mod energies;
 pub mod plans;
@@ -27,42 +27,42 @@ use crate::{
     threads,
 };
 
-/// Loops of plain BP in a quick run: the fewest of which CFBP and CFCSBP make different numbers of loops. A whole k = L
-/// would take minutes on one thread.
+/// Iterations of plain BP in a quick run: the fewest from which CFBP and CFCSBP derive different numbers of iterations.
+/// The full k = L would take minutes on one thread.
 const QUICK_LOOPS: u32 = 18;
 
-/// Samples of a cell that takes little time.
+/// Samples of a fast cell.
 const SAMPLES: u32 = 5;
 
-/// Labellings by other programs and by plain BP, with their energies in profile `mrf`, of the scenes whose labellings a
-/// data folder holds.
+/// Labellings by other programs and by plain BP, with their energies in profile `mrf`, for the scenes whose labellings
+/// are in a data folder.
 ///
 /// # Errors
-/// A message that names the file, where one is missing or not as listed.
+/// A message that names the file, if one is missing or differs from the manifest.
 pub fn outside_energies(data: &Path) -> Result<Vec<Labelling>, String> {
     energies::compare(data, &mut |_| ControlFlow::Continue(())).map_err(|failure| failure.to_string())
 }
 
-/// What a run is asked for.
+/// Options of a run.
 #[derive(Debug)]
 pub struct ReproduceOptions {
     /// The folder of public data; without one the synthetic scenes run.
     pub data: Option<PathBuf>,
-    /// Small images and few loops.
+    /// Small images and few iterations.
     pub quick: bool,
     /// The devices, as [`Asked::open`] reads them.
     pub backends: Vec<String>,
-    /// Threads that the devices must work with.
+    /// Number of threads, which a device must use.
     pub threads: Option<u16>,
-    /// Samples of a cell, by default five, or one in a quick run.
+    /// Samples per cell; five by default, or one in a quick run.
     pub samples: Option<u32>,
     /// The folder of recorded runs.
     pub results: PathBuf,
-    /// Name of this machine there.
+    /// Name of this machine in that folder.
     pub machine: Option<String>,
 }
 
-/// Runs what is asked for and writes its report; or goes on with a run that was interrupted.
+/// Runs the experiments, or resumes an interrupted run, and writes the report.
 pub fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Failure> {
     let source = Source::new(options.data.clone(), options.quick)?;
     let devices = Asked::open_all(&options.backends, watch)?;
@@ -87,7 +87,7 @@ pub fn reproduce(options: &ReproduceOptions, watch: &Watch<'_>) -> Result<(), Fa
     check_cells(storage.record(), late)
 }
 
-/// What a run on these scenes and devices asks for.
+/// The recorded options of a run on these scenes and devices.
 pub fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -> Run {
     Run {
         data: source.set.name.to_owned(),
@@ -100,7 +100,7 @@ pub fn settings(source: &Source, devices: &[Asked], quick: bool, samples: u32) -
     }
 }
 
-/// Fails where a cell failed, be it `late`, after samples that are kept, or where none could be run at all.
+/// Fails if a cell failed, or if none could be run at all. `late` holds failures of cells that keep earlier samples.
 pub fn check_cells(record: &Record, late: Vec<String>) -> Result<(), Failure> {
     let such_as = |Cell { scene, plan, backend, .. }: &Cell| format!("{scene}, {plan} on {backend}");
     let failed = record.cells.iter().filter_map(|cell| match &cell.outcome {

@@ -1,4 +1,4 @@
-//! The scenes that results are made from: six public ones, or six synthetic ones where those are not at hand.
+//! The scenes of the experiments: six public ones, or six synthetic ones if those are not available.
 
 use std::path::{Path, PathBuf};
 
@@ -15,19 +15,19 @@ use crate::{
 /// The thesis's six scenes as we identify them, in its order.
 pub const THESIS_SCENES: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
 
-/// What the small synthetic scenes are divided by.
+/// Divisor of the small synthetic scenes' width and height.
 const SMALL_DIVISOR: usize = 2;
 
 /// Six scenes of one origin and size.
 #[derive(Debug)]
 pub struct Set {
-    /// Its name in records, and of its folder in a data folder.
+    /// Its name in records, and its folder's name in a data folder.
     pub name: &'static str,
-    /// Labels of every scene: above the largest true disparity of all six, a multiple of 8.
+    /// Labels of every scene: a multiple of 8 above the largest true disparity of all six.
     pub labels: usize,
-    /// What it is, in a sentence.
+    /// Its description in one sentence.
     pub described: &'static str,
-    /// The same in few words, for every table and chart.
+    /// A short description, for every table and chart.
     pub short: &'static str,
 }
 
@@ -56,7 +56,7 @@ const SMALL_SYNTHETIC: Set = Set {
     short: "synthetic scenes, small",
 };
 
-/// The set of that name in records.
+/// The set with this name in records.
 pub fn set(name: &str) -> Option<&'static Set> {
     [&HALF_SIZE, &THIRD_SIZE, &SYNTHETIC, &SMALL_SYNTHETIC].into_iter().find(|set| set.name == name)
 }
@@ -99,7 +99,7 @@ impl Source {
         Ok(Self { folder, set })
     }
 
-    /// The folder of public data, where that is used.
+    /// The folder of public data, if used.
     pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
@@ -109,7 +109,7 @@ impl Source {
         if self.folder.is_some() { THESIS_SCENES } else { synthetic::NAMES }
     }
 
-    /// Fails where a file of the six scenes is missing or not the one listed; for telling so before a run begins.
+    /// Checks the files of the six scenes before a run; fails if one is missing or differs from the manifest.
     pub fn check(&self) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };
         THESIS_SCENES.iter().try_for_each(|scene| middlebury(folder, self.set, scene).map(drop))
@@ -124,7 +124,7 @@ impl Source {
     }
 }
 
-/// A scene's record, computed from what was loaded.
+/// A scene's record, computed from the loaded data.
 fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<ImageSum>) -> record::Scene {
     let known = |&(_, value): &(usize, &f32)| value.is_finite();
     let seen = |i: usize| truth.visible().is_some_and(|visible| visible[i]);
@@ -140,7 +140,7 @@ fn described(name: &str, pair: &StereoPair, truth: &GroundTruth, images: Vec<Ima
     }
 }
 
-/// Makes scene `index` of six with both sides divided by `divisor`.
+/// Makes synthetic scene `index` of six, with width and height divided by `divisor`.
 pub fn made_up(index: usize, divisor: usize) -> Result<Scene, Failure> {
     let synthetic::Scene { name, pair, truth_left, visible, .. } = synthetic::scene(index, divisor);
     let truth = GroundTruth::with_mask(truth_left, visible)?;
@@ -171,7 +171,7 @@ fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
     Ok(Scene { record: described(scene, &pair, &truth, images), pair, truth })
 }
 
-/// The manifest as messages name it.
+/// Path of the manifest in messages.
 const MANIFEST: &str = "crates/harness/data/middlebury.json";
 
 /// The expected checksums of the public data files: `data/middlebury.json`.
@@ -192,14 +192,14 @@ pub struct ManifestEntry {
     pub path: String,
     width: usize,
     height: usize,
-    /// Of a disparity map: stored value over disparity in pixels.
+    /// For a disparity map: stored value divided by disparity in pixels.
     pub scale: Option<f32>,
-    /// Of the decoded pixels.
+    /// SHA-256 of the decoded pixels.
     sha256: String,
 }
 
 impl Manifest {
-    /// The manifest of this build.
+    /// Reads the manifest of this build.
     pub fn read() -> Result<Self, Failure> {
         let text = include_str!("../data/middlebury.json");
         serde_json::from_str(text).map_err(|error| Failure::other(format!("{MANIFEST}: {error}")))
@@ -210,7 +210,7 @@ impl Manifest {
         entry.ok_or_else(|| Failure::other(format!("{MANIFEST} does not list {path}")))
     }
 
-    /// Reads a listed image and fails, with its name, where it is not the one listed.
+    /// Reads a listed image. Fails, and names it, if its size or pixels differ from the manifest.
     pub fn checked(&self, folder: &Path, path: &Path) -> Result<Image, Failure> {
         let below = path.strip_prefix(folder).unwrap_or(path);
         let entry = self.entry(&below.to_string_lossy().replace('\\', "/"))?;

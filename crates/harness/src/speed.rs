@@ -1,4 +1,4 @@
-//! `bp speed`: devices timed against each other on fixed problems, which need no files.
+//! `bp speed` compares the speed of devices on fixed problems, which need no files.
 
 mod charts;
 mod files;

@@ -1,7 +1,7 @@
-//! The one set of statistics: medians with their range, intervals of medians, and of ratios of medians.
+//! The statistics of all experiments: medians with their range, and intervals of medians and of ratios of medians.
 //!
-//! Every experiment uses medians, because other work on the machine only ever makes a program slower, and sometimes much
-//! slower: it would move a mean.
+//! Every experiment uses medians, because other work on the machine only ever makes a program slower, sometimes much
+//! slower. That would shift a mean.
 
 use std::fmt;
 
@@ -26,7 +26,7 @@ pub struct Spread {
     pub low: f64,
     /// The greatest value.
     pub high: f64,
-    /// How many numbers there are.
+    /// The number of values.
     pub count: usize,
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn ratio_interval(scenes: &[Vec<f64>], base: &[Vec<f64>]) -> Option<[
     percentiles(|random| Some(resampled(scenes, random)? / resampled(base, random)?))
 }
 
-/// The mean of medians of as many samples of each scene, drawn with replacement.
+/// The same mean over resampled scenes: each draws as many samples as it has, with replacement.
 fn resampled(scenes: &[Vec<f64>], random: &mut Rng) -> Option<f64> {
     let mut redrawn = |samples: &Vec<f64>| {
         let count = samples.len();
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(ratio_interval(&[three], &[four]), Some([0.75, 0.75]));
     }
 
-    /// Doubling is found, and noise about the same median holds 1.
+    /// The interval detects a doubling, and contains 1 for noise around the same median.
     #[test]
     fn intervals_of_ratios_tell_a_change_from_none() {
         let [low, high] = ratio_interval(&[around(20.0)], &[around(10.0)]).unwrap();

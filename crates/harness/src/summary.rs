@@ -10,7 +10,7 @@ use crate::record::{Cell, Measurement, Record, Sample};
 pub(crate) struct Group<'a> {
     pub plan: &'a str,
     pub backend: &'a str,
-    /// One a scene, in their order.
+    /// One per scene, in order.
     pub cells: Vec<Option<&'a Cell>>,
 }
 
@@ -31,19 +31,19 @@ pub(crate) fn groups(record: &Record) -> Vec<Group<'_>> {
 }
 
 impl<'a> Group<'a> {
-    /// The scenes with numbers: the place of each, and its cell's measurement.
+    /// The scenes with results: each one's index and its cell's measurement.
     pub(crate) fn measured(&self) -> impl Iterator<Item = (usize, &'a Measurement)> {
         let cells = self.cells.iter().enumerate();
         cells.filter_map(|(at, cell)| Some((at, cell.and_then(Cell::measured).filter(|m| !m.samples.is_empty())?)))
     }
 
-    /// All measurements; `None` where a scene lacks its own, since a mean over other scenes is another number.
+    /// All measurements; `None` if a scene lacks one, since means over different scenes are not comparable.
     pub(crate) fn whole(&self) -> Option<Vec<&'a Measurement>> {
         let measured: Vec<_> = self.measured().map(|(_, measurement)| measurement).collect();
         (!measured.is_empty() && measured.len() == self.cells.len()).then_some(measured)
     }
 
-    /// The cell whose device stands for the group's.
+    /// The cell that provides the group's device.
     pub(crate) fn cell(&self) -> Option<&'a Cell> {
         self.cells.iter().flatten().find(|cell| cell.device.is_some()).copied()
     }

@@ -1,12 +1,12 @@
-//! The threads that work is shared by.
+//! The threads that share the work.
 
 use crate::failure::Failure;
 
-/// Runs `work` on a worker of a pool of so many threads. The backend `rayon` works in the pool that it is called in; called
-/// from one of its workers, it need not hand every kernel over to another thread.
+/// Runs `work` on a worker of a pool with this many threads. The backend `rayon` uses the pool that it is called in. If
+/// called from one of its workers, it need not hand every kernel over to another thread.
 ///
 /// # Errors
-/// Those of `work`, and a failure where the threads cannot be started.
+/// Those of `work`, and a failure if the threads cannot be started.
 pub fn run_on<T: Send, E: From<Failure> + Send>(
     threads: Option<u16>,
     work: impl FnOnce() -> Result<T, E> + Send,
@@ -15,7 +15,7 @@ pub fn run_on<T: Send, E: From<Failure> + Send>(
     pool.install(work)
 }
 
-/// Refuses a number of threads that none of these devices works with.
+/// Fails if none of these devices uses the requested number of threads.
 pub fn check(threads: Option<u16>, names: &[String], workers: impl IntoIterator<Item = usize>) -> Result<(), Failure> {
     match threads.map(usize::from) {
         Some(threads) if workers.into_iter().all(|workers| workers != threads) => {

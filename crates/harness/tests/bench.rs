@@ -1,4 +1,4 @@
-//! What criterion is handed by `cargo bench`, and what it makes of it.
+//! Checks what `cargo bench` passes to criterion, and what criterion computes from it.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 #[path = "../benches/thesis/replay.rs"]
@@ -12,7 +12,7 @@ use criterion::Criterion;
 use harness::bench::{self, Bench};
 use serde_json::Value;
 
-/// All benches of an empty environment.
+/// All benches if no environment variable is set.
 fn possible() -> Vec<Bench> {
     bench::possible(&|_| None, &Watch::default()).unwrap()
 }
@@ -28,7 +28,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Where criterion keeps what it found of a bench.
+/// Reads the files with this name in which criterion keeps its results.
 fn found(folder: &Path, name: &str) -> Vec<Value> {
     let groups = fs::read_dir(folder).unwrap().map(|group| group.unwrap().path());
     let benches = groups.flat_map(|group| fs::read_dir(group).unwrap().map(|bench| bench.unwrap().path()));

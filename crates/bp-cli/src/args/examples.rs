@@ -1,8 +1,8 @@
-//! Examples below the options.
+//! The examples below the options in the help.
 
 use crate::failure;
 
-/// Of `bp` itself; the exit codes are every command's.
+/// The examples of `bp` itself, and the exit codes of all commands.
 pub(super) fn program() -> String {
     format!(
         "\
@@ -15,8 +15,8 @@ Examples:
 
 {}
 
-Results go to standard output, or only JSON with --json; everything else goes to standard error. RUST_LOG=debug logs
-what is opened, prepared and solved. NO_COLOR=1 turns colours off.",
+Results go to standard output, with --json as JSON only. Everything else goes to standard error. RUST_LOG=debug logs
+the devices opened, the plans prepared and the pairs solved. NO_COLOR=1 turns colours off.",
         failure::exit_codes()
     )
 }
@@ -39,7 +39,7 @@ Examples:
 pub(super) const EVALUATE: &str = "\
 Examples:
   bp evaluate map.pfm truth.png --scale 2
-  bp evaluate map.pfm truth.pfm --mask visible.png --json";
+  bp evaluate map.pfm truth.pfm --mask nonocc.png --json";
 
 pub(super) const REPRODUCE: &str = "\
 Examples:

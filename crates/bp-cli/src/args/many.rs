@@ -1,4 +1,4 @@
-//! Many pairs with one command.
+//! Arguments for matching many pairs with one command.
 
 use std::path::PathBuf;
 
@@ -14,34 +14,36 @@ use super::named;
 pub(crate) struct ManyArgs {
     /// Match all pairs of a list or folder; --output is then a folder for their maps.
     ///
-    /// A list has one pair a line: left image, right image and, optionally, a name for the map. Tabs separate them, else commas,
-    /// else spaces ("..." around paths with spaces). - reads the list from standard input. A folder is searched, with the folders
-    /// below it, for view1 and view5, im2 and im6, im0 and im1, left and right, imL and imR, and for equal names in the folders
-    /// left and right, image_2 and image_3, image_0 and image_1. Run the same command again to resume.
+    /// A list has one pair per line: left image, right image and, optionally, a name for the map. Tabs separate them,
+    /// else commas, else spaces ("..." around paths with spaces). - reads the list from standard input. A folder is
+    /// searched recursively for view1 and view5, im2 and im6, im0 and im1, left and right, imL and imR, and for equal
+    /// names in the folders left and right, image_2 and image_3, image_0 and image_1. Run the same command again to
+    /// resume.
     #[arg(long, value_name = "LIST|DIR", group = "many")]
     pub(crate) pairs: Option<PathBuf>,
     /// Match the frames of a video: 'left/%04d.png' 'right/%04d.png'; --output is a folder.
     ///
-    /// In each pattern one %d or %04d stands for a number, or one * for anything. Quote patterns with *.
+    /// Each pattern has one %d or %04d for the frame number, or one * for any text. Quote patterns with *.
     #[arg(long, num_args = 2, value_names = ["LEFT", "RIGHT"], group = "many")]
     pub(crate) video: Option<Vec<String>>,
-    /// Ending of the maps, which names their format as the ending of --output does for one pair.
-    #[arg(long, value_name = "ENDING", default_value = "pfm", requires = "many", hide_short_help = true)]
+    /// Extension of the maps, which selects their format.
+    #[arg(long, value_name = "EXT", default_value = "pfm", requires = "many", hide_short_help = true)]
     pub(crate) format: String,
-    /// What else to write for every pair, separated by commas.
+    /// Other outputs for each pair, separated by commas.
     ///
-    /// The files are NAME.picture.png, NAME.points.ply, and NAME.depth and NAME.confidence with the ending of --format.
+    /// The files are NAME.picture.png, NAME.points.ply, and NAME.depth and NAME.confidence with the extension of
+    /// --format.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "many", value_parser = named(&Also::ALL, Also::name),
         hide_short_help = true)]
     pub(crate) also: Vec<Also>,
-    /// Match every N-th pair only, starting with the I-th: N processes with I from 1 to N share the work.
+    /// Match only every N-th pair, starting with pair I. N processes, with I from 1 to N, share the work.
     #[arg(long, value_name = "I/N", requires = "many", hide_short_help = true)]
     pub(crate) shard: Option<Shard>,
-    /// Start each frame from the messages of the frame before, on the full grid only.
+    /// Start each frame from the messages of the previous frame, on the full grid only.
     ///
-    /// That is faster, and as accurate where little moves. Every N-th frame starts anew; the frames from one such frame to the
-    /// next are matched and resumed together. It needs --schedule sync or checkerboard, as --algorithm cfbp --half-steps 10 has,
-    /// and one view: neither --check nor --also confidence.
+    /// This is faster, and as accurate where little moves. Every N-th frame starts cold; the frames up to the next cold
+    /// start are matched and resumed together. Needs --schedule sync or checkerboard, for example --algorithm cfbp
+    /// --half-steps 10. Excludes --check and --also confidence, which match both views.
     #[arg(long, value_name = "N", requires = "video", num_args = 0..=1, require_equals = true, hide_short_help = true,
           default_missing_value = "30", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     pub(crate) warm_start: Option<u32>,

@@ -1,4 +1,4 @@
-//! Matching and evaluating.
+//! Arguments for matching and evaluating.
 
 use std::path::PathBuf;
 
@@ -16,8 +16,8 @@ use super::{FinishArgs, ManyArgs, OutputArgs, meaning::labels, named, positive, 
 pub(crate) struct MatchArgs {
     /// The left image.
     ///
-    /// PNG, PGM, PPM or TIFF with 8 or 16 bits, JPEG, or PFM with values from 0 to 1 or from 0 to 255; grey or colour. An
-    /// orientation that the camera noted (EXIF) is ignored.
+    /// PNG, PGM, PPM or TIFF with 8 or 16 bits, JPEG, or PFM with values from 0 to 1 or from 0 to 255; grey or colour.
+    /// The camera's orientation tag (EXIF) is ignored.
     #[arg(required_unless_present = "many", conflicts_with = "many")]
     pub(crate) left: Option<PathBuf>,
     /// The right image of a rectified pair: same size, corresponding rows.
@@ -25,28 +25,28 @@ pub(crate) struct MatchArgs {
     pub(crate) right: Option<PathBuf>,
     /// The disparity map to write: .pfm, .tif, .npy or .png; - writes PFM to standard output.
     ///
-    /// .pfm, .tif and .npy hold disparities in pixels as 32-bit floats. .png holds 256 times the disparity in 16 bits, where 0
-    /// means unknown and a disparity of 0 is stored as 1.
+    /// .pfm, .tif and .npy hold disparities in pixels as 32-bit floats. .png holds 256 times the disparity in 16 bits,
+    /// where 0 means unknown and a disparity of 0 is stored as 1.
     #[arg(long, short, value_name = "MAP")]
     pub(crate) output: PathBuf,
-    /// Print everything as JSON to standard output.
+    /// Print the report to standard output as JSON.
     #[arg(long)]
     pub(crate) json: bool,
     /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
     #[arg(long, conflicts_with = "many", hide_short_help = true)]
     pub(crate) messages_hash: bool,
-    /// Refuse images with more megapixels.
+    /// Refuse images with more than N megapixels.
     #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS, hide_short_help = true)]
     pub(crate) max_megapixels: u32,
-    /// Stay within this much memory, images and answer included, such as 2GiB. [default: what is free]
+    /// Limit memory use, including images and answer; for example 2GiB. [default: the free memory]
     ///
-    /// Larger pairs are matched in strips or tiles. Takes bytes, or 512M and 2G (powers of 1000), or 512MiB and 2GiB (powers of
-    /// 1024).
+    /// Larger pairs are matched in strips or tiles. SIZE is in bytes, or has a unit: 512M and 2G use powers of 1000,
+    /// 512MiB and 2GiB powers of 1024.
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_short_help = true)]
     pub(crate) max_memory: Option<ByteSize>,
     /// Match the pair N times, and report the median time and the range (--json: every time).
     ///
-    /// The first match is slower than the later ones; a video is like the later ones.
+    /// The first match is slower than the later ones. The frames of a video take as long as the later ones.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000),
         conflicts_with = "many", hide_short_help = true)]
     pub(crate) repeat: u32,
@@ -56,13 +56,13 @@ pub(crate) struct MatchArgs {
     /// Many pairs with one command.
     #[command(flatten)]
     pub(crate) many: ManyArgs,
-    /// What is done to the map after matching.
+    /// The operations on the map after matching.
     #[command(flatten)]
     pub(crate) finish: FinishArgs,
-    /// What else is written, and how.
+    /// The other outputs.
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,
-    /// What to run.
+    /// The plan.
     #[command(flatten)]
     pub(crate) plan: PlanArgs,
     /// How ground truth is read.
@@ -70,66 +70,69 @@ pub(crate) struct MatchArgs {
     pub(crate) truth: TruthArgs,
 }
 
-/// What to run.
+/// The plan.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Plan")]
 pub(crate) struct PlanArgs {
     /// Number of disparities to search; must exceed the largest one. [default: a quarter of the width]
     ///
-    /// The largest disparity that can be found is the first one plus labels - 1. auto finds the labels and the first disparity
-    /// by a coarse look at the images. The default is rounded up to a multiple of 16.
+    /// The largest disparity that can be found is the first one plus labels - 1. With auto, a coarse survey of the
+    /// images finds the labels and the first disparity. The default is rounded up to a multiple of 16.
     #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = labels)]
     pub(crate) labels: Option<Labels>,
-    /// First disparity in pixels; may be negative. [default: 0; with --labels auto what the images need]
+    /// First disparity in pixels; may be negative. [default: 0; found by --labels auto]
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true,
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
     pub(crate) min_disparity: Option<i32>,
-    /// Data cost, with the smoothness that goes with it.
+    /// Data cost and its default smoothness.
     #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
     pub(crate) profile: Profile,
     /// Algorithm: sweep is ours, the others are the thesis's. [default: sweep]
     ///
-    /// bp is plain belief propagation; cfbp is coarse-to-fine BP; cfcsbp is coarse-to-fine constant-space BP, with fewer loops;
-    /// ctbp is census-transform BP, in four parts; ctcsbp is census-transform constant-space BP, in four parts with fewer loops.
+    /// bp is plain belief propagation; cfbp is coarse-to-fine BP; cfcsbp is coarse-to-fine constant-space BP, with
+    /// fewer loops; ctbp is census-transform BP, in four parts; ctcsbp is census-transform constant-space BP, in four
+    /// parts with fewer loops.
     #[arg(long, value_parser = named(&Algorithm::ALL, Algorithm::name), hide_short_help = true)]
     pub(crate) algorithm: Option<Algorithm>,
     /// Backend: rayon, scalar (CPU), vulkan, wgpu (GPU); see bp devices.
     ///
-    /// NAME:DEVICE chooses another device than the backend's first.
+    /// NAME:DEVICE selects a device other than the backend's first.
     #[arg(long, default_value = devices::DEFAULT, value_name = "NAME")]
     pub(crate) backend: String,
-    /// Device of the backend: its index, a part of its name or the beginning of its UUID. [default: its first]
+    /// Device of the backend: its index, a part of its name or the beginning of its UUID. [default: the first]
     #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new(), hide_short_help = true)]
     pub(crate) device: Option<String>,
-    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one for each core]
+    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one per core]
     #[arg(long, value_name = "N", value_parser = threads(), hide_short_help = true)]
     pub(crate) threads: Option<u16>,
-    /// Loops (k), from which the algorithm derives those of each grid. [default: as many as labels; 1 for sweep]
+    /// Total loops (k), from which the algorithm derives those of each grid. [default: the number of labels; 1 for
+    /// sweep]
     ///
-    /// With --grids, and for sweep, loops on each grid.
+    /// With --grids, and for sweep, N is the number of loops on each grid.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), hide_short_help = true)]
     pub(crate) loops: Option<u32>,
     /// Half-steps of the schedule checkerboard on each grid.
     #[arg(long, value_name = "N", conflicts_with = "loops", value_parser = clap::value_parser!(u32).range(1..=2_000_000),
         hide_short_help = true)]
     pub(crate) half_steps: Option<u32>,
-    /// Number of grids, coarse to fine. Except for sweep, it needs --loops or --half-steps.
+    /// Number of grids (pyramid levels). Needs --loops or --half-steps, except for sweep.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=bp_core::MAX_GRIDS as i64),
         hide_short_help = true)]
     pub(crate) grids: Option<u8>,
-    /// What cfcsbp and ctcsbp divide loops by (Z'', Z''''). [default: 2]
+    /// Divisor of the total loops for cfcsbp and ctcsbp (Z'', Z''''). [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) z: Option<u32>,
     /// Order of message updates. [default: sync; checkerboard with --half-steps; sweep has its own]
     #[arg(long, value_parser = named(&Schedule::ALL, Schedule::name), hide_short_help = true)]
     pub(crate) schedule: Option<Schedule>,
-    /// By which side finer grids take over messages. [default: receiver]
+    /// Whether finer grids start with the messages that a parent received, or that the neighbour's parent sent.
+    /// [default: receiver]
     #[arg(long, value_parser = named(&MessageStart::ALL, MessageStart::name), hide_short_help = true)]
     pub(crate) message_start: Option<MessageStart>,
-    /// Whether data costs of coarse grids are clipped at K + K div 2. [default: on for sweep, else off]
+    /// Whether to clip the data costs of coarse grids at K + K div 2. [default: on for sweep, else off]
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) coarse_clip: Option<bool>,
-    /// Whether the census match of the centre is a prior (ctbp, ctcsbp). [default: on]
+    /// Whether to use the census match of the centre as a prior (ctbp, ctcsbp). [default: on]
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) seed_start: Option<bool>,
     /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
@@ -155,13 +158,14 @@ fn memory(text: &str) -> Result<ByteSize, String> {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Ground truth")]
 pub(crate) struct TruthArgs {
-    /// Ground truth of the right image, which shows the pixels that both cameras see.
+    /// Ground truth of the right image, which shows the non-occluded pixels: those that both cameras see.
     #[arg(long, value_name = "MAP", conflicts_with = "mask", hide_short_help = true)]
     pub(crate) ground_truth_right: Option<PathBuf>,
-    /// Non-occluded pixels, those that both cameras see: an 8-bit image with 255 where they do.
+    /// Mask of the non-occluded pixels: an 8-bit image in which they are 255.
     #[arg(long, value_name = "MAP", hide_short_help = true)]
     pub(crate) mask: Option<PathBuf>,
-    /// Stored ground truth divided by N is in pixels; 0 is unknown. [default: 1 for floats and 8 bits, 256 for 16 bits]
+    /// Divide stored ground truth by N to get pixels; an integer 0 is unknown. [default: 1 for floats and 8 bits, 256
+    /// for 16 bits]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive, hide_short_help = true)]
     pub(crate) scale: Option<f32>,
 }
@@ -173,13 +177,13 @@ pub(crate) struct EvaluateArgs {
     pub(crate) map: PathBuf,
     /// Ground truth, in the same formats.
     pub(crate) truth: PathBuf,
-    /// The map's stored values divided by N are in pixels; 0 is unanswered. [default: as for --scale]
+    /// Divide the map's stored values by N to get pixels; an integer 0 is unanswered. [default: as for --scale]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Refuse images with more megapixels.
+    /// Refuse images with more than N megapixels.
     #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
     /// How ground truth is read.

@@ -1,5 +1,5 @@
-//! What the arguments of `bp match` and `bp convert` mean, as the library's options. All checks of arguments against each
-//! other are here.
+//! Translates the arguments of `bp match` and `bp convert` into the library's options. All checks of arguments against
+//! each other are here.
 
 use std::path::{Path, PathBuf};
 
@@ -14,11 +14,11 @@ use bp_stereo::{
 use super::{ManyArgs, MatchArgs, OutputArgs, PlanArgs};
 use crate::{colour_bar, failure::Failure};
 
-/// The algorithms that count loops as the thesis does, as messages name them.
+/// The algorithms that count loops as the thesis does, for messages.
 const THESIS: &str = "--algorithm bp, cfbp, cfcsbp, ctbp or ctcsbp";
 
 impl MatchArgs {
-    /// The library's options; of many pairs, those of each.
+    /// The library's options for each pair.
     pub(crate) fn options(&self) -> Result<Options, Failure> {
         let (plan, finish) = (&self.plan, &self.finish);
         check_finish(self)?;
@@ -45,7 +45,7 @@ impl MatchArgs {
         Ok(options)
     }
 
-    /// Where the files of one pair go.
+    /// The output files of one pair.
     pub(crate) fn outputs(&self) -> Outputs {
         let map = Some(self.output.as_path()).filter(|_| !self.is_piped());
         Outputs { confidence: self.finish.confidence.clone(), ..self.outputs.outputs(map) }
@@ -56,7 +56,7 @@ impl MatchArgs {
         self.output == Path::new("-")
     }
 
-    /// The batch that the arguments ask for; none for one pair.
+    /// The batch that the arguments ask for; `None` for one pair.
     pub(crate) fn batch(&self) -> Result<Option<BatchOptions>, Failure> {
         let Some(source) = self.many.source()? else { return Ok(None) };
         let OutputArgs { picture, depth, points, .. } = &self.outputs;
@@ -86,7 +86,7 @@ impl MatchArgs {
 
 fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
     if args.is_piped() && (args.json || args.many.pairs.is_some() || args.many.video.is_some()) {
-        return Err(Failure::usage("--output - writes one map to standard output: no --json, --pairs or --video"));
+        return Err(Failure::usage("--output - writes one map to standard output, without --json, --pairs or --video"));
     }
     let finish = &args.finish;
     if finish.fill.is_some() && finish.check.is_none() && finish.speckle.is_none() {
@@ -97,7 +97,7 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
     if args.ground_truth.is_none() && reads_truth {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
-    // Clap does not ask for --video where --pairs or two images stand in its place.
+    // Clap's `requires` does not check this if --pairs or two images are given, which conflict with --video.
     if args.many.warm_start.is_some() && args.many.video.is_none() {
         return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
     }
@@ -105,7 +105,7 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
 }
 
 impl ManyArgs {
-    /// Where many pairs come from; none for one pair.
+    /// The source of many pairs; `None` for one pair.
     fn source(&self) -> Result<Option<Source>, Failure> {
         match (&self.pairs, self.video.as_deref()) {
             (Some(path), _) if path == Path::new("-") => {
@@ -123,13 +123,14 @@ impl ManyArgs {
 }
 
 impl OutputArgs {
-    /// Where files go, beside a map.
+    /// The output files of a map.
     pub(crate) fn outputs(&self, map: Option<&Path>) -> Outputs {
         let Self { picture, depth, points, .. } = self.clone();
         Outputs { map: map.map(Into::into), picture, depth, points, confidence: None }
     }
 
-    /// How files are made; a picture, and depth or points, may be asked for by other arguments too.
+    /// How files are made. `also_picture` and `also_depth` say whether other arguments ask for a picture, or for depth
+    /// or points.
     pub(crate) fn making(&self, also_picture: bool, also_depth: bool) -> Result<Making, Failure> {
         let args = &self.making;
         if self.picture.is_none() && !also_picture && (args.colours.is_some() || args.no_colour_bar) {
@@ -156,7 +157,7 @@ impl OutputArgs {
         Ok(Making { picture, no_sidecar: args.no_sidecar, geometry: read.or(given), ..Making::default() })
     }
 
-    /// The file of the calibration, which outputs are made of.
+    /// The calibration file.
     pub(crate) fn calibration(&self) -> Option<&PathBuf> {
         self.making.calib.as_ref()
     }
@@ -167,7 +168,7 @@ impl PlanArgs {
         self.algorithm.unwrap_or(Kind::Sweep)
     }
 
-    /// The algorithm with its own options.
+    /// The algorithm with its options.
     fn meaning(&self) -> Result<Algorithm, Failure> {
         self.check()?;
         self.check_algorithm()?;
@@ -210,7 +211,7 @@ impl PlanArgs {
         let is_swept = self.kind() == Kind::Sweep;
         let on_each_grid = self.grids.is_some() || self.half_steps.is_some() || is_swept;
         if self.z.is_some() && self.kind().divides_loops() && on_each_grid {
-            let what = "--z divides loops in all, not those that --grids or --half-steps count on each grid";
+            let what = "--z divides the total loops, but --grids and --half-steps set the loops on each grid";
             return Err(Failure::usage(what));
         }
         let is_counted = self.loops.is_some() || self.half_steps.is_some() || is_swept;
@@ -243,7 +244,7 @@ impl PlanArgs {
     }
 }
 
-/// What --labels takes.
+/// Parses the value of --labels.
 pub(super) fn labels(text: &str) -> Result<Labels, String> {
     let most = bp_core::MAX_LABELS;
     let count = || text.parse().ok().filter(|count| (1..=most).contains(count));

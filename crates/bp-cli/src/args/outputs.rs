@@ -1,4 +1,4 @@
-//! What is written of a disparity map, and how.
+//! Arguments for the outputs that are made from a disparity map.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use clap::Args;
 use super::{named, positive};
 use bp_io::{Colours, Limits};
 
-/// What is made of a map.
+/// The outputs that are made from a map.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct OutputArgs {
@@ -16,7 +16,7 @@ pub(crate) struct OutputArgs {
     pub(crate) picture: Option<PathBuf>,
     /// Write depth in millimetres; needs a calibration.
     ///
-    /// .pfm, .tif and .npy hold 32-bit floats, .png 16 bits (0 where unknown or beyond 65535 mm).
+    /// .pfm, .tif and .npy hold 32-bit floats. .png holds 16-bit integers, with 0 for unknown or beyond 65535 mm.
     #[arg(long, value_name = "MAP", hide_short_help = true)]
     pub(crate) depth: Option<PathBuf>,
     /// Write a point cloud with the left image's colours; needs a calibration.
@@ -24,27 +24,27 @@ pub(crate) struct OutputArgs {
     /// Positions are in millimetres from the left camera: x right, y down, z forward.
     #[arg(long, value_name = "FILE.ply")]
     pub(crate) points: Option<PathBuf>,
-    /// How.
+    /// How the files are made.
     #[command(flatten)]
     pub(crate) making: MakingArgs,
 }
 
-/// How files are made: the same for every pair.
+/// How the files of every pair are made.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Pictures, depth and points")]
 pub(crate) struct MakingArgs {
     /// Colours of the picture; unknown pixels are black. [default: viridis]
     #[arg(long, value_parser = named(&Colours::ALL, Colours::name), hide_short_help = true)]
     pub(crate) colours: Option<Colours>,
-    /// Leave out the bar that shows which disparities the colours stand for; the picture then has the map's size.
+    /// Leave out the colour bar, which shows the disparity of each colour. The picture then has the map's size.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_colour_bar: bool,
-    /// Write no MAP.json, which describes scale, unit, range, plan and inputs, beside maps and pictures.
+    /// Do not write the sidecar MAP.json, which describes scale, unit, range, plan and inputs of a map or picture.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_sidecar: bool,
     /// Calibration of the pair in Middlebury's format (calib.txt).
     ///
-    /// It has cam0, doffs and baseline, and width and height of the images where it says so.
+    /// It contains cam0, doffs and baseline and, optionally, width and height of the images.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["focal", "baseline", "doffs", "principal_point"])]
     pub(crate) calib: Option<PathBuf>,
     /// Instead of --calib: focal length in pixels of these images.
@@ -57,11 +57,11 @@ pub(crate) struct MakingArgs {
     pub(crate) baseline: Option<f64>,
     /// Column of the right principal point minus that of the left one, in pixels. [default: 0]
     ///
-    /// It is added to disparities before they give depth.
+    /// It is added to disparities to compute depth.
     #[arg(long, value_name = "PX", requires = "focal", allow_negative_numbers = true, value_parser = finite,
         hide_short_help = true)]
     pub(crate) doffs: Option<f64>,
-    /// Column and row of the left principal point, from the centre of the first pixel. [default: the middle]
+    /// Column and row of the left principal point, from the centre of the first pixel. [default: the image's centre]
     #[arg(long, value_name = "X,Y", requires = "focal", allow_hyphen_values = true, value_parser = point,
         hide_short_help = true)]
     pub(crate) principal_point: Option<[f64; 2]>,
@@ -72,20 +72,20 @@ pub(crate) struct MakingArgs {
 pub(crate) struct ConvertArgs {
     /// The disparity map: PFM, NPY or TIFF floats, or PNG, PGM or TIFF with 8 or 16 bits.
     pub(crate) map: PathBuf,
-    /// The map's stored values divided by N are in pixels; 0 is unknown where they are whole numbers. [default: 1 for floats
-    /// and 8 bits, 256 for 16 bits]
+    /// Divide the map's stored values by N to get pixels; an integer 0 is unknown. [default: 1 for floats and 8 bits,
+    /// 256 for 16 bits]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
-    /// The disparity map to write; its ending names the format, as for bp match.
+    /// The disparity map to write; its extension selects the format, as for bp match.
     #[arg(long, short, value_name = "MAP")]
     pub(crate) output: Option<PathBuf>,
-    /// The left image, whose colours --points takes.
+    /// The left image, which gives --points its colours.
     #[arg(long, value_name = "LEFT")]
     pub(crate) image: Option<PathBuf>,
-    /// Refuse images with more megapixels.
+    /// Refuse images with more than N megapixels.
     #[arg(long, value_name = "N", default_value_t = Limits::MEGAPIXELS)]
     pub(crate) max_megapixels: u32,
-    /// What else is written, and how.
+    /// The other outputs.
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,
 }

@@ -1,4 +1,4 @@
-//! `bp compare`: records of several machines, commits or backends in one table.
+//! `bp compare`: compares records of several machines, commits or backends in one table.
 
 use std::{io::Write, path::Path};
 

@@ -1,4 +1,4 @@
-//! `bp conform`: whether backends answer as the reference does, to the bit.
+//! `bp conform`: checks that backends give the same answers as the reference, to the bit.
 
 use std::{io::Write, time::Instant};
 
@@ -6,7 +6,7 @@ use bp_stereo::devices;
 
 use crate::{args::ConformArgs, failure::Failure, notes::tell};
 
-/// Runs the command: all backends, though one may fail.
+/// Runs the command. If a backend fails, the others are still checked.
 pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
     let chosen: Vec<_> =
         args.backend.iter().map(|name| Ok(devices::choose(name, None)?)).collect::<Result<_, Failure>>()?;
@@ -29,7 +29,7 @@ fn check(opened: &devices::Opened) -> Result<(), Failure> {
     let conforms = bp_testkit::conform(reference.device.as_ref(), opened.device.as_ref());
     conforms.map_err(|difference| Failure::other(difference.to_string()))?;
     let (cases, seconds) = (bp_testkit::cases().count(), start.elapsed().as_secs_f64());
-    let what = format!("{cases} cases as {} to the bit, and what comes after another pair", reference.name);
+    let what = format!("{cases} cases match {} to the bit, also after another pair", reference.name);
     writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
     Ok(())
 }

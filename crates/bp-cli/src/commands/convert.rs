@@ -1,4 +1,4 @@
-//! `bp convert`: other files from an existing disparity map.
+//! `bp convert`: makes other files from an existing disparity map.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
         return Err(Failure::usage("nothing to write: give --output, --picture, --depth or --points"));
     }
     if outputs.points.is_some() && args.image.is_none() {
-        return Err(Failure::usage("--points needs --image, the left image that its colours come from"));
+        return Err(Failure::usage("--points needs --image, the left image, for its colours"));
     }
     if outputs.points.is_none() && args.image.is_some() {
         return Err(Failure::usage("--image is for --points: give --points too"));
@@ -44,5 +44,5 @@ fn read_image_of(map: &DisparityMap, path: &Path, limit: Limits) -> Result<Image
         return Ok(image);
     }
     let (found, size) = (image.size(), map.size());
-    Err(Failure::input(format!("{}: {found} pixels where the map has {size}", path.display())))
+    Err(Failure::input(format!("{}: {found} pixels, but the map has {size}", path.display())))
 }

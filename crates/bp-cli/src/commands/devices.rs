@@ -1,4 +1,4 @@
-//! `bp devices`: every device of every backend.
+//! `bp devices`: lists the devices of all backends.
 
 use std::io::Write;
 
@@ -10,26 +10,26 @@ use bp_stereo::{description, devices as listed, devices::device_name};
 
 use crate::{args::DevicesArgs, failure::Failure};
 
-/// What `--json` prints for a backend.
+/// A backend in the output of `--json`.
 #[derive(Serialize)]
 struct BackendReport {
     backend: &'static str,
-    /// Whether commands that name no backend use it.
+    /// Whether it is the default backend.
     default: bool,
     devices: Vec<DeviceReport>,
-    /// Why there are no devices.
+    /// The reason if there are no devices.
     unavailable: Option<String>,
 }
 
 #[derive(Serialize)]
 struct DeviceReport {
-    /// What `--backend` takes.
+    /// The value for `--backend`.
     option: String,
     #[serde(flatten)]
     device: description::Device,
 }
 
-/// Where names of devices begin.
+/// The column at which the names of devices begin.
 const INDENT: usize = 33;
 
 /// Runs the command.
@@ -69,7 +69,7 @@ fn report(backend: &dyn bp_core::Backend) -> BackendReport {
     BackendReport { backend: backend.name(), default: backend.name() == listed::DEFAULT, devices, unavailable }
 }
 
-/// Memory, interface and driver, as far as they are known.
+/// Memory, API and driver, if known.
 fn details(device: &description::Device) -> Vec<String> {
     let memory = device.memory_bytes.map(|bytes| ByteSize(bytes).display().iec().to_string());
     [memory, device.api.clone(), device.driver.clone()].into_iter().flatten().collect()

@@ -1,4 +1,4 @@
-//! `bp doctor`: what this machine has, and what is missing.
+//! `bp doctor`: checks this machine and reports what is missing.
 
 use std::io::Write;
 
@@ -16,13 +16,13 @@ use crate::{
     failure::Failure,
 };
 
-/// Something that was looked at.
+/// The result of one check.
 #[derive(Serialize)]
 struct Check {
     what: String,
     state: State,
     found: String,
-    /// What would mend it.
+    /// How to fix it.
     advice: Option<String>,
 }
 
@@ -30,7 +30,7 @@ struct Check {
 #[serde(rename_all = "snake_case")]
 enum State {
     Ok,
-    /// Something is missing that the default backend does without.
+    /// Something is missing that the default backend does not need.
     Note,
     Failed,
 }
@@ -108,12 +108,12 @@ fn cores(count: usize) -> String {
 fn memory() -> Check {
     let iec = |bytes| ByteSize(bytes).display().iec();
     match Memory::of_machine() {
-        None => Check::note("memory", "the system does not tell", "--max-memory keeps `bp match` within a limit"),
+        None => Check::note("memory", "not reported by the system", "--max-memory keeps `bp match` within a limit"),
         Some(memory) => Check::ok("memory", format!("{} available of {}", iec(memory.available), iec(memory.total))),
     }
 }
 
-/// Opens every device of a backend, which tests it; adds what those that work are to `kinds`.
+/// Opens every device of a backend, which tests it. Adds the kinds of the devices that work to `kinds`.
 fn devices(backend: &dyn Backend, kinds: &mut Vec<DeviceKind>) -> Vec<Check> {
     let devices = backend.devices();
     let mut checks = Vec::new();
@@ -138,43 +138,43 @@ fn described(info: &DeviceInfo) -> String {
     format!("{}{software}", info.name)
 }
 
-/// Whether there is a GPU among the devices that work.
+/// Whether one of the devices that work is a GPU.
 fn gpu(kinds: &[DeviceKind]) -> Check {
     let advice = "everything runs, but GPU times need a GPU and its vendor's Vulkan driver";
     let software = kinds.contains(&DeviceKind::SoftwareRasteriser);
     if kinds.iter().any(|kind| !matches!(kind, DeviceKind::Processor | DeviceKind::SoftwareRasteriser)) {
-        Check::ok("GPU", "there is one that works")
+        Check::ok("GPU", "found and working")
     } else if software {
-        Check::note("GPU", "none: a software rasteriser is all there is; its times are not a GPU's", advice)
+        Check::note("GPU", "none, only a software rasteriser, whose times say nothing about GPUs", advice)
     } else if !cfg!(any(feature = "vulkan", feature = "wgpu")) {
-        Check::note("GPU", "this build has no backend for GPUs", "build with --features vulkan,wgpu")
+        Check::note("GPU", "this build has no GPU backend", "build with --features vulkan,wgpu")
     } else {
         Check::note("GPU", "none", advice)
     }
 }
 
-/// Whether compiled kernels can be kept.
+/// Whether compiled kernels can be cached.
 #[cfg(any(feature = "vulkan", feature = "wgpu"))]
 fn cache() -> Check {
-    let advice = "without it kernels may be compiled at every start; set XDG_CACHE_HOME to a folder of yours";
+    let advice = "without it, kernels may be compiled at every start; set XDG_CACHE_HOME to a writable folder";
     let Some(folder) = bp_gpu::cache::folder() else {
-        return Check::note("cache", "no folder for compiled kernels: there is no home folder", advice);
+        return Check::note("cache", "no folder for compiled kernels: no home folder was found", advice);
     };
     let written = std::fs::create_dir_all(&folder).and_then(|()| tempfile::tempfile_in(&folder));
     let folder = folder.display();
     match written {
-        Ok(_) => Check::ok("cache", format!("{folder} can be written")),
-        Err(error) => Check::note("cache", format!("{folder} cannot be written: {error}"), advice),
+        Ok(_) => Check::ok("cache", format!("{folder} is writable")),
+        Err(error) => Check::note("cache", format!("{folder} is not writable: {error}"), advice),
     }
 }
 
-/// Whether the public images are there.
+/// Whether the public images were downloaded.
 fn data(args: &DoctorArgs) -> Check {
-    let advice = "the synthetic scenes run instead; scripts/fetch-middlebury fetches the real images";
+    let advice = "the synthetic scenes are used instead; scripts/fetch-middlebury downloads the real images";
     let source = Source::new(DataArgs { data: args.data.clone(), synthetic: false }.folder(), false);
     match source.map(|source| (source.folder().map(|folder| folder.display().to_string()), source.set.described)) {
         Ok((Some(folder), described)) => Check::ok("data", format!("{folder}: {described}")),
-        Ok((None, _)) => Check::note("data", "no folder is named by --data or BP_DATA", advice),
+        Ok((None, _)) => Check::note("data", "neither --data nor BP_DATA names a folder", advice),
         Err(failure) => Check::note("data", failure.to_string(), advice),
     }
 }

@@ -1,4 +1,4 @@
-//! `bp evaluate`: the errors of a disparity map.
+//! `bp evaluate`: measures the errors of a disparity map.
 
 use std::{fmt::Write as _, io::Write as _, path::Path};
 
@@ -14,7 +14,7 @@ use crate::{
     failure::Failure,
 };
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Report {
     width: usize,
@@ -23,7 +23,7 @@ struct Report {
     errors: ErrorReport,
 }
 
-/// The errors of a map over all pixels of known truth and over visible ones.
+/// The errors of a map over all pixels of known truth, and over the non-occluded ones (`visible`).
 #[derive(Clone, Copy, Serialize)]
 pub(crate) struct ErrorReport {
     thresholds_px: [f32; 4],
@@ -45,7 +45,7 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     let errors = truth.errors(&map).map_err(|_| {
         let (map_size, truth_size) = (map.size(), truth.disparities().size());
         let (map, truth) = (args.map.display(), args.truth.display());
-        Failure::input(format!("{map} has {map_size} pixels and its ground truth {truth} {truth_size}"))
+        Failure::input(format!("{map} has {map_size} pixels, but its ground truth {truth} has {truth_size}"))
     })?;
     let errors = ErrorReport::from(errors);
     if args.json {
@@ -55,7 +55,7 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     Ok(write!(std::io::stdout(), "{}", error_table(&errors))?)
 }
 
-/// Reads ground truth, and what tells which of its pixels are visible.
+/// Reads ground truth, and the right ground truth or the mask that shows its non-occluded pixels.
 pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Result<GroundTruth, Failure> {
     let truth = read_map(path, options.scale, limit)?;
     if truth.range().is_none() {
@@ -71,16 +71,17 @@ pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Res
             return Err(Error::reading(mask, &format!("{size} pixels, but the truth has {}", truth.size())).into());
         }
         if !visible.contains(&true) {
-            return Err(Error::reading(mask, &"no pixel is 255, so none would count").into());
+            return Err(Error::reading(mask, &"no pixel is 255, so the mask selects none").into());
         }
         return GroundTruth::with_mask(truth, visible).map_err(|error| Error::reading(mask, &error).into());
     }
     Ok(GroundTruth::new(truth))
 }
 
-/// Errors as text: for each set of pixels a column over answered ones, and one that counts unanswered ones as wrong.
+/// The errors as text. Each set of pixels has one column for answered pixels, and one that counts unanswered pixels as
+/// wrong.
 pub(crate) fn error_table(report: &ErrorReport) -> String {
-    let sets = [("all known pixels", Some(&report.all)), ("visible in both views", report.visible.as_ref())];
+    let sets = [("all known pixels", Some(&report.all)), ("non-occluded pixels", report.visible.as_ref())];
     let sets: Vec<_> = sets.into_iter().filter_map(|(name, errors)| Some((name, errors?))).collect();
     let mut text = String::new();
     let mut line = |name: &str, cells: &dyn Fn(&record::Errors) -> [String; 2]| {
@@ -101,7 +102,7 @@ pub(crate) fn error_table(report: &ErrorReport) -> String {
     format!("{:<12}{heads}\n{:<12}{columns}\n{text}", "errors", "")
 }
 
-/// A figure with its unit; a dash where nothing was measured.
+/// A figure with its unit; a dash if nothing was measured.
 fn figure(value: f64, decimals: usize, unit: &str) -> String {
     if value.is_finite() { format!("{value:.decimals$} {unit}") } else { "-".to_owned() }
 }

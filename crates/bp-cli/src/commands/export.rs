@@ -1,4 +1,4 @@
-//! `bp export`: a record for other programs.
+//! `bp export`: writes a record in the format of another program.
 
 use std::io::Write;
 
@@ -13,12 +13,12 @@ use crate::{args::ExportArgs, failure::Failure, notes::note};
 /// Runs the command.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     if let Some(output) = &args.output {
-        bp_io::check_distinct(&record_file(&args.record), output, "is read, and would be overwritten")?;
+        bp_io::check_distinct(&record_file(&args.record), output, "is an input and would be overwritten")?;
         Files::default().check_writable(output)?;
     }
     let record = load(&args.record)?;
     if !export::has_numbers(&record) {
-        let what = "nothing in it was measured; run `bp reproduce` to its end";
+        let what = "it holds no measurements; run `bp reproduce` to its end";
         return Err(Error::reading(&args.record, &what).into());
     }
     let text = export::export(&record, args.format)?;

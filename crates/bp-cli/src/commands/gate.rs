@@ -1,4 +1,4 @@
-//! `bp gate`: whether speed-ups, accuracy, energy, memory and instruction counts are still what they were.
+//! `bp gate`: checks speed-ups, accuracy, energy, memory and instruction counts against baselines.
 
 use std::io::Write;
 
@@ -38,6 +38,6 @@ fn written(files: &str) -> Result<(), Failure> {
 fn conclude(failures: &[String]) -> Result<(), Failure> {
     let Some((first, others)) = failures.split_first() else { return Ok(()) };
     let more = if others.is_empty() { String::new() } else { format!("; and {} more", others.len()) };
-    let advice = "if that is meant, write new baselines by --update (see --help)";
+    let advice = "if that is meant, write new baselines with --update (see --help)";
     Err(Failure::gate(format!("the gate failed: {first}{more}; {advice}")))
 }

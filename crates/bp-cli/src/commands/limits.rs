@@ -4,7 +4,7 @@ use bp_core::DeviceKind;
 use bp_io::Limits;
 use bp_stereo::Memory;
 
-/// How much a file may hold, and how much memory reading it may take.
+/// The limits for a file: its size in megapixels, and the free memory for reading it.
 pub(super) fn limits(megapixels: u32) -> Limits {
     Limits::megapixels(megapixels).within(Memory::available_to(DeviceKind::Processor))
 }

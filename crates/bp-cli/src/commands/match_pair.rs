@@ -1,4 +1,4 @@
-//! `bp match`: disparity maps of one's own pairs.
+//! `bp match`: matches one pair or many.
 
 use std::{
     io::Write as _,
@@ -55,7 +55,7 @@ fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Fai
     }
 }
 
-/// One pair: its images, and what is made of them.
+/// One pair: its images and its outputs.
 struct Job<'a> {
     args: &'a MatchArgs,
     files: [&'a PathBuf; 2],
@@ -110,7 +110,8 @@ impl Job<'_> {
         Ok(Report::new(matcher, answer, &times, asked, self.outputs.paths(&self.making)))
     }
 
-    /// The pair's plan, which its outputs can hold. What may be wrong is shown first: exchanged images may be why they cannot.
+    /// Plans the pair, and checks that its outputs can hold the result. Shows warnings before this check: exchanged
+    /// images may be the reason that it fails.
     fn plan(&self, matcher: &Matcher) -> Result<Planned, Failure> {
         let survey = Survey::of(&self.pair)?;
         let planned = matcher.plan_within(&self.pair, &survey, &|disparity| self.outputs.hold(disparity))?;
@@ -126,7 +127,7 @@ impl Job<'_> {
         Ok(planned)
     }
 
-    /// Ground truth beyond the labels was most likely stored as a multiple of disparities.
+    /// Warns if ground truth exceeds the labels. It was then most likely stored as a multiple of disparities.
     fn hint_at_scale(&self, Planned { plan, .. }: &Planned) {
         let last = plan.model().disparity(plan.model().labels() as u16 - 1);
         let truth = self.truth.as_ref().and_then(|truth| truth.disparities().range());
@@ -137,8 +138,8 @@ impl Job<'_> {
         }
     }
 
-    /// The last answer of as many matches as the arguments ask for, and the times of all. Only one answer is in memory at a
-    /// time.
+    /// Matches the pair as often as the arguments ask for. Returns the last answer and the times of all. Only one
+    /// answer is in memory at a time.
     fn matched(&self, matcher: &mut Matcher, planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
         let mut times = Vec::new();
         loop {
@@ -150,7 +151,7 @@ impl Job<'_> {
         }
     }
 
-    /// Both images, as messages name them.
+    /// Both images, for messages.
     fn name(&self) -> String {
         let [left, right] = self.files;
         format!("{} and {}", left.display(), right.display())
@@ -163,7 +164,7 @@ fn pipe(map: &DisparityMap) -> Result<(), Failure> {
     Ok(std::io::stdout().write_all(&bytes.map_err(Failure::other)?)?)
 }
 
-/// The files that the outputs are made of.
+/// The files that the outputs are made from.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }

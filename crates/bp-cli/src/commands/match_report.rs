@@ -1,4 +1,4 @@
-//! What `bp match` says of a pair, as text or as JSON.
+//! The report of `bp match` on one pair, as text or as JSON.
 
 use std::{fmt::Write as _, path::PathBuf};
 
@@ -12,10 +12,10 @@ use serde::Serialize;
 
 use super::evaluate::{self, ErrorReport};
 
-/// Version of what `--json` prints; changes with every change of meaning.
+/// Version of the JSON report. Every change of meaning raises it.
 const SCHEMA_VERSION: u32 = 1;
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 pub(super) struct Report {
     schema_version: u32,
@@ -24,28 +24,28 @@ pub(super) struct Report {
     backend: String,
     device: description::Device,
     settings: Settings,
-    /// None where the pair was matched as a whole.
+    /// `None` if the pair was matched as a whole.
     tiles: Option<Tiles>,
     allocated_bytes: u64,
-    /// Most that the program was predicted to hold at a time.
+    /// Predicted peak memory of the program.
     peak_bytes: u64,
-    /// Of every match, in order.
+    /// The total time of each match, in order.
     samples_ms: Vec<f64>,
-    /// The median of these, what of it came after matching, and the stages of that match; of both images' where both
-    /// were matched.
+    /// The median of the samples, the part of it after matching, and the stages of that match. The stages include both
+    /// images if both were matched.
     total_ms: f64,
     finishing_ms: f64,
     clocks: Vec<Clocked>,
     energy: Energy,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
-    /// What may be wrong with the images or the labels, as standard error tells it.
+    /// Warnings about the images or the labels, as printed to standard error.
     warnings: Vec<String>,
     /// The files, the disparity map first.
     written: Vec<String>,
 }
 
-/// What a report has beside an answer.
+/// The parts of a report that are not in the answer.
 pub(super) struct Asked {
     pub(super) size: Size,
     pub(super) warnings: Vec<String>,
@@ -54,7 +54,7 @@ pub(super) struct Asked {
 }
 
 impl Report {
-    /// The report of the last answer of several, whose times are these.
+    /// The report of one or several matches: the last answer, and the times of all.
     pub(super) fn new(
         matcher: &Matcher,
         answer: Disparity,
@@ -86,7 +86,7 @@ impl Report {
     }
 }
 
-/// The sample of median total; of an even number, the lower one of the two in the middle.
+/// The sample with the median total; the lower middle one if the number of samples is even.
 fn median(samples: &[AnswerTimes]) -> AnswerTimes {
     let mut sorted = samples.to_vec();
     sorted.sort_by_key(AnswerTimes::total);
@@ -119,7 +119,7 @@ pub(super) fn text(report: &Report) -> String {
     if let Some(Tiles { columns, rows, width, height, answer }) = &report.tiles {
         let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
     }
-    let _ = writeln!(text, "{:<10}{:.1} ms in all{}", "time", report.total_ms, spread(&report.samples_ms));
+    let _ = writeln!(text, "{:<10}{:.1} ms in total{}", "time", report.total_ms, spread(&report.samples_ms));
     for Clocked { clock, stages } in &report.clocks {
         let _ = writeln!(text, "{:<12}{clock:?} clock", "");
         for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {

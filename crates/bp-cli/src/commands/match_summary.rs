@@ -1,4 +1,4 @@
-//! What `bp match` says of many pairs.
+//! The summary of `bp match` on many pairs.
 
 use std::fmt::Write as _;
 
@@ -10,16 +10,16 @@ pub(super) fn text(summary: &Summary) -> String {
     let shard = summary.shard.as_ref().map_or_else(String::new, |shard| format!(" of shard {shard}"));
     let mut text = String::new();
     let failed = summary.failures.len();
-    let _ = writeln!(text, "{:<10}{pairs}{shard}: {done} done, {skipped} of them before, {failed} failed", "pairs");
+    let _ = writeln!(text, "{:<10}{pairs}{shard}: {done} done, {skipped} of them earlier, {failed} failed", "pairs");
     let PairTimes { read_ms, match_ms, write_ms, .. } = summary.times;
     let [read, matching, written, total] = [read_ms, match_ms, write_ms, summary.total_ms].map(|ms| ms / 1000.0);
     let parts = format!("{read:.1} s reading, {matching:.1} s matching, {written:.1} s writing, at the same time");
-    let _ = writeln!(text, "{:<10}{total:.1} s in all; {parts}", "time");
+    let _ = writeln!(text, "{:<10}{total:.1} s in total; {parts}", "time");
     if let (Some(all), Some(solved), Some(median)) =
         (summary.pairs_per_second, summary.solved_per_second, summary.median_solve_ms)
     {
         let alone = format!("{solved:.2} matching alone (median {median:.1} ms)");
-        let _ = writeln!(text, "{:<10}{all:.2} pairs a second from file to file, {alone}", "rate");
+        let _ = writeln!(text, "{:<10}{all:.2} pairs per second from file to file, {alone}", "rate");
     }
     let _ = writeln!(text, "{:<10}{}", "written", summary.output.display());
     text

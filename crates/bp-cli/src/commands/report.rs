@@ -1,4 +1,4 @@
-//! `bp report`: the report of a recorded run again, or the part of a page that comes from it.
+//! `bp report`: rewrites the report of a recorded run, or the part of a page that is generated from it.
 
 use crate::{args::ReportArgs, failure::Failure, notes::note};
 

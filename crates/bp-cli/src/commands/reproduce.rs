@@ -1,4 +1,4 @@
-//! `bp reproduce`: the thesis's experiments.
+//! `bp reproduce`: repeats the thesis's experiments.
 
 use harness::{reproduce, threads};
 

@@ -1,4 +1,4 @@
-//! `bp scenes`: what there is to run on.
+//! `bp scenes`: lists the scenes and checks their files.
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use harness::scenes::{Manifest, Source};
 
 use crate::{args::ScenesArgs, failure::Failure};
 
-/// Runs the command: lists the scenes, and checks every listed file that the data folder holds.
+/// Runs the command. Lists the synthetic scenes, or checks every listed file that the data folder holds.
 pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let source = Source::new(args.data.folder(), false)?;
@@ -29,10 +29,10 @@ pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
         writeln!(out, "{:<60}{state}", entry.path)?;
     }
     let listed = manifest.files.len();
-    writeln!(out, "{found} of {listed} listed files are there, {wrong} wrong")?;
+    writeln!(out, "{found} of {listed} listed files found, {wrong} wrong")?;
     match (found, wrong) {
-        (0, _) => Err(Failure::input(format!("--data {}: none of the listed files is there", folder.display()))),
+        (0, _) => Err(Failure::input(format!("--data {}: none of the listed files was found", folder.display()))),
         (_, 0) => Ok(()),
-        _ => Err(Failure::input(format!("{wrong} files are not as listed"))),
+        _ => Err(Failure::input(format!("{wrong} files differ from the list"))),
     }
 }

@@ -1,4 +1,4 @@
-//! `bp completions` and `bp man`: the command line told to shells and to `man`.
+//! `bp completions` and `bp man`: write shell completions and man pages.
 
 use std::{io::Write as _, path::Path};
 
@@ -10,7 +10,7 @@ use crate::{
     failure::Failure,
 };
 
-/// Prints completions.
+/// Prints a completion script.
 pub(crate) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "bp", &mut script);

@@ -1,4 +1,4 @@
-//! `bp speed`: devices against each other.
+//! `bp speed`: compares the speed of devices.
 
 use std::io::Write;
 

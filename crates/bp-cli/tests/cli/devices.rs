@@ -1,4 +1,4 @@
-//! Backends and devices: how they are listed, checked and chosen, and what happens where there is none.
+//! Backends and devices: how they are listed, checked and chosen, and what happens if there is none.
 
 use std::{fs, process::Command};
 
@@ -58,10 +58,10 @@ fn a_device_is_chosen_by_index_or_name() {
 #[test]
 fn conform_holds_a_backend_against_the_reference() {
     let told = text(&Folder::new().run("conform --backend rayon").stdout);
-    assert!(told.starts_with("rayon: ") && told.contains("cases as scalar to the bit"), "{told}");
+    assert!(told.starts_with("rayon: ") && told.contains("cases match scalar to the bit"), "{told}");
 }
 
-/// No driver is found, whatever this machine has.
+/// Hides all drivers of this machine.
 #[cfg(all(feature = "vulkan", feature = "wgpu"))]
 #[test]
 fn without_a_driver_the_gpu_backends_say_so_and_the_others_work() {
@@ -87,7 +87,7 @@ fn without_a_driver_the_gpu_backends_say_so_and_the_others_work() {
     assert_eq!(listed.matches("unavailable").count(), 2, "{listed}");
 }
 
-/// The loader that is found is an empty file, whatever this machine has.
+/// Replaces this machine's Vulkan loader by an empty file.
 #[cfg(all(feature = "vulkan", feature = "wgpu"))]
 #[test]
 fn without_a_loader_the_gpu_backends_say_so() {
@@ -101,20 +101,20 @@ fn without_a_loader_the_gpu_backends_say_so() {
     }
 }
 
-/// Main memory ends while a plan is being allocated, not before, so that no check can foresee it. Devices with memory of
-/// their own are left out: their drivers reserve more addresses than such a limit leaves.
+/// Main memory runs out while a plan is being allocated, so no check can foresee it. Skips devices with memory of their
+/// own, because their drivers reserve more address space than this limit leaves.
 #[cfg(unix)]
 #[test]
 fn too_little_memory_is_told() {
     let folder = Folder::new();
-    // The plan takes 1.7 GB, a program with a driver half of one.
+    // The plan takes 1.7 GB, and the program with a driver takes 0.5 GB.
     fs::write(folder.path("large.pgm"), [b"P5 800 600 255\n".as_slice(), &[7; 800 * 600]].concat()).unwrap();
     let plan = "--labels 512 --algorithm cfbp --grids 5 --half-steps 1";
     let limited = |kibibytes: u32, arguments: &str| {
         let mut command = Command::new("sh");
         let script = format!("ulimit -v {kibibytes}; exec \"$0\" {arguments}");
         command.args(["-c", &script, env!("CARGO_BIN_EXE_bp")]).current_dir(folder.path(""));
-        // Else every thread of a driver reserves addresses, more of them on more processors.
+        // Otherwise every thread of a driver reserves address space, so that more processors need more.
         command.env("MALLOC_ARENA_MAX", "1");
         command
     };

@@ -49,7 +49,7 @@ impl Folder {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
-    /// Asserts an exit code and that the message has all of `words`; that no panic and no file is left.
+    /// Asserts that a command fails with this exit code and all `words` in its message, without a panic or a new file.
     pub(crate) fn fails(&self, arguments: &str, code: i32, words: &[&str]) {
         self.command_fails(&mut self.command(arguments), code, words);
     }
@@ -76,5 +76,5 @@ fn listing(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// A match of that pair; the output follows.
+/// Arguments to match that pair; the path of the output must follow.
 pub(crate) const MATCH: &str = "match left.png right.png --labels 12 --output";

@@ -1,4 +1,4 @@
-//! The program as its users meet it: options, files, messages, exit codes.
+//! The program as its users see it: options, files, messages, exit codes.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 mod devices;
@@ -31,7 +31,7 @@ fn a_shifted_pair_is_matched_and_evaluated_in_every_format() {
     ] {
         let report = folder.json(&format!("{MATCH} {output} --algorithm {algorithm} {truth} --json"));
         let bad = report["errors"]["visible"]["bad"][1].as_f64().unwrap();
-        assert!(bad < 2.0, "{algorithm}: {bad} % of visible pixels");
+        assert!(bad < 2.0, "{algorithm}: {bad} % of non-occluded pixels");
         assert_eq!(report["settings"]["algorithm"], algorithm);
         let again =
             folder.json(&format!("evaluate {output} truth.png --ground-truth-right truth.png --scale 2 --json"));
@@ -259,7 +259,7 @@ fn unanswered_pixels_are_counted_apart() {
     assert!(text(&folder.run("evaluate half.png truth.png").stdout).contains("unanswered wrong"));
 }
 
-/// Decoders stretch what fills fewer bits: a map's values must be those that are stored.
+/// Decoders stretch values of fewer bits, but a map must have the stored values.
 #[test]
 fn maps_are_read_as_stored_or_refused() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! What every command owes its user: help, man pages, silence on request, nothing left behind.
+//! The common behaviour of all commands: help, man pages, silence on request, nothing left behind.
 
 use std::{fs, process::Stdio, time::Duration};
 

@@ -1,4 +1,4 @@
-//! Many pairs: which are found, what they are called, what is told.
+//! Many pairs: which ones are found, how they are named, and the notes about them.
 
 use std::{
     collections::BTreeSet,
@@ -13,7 +13,7 @@ use crate::folder::{Folder, text};
 /// Options that make matching tiny pairs quick.
 pub(super) const TINY: &str = "--labels 12 --threads 1";
 
-/// Copies the folder's pair to these places.
+/// Copies the folder's pair to these paths.
 pub(super) fn place(folder: &Folder, images: &[&str]) {
     for image in images {
         let to = folder.path(image);
@@ -71,7 +71,7 @@ fn pairs_of_every_layout_are_found_and_what_is_lonely_or_ambiguous_is_told() {
     }
     assert!(told.contains("im2.png and im6.png are taken as its pair, not im0.png and im1.png"), "{told}");
     assert_eq!(told.lines().count(), 4, "{told}");
-    // What was written is not searched, nothing is done twice, and a pair alone gives the same map.
+    // Outputs are not searched, complete pairs are skipped, and a pair matched on its own gives the same map.
     let again = folder.json(&format!("match --pairs in --output in/out --json {TINY}"));
     assert_eq!((&again["pairs"], &again["skipped"]), (&9.into(), &9.into()));
     folder.run(&format!("match in/d/im2.png in/d/im6.png --output alone.pfm {TINY}"));
@@ -88,7 +88,7 @@ fn names_that_no_record_can_hold_are_passed_over() {
     place(&folder, &["in/a/left.png", "in/a/right.png", "in/b/left.png", "in/b/right.png"]);
     let odd = folder.path("in").join(OsStr::from_bytes(b"\xff"));
     if fs::rename(folder.path("in/b"), &odd).is_err() {
-        return; // Some file systems hold no such names.
+        return; // Some file systems do not allow such names.
     }
     let output = folder.run(&format!("match --pairs in --output out {TINY}"));
     let told = text(&output.stderr);
@@ -214,7 +214,7 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
         [4, 3]
     );
     assert_eq!(maps(&folder.path("shared")), whole);
-    // A chain whose first frame was another when it was begun is done again, though that frame is complete.
+    // A chain is matched again if its records follow a different first frame, even though the first frame is complete.
     let (new, old) = (fs::read(folder.path("v/left/5.png")).unwrap(), fs::read(folder.path("v/left/0.png")).unwrap());
     run("cut", "--warm-start=3");
     let records: Vec<_> = [1, 2].map(|frame| format!("cut/records/{frame}.json")).into();
@@ -230,14 +230,14 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
     assert_eq!(run("cut", "--warm-start=3")["skipped"], 4);
     assert_eq!(maps(&folder.path("cut")), anew);
     fs::write(folder.path("v/left/0.png"), old).unwrap();
-    // The frames after one that is gone start from another one's messages.
+    // Frames after a missing one start from the messages of a different frame.
     fs::rename(folder.path("v/left/1.png"), folder.path("v/left_1.png")).unwrap();
     assert_eq!(run("warm", "--warm-start=3")["skipped"], 0);
     run("anew", "--warm-start=3");
     fs::remove_file(folder.path("warm/1.pfm")).unwrap();
     assert_eq!(maps(&folder.path("warm")), maps(&folder.path("anew")));
     fs::rename(folder.path("v/left_1.png"), folder.path("v/left/1.png")).unwrap();
-    // A frame that fails at the head of a chain leaves no way for another chain's messages to come in.
+    // If the first frame of a chain fails, the next frame must not start from the messages of another chain.
     fs::write(folder.path("v/left/3.png"), "broken").unwrap();
     let broken = "match --video v/left/%d.png v/right/%d.png --warm-start=3 --algorithm cfbp --half-steps 1 --slope 9 --truncation 60 --labels 12";
     for output in ["warm", "broken"] {

@@ -11,20 +11,20 @@ const FORMATS: [&str; 4] = ["pfm", "png", "tif", "npy"];
 /// The options of a geometry.
 const GEOMETRY: &str = "--focal 1870 --baseline 160 --doffs 45.5";
 
-/// A map whose columns have known disparities, but one unknown pixel.
+/// Writes a map with one disparity per column and one unknown pixel.
 fn write_map(folder: &Folder, name: &str, disparity: impl Fn(u32) -> f32) {
     let value = |i: u32| if i == 3 { f32::INFINITY } else { disparity(i % WIDTH) };
     write_pfm(&folder.path(name), 'f', &(0..WIDTH * HEIGHT).map(value).collect::<Vec<_>>());
 }
 
-/// Values `[height][width][channel]` as a PFM of the folder's image size.
+/// Writes values `[height][width][channel]` as a PFM with the size of the folder's images.
 fn write_pfm(path: &Path, kind: char, values: &[f32]) {
     let rows = values.chunks_exact(values.len() / HEIGHT as usize).rev();
     let bytes: Vec<u8> = rows.flatten().flat_map(|value| value.to_le_bytes()).collect();
     fs::write(path, [format!("P{kind}\n{WIDTH} {HEIGHT}\n-1.0\n").as_bytes(), &bytes].concat()).unwrap();
 }
 
-/// The floats that a file ends with, in its order.
+/// The floats at the end of a file, in its order.
 fn floats(path: &Path) -> Vec<f32> {
     let bytes = fs::read(path).unwrap();
     let values = bytes[bytes.len() - 4 * (WIDTH * HEIGHT) as usize..].chunks_exact(4);
@@ -44,7 +44,7 @@ fn sidecar(folder: &Folder, map: &str) -> Value {
 #[test]
 fn the_same_map_is_read_back_from_every_format() {
     let folder = Folder::new();
-    // No disparity of 0, which a PNG stores as 1/256.
+    // Avoids a disparity of 0, which a PNG stores as 1/256.
     for format in FORMATS {
         succeeds(&folder, &format!("{MATCH} a.{format} --min-disparity 1"));
         let report = folder.json(&format!("evaluate a.{format} a.pfm --json"));

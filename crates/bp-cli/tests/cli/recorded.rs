@@ -1,4 +1,4 @@
-//! Recorded runs, ours and strangers', beside one another and in other formats.
+//! Comparing and exporting recorded runs, and refusing files that are not ours.
 
 use std::{
     fs::{self, File},
@@ -23,7 +23,7 @@ fn committed(name: &str) -> String {
         .to_owned()
 }
 
-/// What a committed run has of a backend.
+/// The part of a committed run that one backend measured.
 fn record(backend: &str) -> Value {
     let file = Path::new(&committed(EVERY)).join("record.json");
     let mut record: Value = serde_json::from_slice(&fs::read(file).unwrap()).unwrap();
@@ -32,21 +32,21 @@ fn record(backend: &str) -> Value {
     record
 }
 
-/// The same, with a change, as a file.
+/// Writes that part with a change to a file.
 fn changed(folder: &Folder, backend: &str, file: &str, change: impl FnOnce(&mut Value)) {
     let mut record = record(backend);
     change(&mut record);
     fs::write(folder.path(file), record.to_string()).unwrap();
 }
 
-/// The same without a change; its name.
+/// Writes that part without a change. Returns the name of the file.
 fn run(folder: &Folder, backend: &str) -> String {
     let file = format!("{backend}.json");
     changed(folder, backend, &file, |_| ());
     file
 }
 
-/// A file, how it differs from a committed record, and a word of why it is refused.
+/// A file, its change to a committed record, and a word of the refusal.
 type Change = (&'static str, fn(&mut Value), &'static str);
 
 /// Every measurement of a record.
@@ -125,8 +125,8 @@ fn a_slower_record_with_other_labels_is_told() {
     assert!(words.iter().all(|word| page.contains(word)) && !page.contains('\u{1b}'), "{page}");
 }
 
-/// A record agrees with itself; one whose BP took twice as long has other speed-ups throughout, but not of one plan that
-/// took twice as long too.
+/// A record agrees with itself. If BP takes twice as long, all speed-ups differ, except that of a plan that takes twice
+/// as long too.
 #[test]
 fn speed_ups_of_two_records_are_counted_where_they_overlap() {
     let folder = Folder::new();

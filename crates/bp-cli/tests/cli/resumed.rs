@@ -1,4 +1,4 @@
-//! What is done again of many pairs, after changes, failures and kills, and what is not.
+//! Which of many pairs are matched again after changes, failures and kills.
 
 use std::{
     fs,
@@ -30,11 +30,11 @@ fn only_what_changed_is_done_again() {
     assert_eq!((done(""), done(""), done("--backend scalar"), done("--force")), (3, 0, 0, 3));
     fs::copy(folder.path("truth.png"), folder.path("in/right/2.png")).unwrap();
     assert_eq!((done(""), done("")), (1, 0));
-    // As `touch` does: the same contents.
+    // Like `touch`: the same contents with a new time.
     let bytes = fs::read(folder.path("in/left/1.png")).unwrap();
     fs::write(folder.path("in/left/1.png"), bytes).unwrap();
     assert_eq!(done(""), 0);
-    // As `cp --preserve` does: other contents of equal length and time.
+    // Like `cp --preserve`: other contents of equal length and time.
     let (path, times) = (folder.path("in/left/3.png"), fs::metadata(folder.path("in/left/3.png")).unwrap());
     let other = fs::read(&path).unwrap().into_iter().rev().collect::<Vec<_>>();
     let whole = fs::read(&path).unwrap();
@@ -58,7 +58,7 @@ fn only_what_changed_is_done_again() {
     assert_eq!((with("calib.txt"), with("./calib.txt")), (3, 0));
     calibration(101);
     assert_eq!((with("calib.txt"), done("--slope 3 --also picture")), (3, 3));
-    // What a default says, said.
+    // Giving a default explicitly changes nothing.
     assert_eq!(done("--slope 3 --also picture --colours viridis"), 0);
     fs::rename(folder.path("out"), folder.path("moved")).unwrap();
     let moved = folder.json(&format!("match --pairs in --output moved --json {TINY} --slope 3 --also picture"));
@@ -91,7 +91,7 @@ fn a_pair_that_fails_is_told_recorded_and_tried_again() {
         (&report["done"], &report["skipped"], &report["failures"]),
         (&4.into(), &2.into(), &Value::Array(vec![]))
     );
-    // What has failed otherwise leaves what there is.
+    // Other failures leave existing outputs in place.
     fs::rename(folder.path("wide.png"), folder.path("away.png")).unwrap();
     for options in ["", "--max-memory 1k"] {
         assert_eq!(folder.run(&format!("{run} {options}")).status.code(), Some(3));
@@ -99,7 +99,7 @@ fn a_pair_that_fails_is_told_recorded_and_tried_again() {
     }
     fs::rename(folder.path("away.png"), folder.path("wide.png")).unwrap();
     assert_eq!(folder.json(&format!("{run} --json"))["skipped"], 4);
-    // A map of before is not left to be taken for the answer to other images that fail.
+    // If changed images fail, the map of the earlier images is removed.
     fs::write(folder.path("no.png"), "broken").unwrap();
     assert_eq!(folder.run(&run).status.code(), Some(3));
     assert_eq!(names(&folder.path("out")), ["a", "b", "d"]);
@@ -119,7 +119,7 @@ fn what_an_earlier_command_wrote_besides_is_removed() {
     fs::write(folder.path("out/a.mine.png"), "").unwrap();
     assert_eq!(written("--slope 3 --format npy"), ["a.mine.png", "a.npy", "a.npy.json"]);
     assert_eq!(written("--slope 3 --format npy --no-sidecar"), ["a.mine.png", "a.npy"]);
-    // Of a pair whose map is named as another one's picture.
+    // The map of one pair has the name of another pair's picture.
     written("--format png --also picture");
     fs::write(folder.path("list"), "left.png right.png a.picture\nleft.png right.png a\n").unwrap();
     assert_eq!(written("--format png"), ["a.mine.png", "a.picture.png", "a.picture.png.json", "a.png", "a.png.json"]);
@@ -161,7 +161,7 @@ fn shards_share_all_pairs_in_one_folder() {
     assert_eq!((&whole["done"], &whole["skipped"]), (&7.into(), &7.into()));
 }
 
-/// Pairs that take a while, so that there is something to interrupt.
+/// Pairs that take long enough to be interrupted.
 fn slow(folder: &Folder, pairs: usize) -> String {
     let noise = |x: u32, y: u32| ((x * x * 7 + x * y * 13 + y * 31 + x * 5) % 251) as u8;
     for (name, shift) in [("l.pgm", 0), ("r.pgm", 3)] {

@@ -27,7 +27,7 @@ fn a_memory_limit_is_kept_by_strips_then_by_tiles_or_refused() {
     let (told, report) = (text(&output.stderr), text(&output.stdout));
     assert!(told.contains("tiles of up to") && report.contains("nearly the whole image's answer"), "{told}{report}");
     folder.fails(&format!("{again} --messages-hash"), 6, &["--messages-hash"]);
-    // Tiles keep no messages for the next frame; of many pairs, the one read and the one written count too.
+    // Tiles keep no messages for the next frame. In a batch, the pairs being read and written count too.
     for (from, to) in [("high-left.png", "l1.png"), ("high-right.png", "r1.png")] {
         fs::copy(folder.path(from), folder.path(to)).unwrap();
     }

@@ -1,4 +1,4 @@
-//! Devices against each other.
+//! Comparing the speed of devices.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::folder::{Folder, text};
 
-/// The quickest of all runs.
+/// The fastest possible run.
 const QUICK: &str = "speed --quick --problem sweep --backend scalar,rayon --threads 2";
 
 #[test]
@@ -31,7 +31,7 @@ fn a_run_writes_a_page_and_every_sample_once() {
     assert_eq!(fs::read_to_string(folder.path("new/folder/speed.md")).unwrap(), page);
 }
 
-/// Each family is a chart and a table; a chart of its own shows what the kernels move beside what the processor copies.
+/// Each family has a chart and a table. Another chart shows the throughput of the kernels beside that of copying.
 #[test]
 fn families_of_problems_are_drawn() {
     let folder = Folder::new();
@@ -66,7 +66,7 @@ fn what_cannot_be_run_is_told() {
     folder.fails("speed --quick --backend magic", 5, &["magic", "scalar"]);
 }
 
-/// No driver is found, whatever this machine has.
+/// Hides all drivers of this machine.
 #[cfg(feature = "vulkan")]
 #[test]
 fn a_device_that_is_not_there_does_not_keep_others_from_running() {

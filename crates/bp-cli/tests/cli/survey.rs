@@ -1,8 +1,8 @@
-//! Labels from a look at the images, and warnings of pairs that are none.
+//! Labels that the survey of the images finds, and warnings about wrong pairs.
 
 use super::folder::{Folder, text};
 
-/// Two views of a noisy plane 9 px apart, one whose rows are 2 px lower, and another scene; large enough to be looked at.
+/// Two views of a noisy plane 9 px apart, one with rows 2 px lower, and another scene; all large enough for the survey.
 fn views() -> Folder {
     let folder = Folder::new();
     let noise = |x: u32, y: u32| {
@@ -32,7 +32,7 @@ fn labels_auto_takes_the_range_that_the_images_need() {
     assert_eq!(settings("a.png b.png -o map.pfm"), (7, 16));
     assert_eq!(settings("b.png a.png -o map.pfm"), (-11, 16));
     assert_eq!(settings("a.png b.png -o map.pfm --min-disparity 2"), (2, 32));
-    // The margin alone is negative here, and a PNG holds nothing negative.
+    // Only the margin is negative here, and a PNG cannot hold negative disparities.
     assert_eq!(settings("a.png a.png -o map.pfm"), (-2, 16));
     assert_eq!(settings("a.png a.png -o map.png"), (0, 16));
     let output = folder.run("match a.png b.png -o map.pfm --labels auto");

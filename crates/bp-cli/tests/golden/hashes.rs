@@ -1,4 +1,4 @@
-//! Maps and messages of a dozen plans, the same on every backend.
+//! Maps and messages of several plans, which must be the same on every backend.
 
 use std::{fs, path::Path};
 
@@ -42,7 +42,7 @@ fn hashes(folder: &Path, backend: &str) -> String {
     PLANS.map(line).concat()
 }
 
-/// Backends without a device are left out; with BP_REQUIRE_GPU=1 none may be.
+/// Skips backends without a device. With BP_REQUIRE_GPU=1, such a backend is a failure.
 #[test]
 fn maps_and_messages_on_every_backend() {
     let folder = folder();

@@ -1,5 +1,5 @@
-//! What must not change by accident: help, the shape of every JSON, maps, messages and exit codes, each as a file beside
-//! this one. `BLESS=1 cargo test --test golden` writes them anew; a commit that does so says why.
+//! Outputs that must not change by accident: help, the shape of every JSON, maps, messages and exit codes. Their golden
+//! files are beside this one. `BLESS=1 cargo test --test golden` rewrites them; a commit that does so says why.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 mod hashes;
@@ -14,7 +14,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Commands by their names; the empty one is the program itself.
+/// The names of the commands; the empty name is the program itself.
 #[cfg(all(feature = "vulkan", feature = "wgpu"))]
 const COMMANDS: [&str; 16] = [
     "",
@@ -35,7 +35,7 @@ const COMMANDS: [&str; 16] = [
     "man",
 ];
 
-/// Compares a text with its golden file, or writes that.
+/// Compares a text with its golden file, or rewrites the file.
 fn check(name: &str, found: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
     if env::var_os("BLESS").is_some() {
@@ -69,7 +69,7 @@ fn run_in(folder: &Path, arguments: &str) -> Output {
     command.output().unwrap()
 }
 
-/// The same where no GPU is found, whatever this machine has.
+/// Like [`run_in`], but hides all GPUs of this machine.
 fn without_gpu(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bp"));
     command.args(arguments.split_whitespace()).current_dir(folder).env_remove("BP_DATA");

@@ -1,4 +1,4 @@
-//! The shape of a JSON value: every path that it has, with the types found there.
+//! The shape of a JSON value: all its paths, with the types of their values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,8 +6,8 @@ use serde_json::Value;
 
 type Types = BTreeMap<String, BTreeSet<&'static str>>;
 
-/// A line for every path; items of an array share theirs. Whatever is named after a device, a stage or a fact shows as
-/// one path too: keys with spaces are no fields.
+/// One line for each path. The items of an array share a path. Keys with a space or a slash share one too: they are
+/// names of devices, stages or facts, not fields.
 pub(crate) fn of(value: &Value) -> String {
     let mut types = Types::new();
     add(value, "", &mut types);

@@ -5,9 +5,9 @@ use crate::{DisparityMap, Error, metrics::check_size};
 /// Two disparities agree, and belong to one surface, if they differ by no more than this many pixels.
 pub const AGREE: f32 = 1.0;
 
-/// Makes every pixel of the left map unknown unless its match in the right image agrees: at column `floor(x - d + 1/2)` the
-/// right map has to be known and to differ by no more than [`AGREE`] (Fua 1993). Occluded pixels fail this check, and so
-/// do most wrong ones.
+/// Makes every pixel of the left map unknown unless its match in the right image agrees: the right map at column
+/// `floor(x - d + 1/2)` must be known and differ by no more than [`AGREE`] (Fua 1993). Occluded pixels fail this check,
+/// and so do most wrong ones.
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the maps differ in size.
@@ -25,7 +25,7 @@ pub fn check_left_right(left: DisparityMap, right: &DisparityMap) -> Result<Disp
     }))
 }
 
-/// By how much the disparity of column `x` differs from that of its match in the right map's row; `None` if either
+/// The difference between the disparity of column `x` and that of its match in the right map's row; `None` if either
 /// is unknown or the match lies outside.
 pub(super) fn difference(x: usize, disparity: f32, right: &[f32]) -> Option<f32> {
     let column = (x as f32 - disparity + 0.5).floor();

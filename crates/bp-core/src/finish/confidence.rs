@@ -7,13 +7,13 @@ use super::{
 };
 use crate::{DisparityMap, Error, metrics::check_size};
 
-/// The confidence of each pixel of the left map, `[height][width]`, from 0 to 1: the mean worth of the pixels in the window
-/// of 9x9 around it. A pixel that differs from the centre by no more than [`AGREE`] is worth 1 if the right map has the
-/// same disparity there, and half if it differs by no more than [`AGREE`]. All others, and those outside the image, are
-/// worth nothing.
+/// The confidence of each pixel of the left map, `[height][width]`, from 0 to 1: the mean worth of the pixels in the
+/// 9x9 window around it. A pixel that differs from the centre by no more than [`AGREE`] is worth 1 if its match in the
+/// right map has the same disparity, and half if that differs by no more than [`AGREE`]. All other pixels, and those
+/// outside the image, are worth nothing.
 ///
-/// The measure is ours. Simple as it is, it separates right pixels from wrong ones nearly as well as the best that we tried
-/// (docs/algorithms.md).
+/// The measure is ours. Although it is simple, it separates correct pixels from wrong ones nearly as well as the best
+/// measure that we tried (docs/algorithms.md).
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the maps differ in size, [`Error::OutOfMemory`].
@@ -36,7 +36,7 @@ pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>,
     Ok(sums)
 }
 
-/// The worth of a pixel on its own.
+/// The worth of a single pixel.
 fn worth(x: usize, disparity: f32, right: &[f32]) -> f32 {
     match difference(x, disparity, right) {
         Some(0.0) => 1.0,

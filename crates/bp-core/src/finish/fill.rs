@@ -2,8 +2,9 @@
 
 use crate::DisparityMap;
 
-/// Fills every unknown pixel with the smaller of the next known disparities to its left and right: a pixel that one camera
-/// does not see belongs to the surface behind. A row without known pixels is copied from the row above, else from below.
+/// Fills every unknown pixel with the smaller of the nearest known disparities to its left and right, because a pixel
+/// that one camera does not see belongs to the surface behind. A row without known pixels is copied from the row above
+/// or, if that is unknown too, from the row below.
 #[must_use]
 pub fn fill(map: DisparityMap) -> DisparityMap {
     let width = map.size().width;
@@ -31,7 +32,7 @@ fn fill_row(row: &mut [f32]) {
     }
 }
 
-/// Copies row `from` to row `to` if that is unknown. By now a row is known or unknown as a whole.
+/// Copies row `from` to row `to` if `to` is unknown. At this point a row is either all known or all unknown.
 fn take_over(values: &mut [f32], width: usize, from: usize, to: usize) {
     if !values[to * width].is_finite() {
         values.copy_within(from * width..(from + 1) * width, to * width);

@@ -3,20 +3,20 @@
 use super::window::{Frame, Framed};
 use crate::{DisparityMap, Error};
 
-/// The sides of windows that [`median`] knows.
+/// The window sides that [`median`] supports.
 pub const MEDIANS: [usize; 3] = [3, 5, 7];
 
 /// How many columns are sorted together.
 const LANES: usize = 16;
 
-/// One value of each of some windows.
+/// One value from each of [`LANES`] windows.
 type Lanes = [f32; LANES];
 
-/// Replaces every known disparity by the median of the known ones in the window of `side` x `side` around it. The border
-/// repeats outward. Of an even number of values, the smaller of the two in the middle counts.
+/// Replaces every known disparity by the median of the known ones in the `side` x `side` window around it. The border
+/// repeats outward. The median of an even number of values is the smaller of the two in the middle.
 ///
 /// # Errors
-/// [`Error::Plan`] if `side` is none of [`MEDIANS`], [`Error::OutOfMemory`].
+/// [`Error::Plan`] if `side` is not one of [`MEDIANS`], [`Error::OutOfMemory`].
 pub fn median(map: &DisparityMap, side: usize) -> Result<DisparityMap, Error> {
     if !MEDIANS.contains(&side) {
         return Err(Error::Plan("a median is over windows of 3, 5 or 7 pixels"));
@@ -33,7 +33,7 @@ pub fn median(map: &DisparityMap, side: usize) -> Result<DisparityMap, Error> {
     DisparityMap::new(size, medians)
 }
 
-/// The medians of the windows from column `start` on; `windows` holds the row once for every place in the window.
+/// The medians of the windows from column `start` on. `windows` holds a shifted row for every position in the window.
 fn chunk(windows: &[&[f32]], start: usize, medians: &mut [f32]) {
     let mut values = [[0.0; LANES]; MEDIANS[MEDIANS.len() - 1] * MEDIANS[MEDIANS.len() - 1]];
     let values = &mut values[..windows.len()];
@@ -50,7 +50,7 @@ fn chunk(windows: &[&[f32]], start: usize, medians: &mut [f32]) {
     }
 }
 
-/// The medians of an odd number of values: least and greatest go to the ends again and again, and are done with.
+/// The medians of an odd number of values. Each round moves the least and greatest values to the ends and drops them.
 fn middle(mut values: &mut [Lanes]) -> Lanes {
     while let [first, inner @ .., last] = values {
         sort(first, last);

@@ -11,7 +11,7 @@ use crate::{DisparityMap, Error, memory};
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
     let mut seen = memory::filled("surfaces", pixels, false)?;
-    // A surface may have all pixels; none is pushed twice.
+    // A surface may contain all pixels, but no pixel is pushed twice.
     let mut surface = memory::filled("surfaces", pixels, 0)?;
     Ok(map.replaced(|values| {
         for start in 0..pixels {

@@ -1,4 +1,4 @@
-//! Fractions of disparities.
+//! Sub-pixel refinement.
 
 use super::{
     check::AGREE,
@@ -9,11 +9,11 @@ use crate::{DisparityMap, Error};
 /// How far the window reaches from its centre.
 const REACH: usize = 4;
 
-/// Replaces every disparity by the mean of those in the window of 9x9 around it that differ by no more than [`AGREE`]. The
+/// Replaces every disparity by the mean of those in the 9x9 window around it that differ by no more than [`AGREE`]. The
 /// labels of a slanted surface form steps; their mean follows the slope.
 ///
-/// The method is ours. It halves the number of errors above 0.5 px if the truth is finer than whole pixels. A parabola
-/// through the matching costs did not (docs/algorithms.md).
+/// The method is ours. It halves the number of errors above 0.5 px if the ground truth is finer than whole pixels.
+/// Fitting a parabola to the matching costs did not (docs/algorithms.md).
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
@@ -35,12 +35,12 @@ pub fn subpixel(map: &DisparityMap) -> Result<DisparityMap, Error> {
     DisparityMap::new(size, means)
 }
 
-/// Where the pixels of the window lie in its frame.
+/// The position of each pixel of the window in its frame.
 pub(super) fn window() -> impl Iterator<Item = (usize, usize)> {
     (0..=2 * REACH).flat_map(|dy| (0..=2 * REACH).map(move |dx| (dx, dy)))
 }
 
-/// Adds differences to those neighbours that are near, and counts them.
+/// Adds the differences to neighbours with a similar disparity, and counts these neighbours.
 fn add_near(row: &[f32], neighbours: &[f32], sums: &mut [f32], counts: &mut [f32]) {
     for (((&own, &other), sum), count) in row.iter().zip(neighbours).zip(sums).zip(counts) {
         let difference = other - own;

@@ -4,8 +4,8 @@ use super::Plan;
 use crate::{Schedule, Stage};
 
 impl Plan {
-    /// The bytes that each stage has to read and write at least, in the order of [`Stage::ALL`], if every stage reads its
-    /// input from memory and writes its output there. It counts each value once per step. `None` under
+    /// The minimum number of bytes that each stage reads and writes, in the order of [`Stage::ALL`], if every stage
+    /// reads its input from memory and writes its output there. Each value counts once per step. `None` under
     /// [`Schedule::Sweep`], whose stages share their input in ways that differ between backends.
     #[must_use]
     pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
@@ -21,7 +21,7 @@ impl Plan {
         let greys = |grid: usize| self.grey_bytes(grid - 1) + self.grey_bytes(grid);
         let coarsen = |grid: usize| self.summed_bytes(grid - 1) + self.written_bytes(grid) + greys(grid);
         let coarsen = (1..grids).map(coarsen).sum();
-        // The coarsest grid's first messages are zeros, which nothing is read for.
+        // The coarsest grid starts with zeros, which need no reads.
         let refine =
             (0..grids).map(|grid| messages(grid) + if grid + 1 < grids { messages(grid + 1) } else { 0 }).sum();
         let step = |grid| Some(costs_of_step(grid)? + 2 * self.updates_per_step(grid) + self.grey_bytes(grid));
@@ -30,13 +30,13 @@ impl Plan {
         Some([images + self.written_bytes(0) + self.grey_bytes(0), coarsen, refine, steps, select_labels])
     }
 
-    /// Bytes of a grid's costs that the next coarser one's are summed from.
+    /// Bytes that the next coarser grid reads to sum this grid's costs.
     fn summed_bytes(&self, grid: usize) -> u64 {
         let bytes = if self.keeps_sums(grid) { self.sum_bytes(grid) } else { 1 };
         (self.volume(grid) * bytes) as u64
     }
 
-    /// Bytes of a grid's costs, its sums included where it keeps some.
+    /// Bytes of a grid's costs, including its sums if it keeps any.
     fn written_bytes(&self, grid: usize) -> u64 {
         let sums = if self.keeps_sums(grid) { self.summed_bytes(grid) } else { 0 };
         self.volume(grid) as u64 + sums
@@ -54,7 +54,7 @@ mod tests {
         Plan::new(size, model, Settings { grids, steps, schedule, ..settings }).unwrap().moved_bytes()
     }
 
-    /// Counted by hand: 4x2 nodes have 10 edges, and 2x1 one; each holds 3 labels a node or message.
+    /// Counted by hand: 4x2 nodes have 10 edges, 2x1 nodes have 1. Each node and each message has 3 labels.
     #[test]
     fn every_value_of_a_step_is_counted_once() {
         let [images, costs, messages, labels] = [2 * 8, 8 * 3, 2 * 10 * 3, 2 * 8];
@@ -73,7 +73,7 @@ mod tests {
         assert_eq!(moved(Schedule::Sweep, 1, 1), None);
     }
 
-    /// Counted by hand: a grey value is written once a node, read by the coarser grid, and read by every step.
+    /// Counted by hand: each node's grey value is written once, read by the coarser grid, and read in every step.
     #[test]
     fn weak_edges_cost_a_byte_a_node() {
         let size = Size { width: 4, height: 2 };

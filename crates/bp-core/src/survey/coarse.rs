@@ -1,4 +1,5 @@
-//! Window matching of the shrunk pair, from both sides at once: a window of census codes against all others of its row.
+//! Window matching of the shrunk pair, in both directions at once: compares each window of census codes with all
+//! windows in the corresponding row of the other image.
 
 use std::ops::Range;
 
@@ -8,21 +9,21 @@ use crate::{DisparityMap, Error, StereoPair, finish, memory};
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.
 const RADIUS: usize = 2;
 
-/// What a pixel costs whose match lies outside the right image: half of the bits differ, as between unrelated pixels.
+/// The cost of a pixel whose match lies outside the right image: half of the bits differ, as between unrelated pixels.
 const OUTSIDE: u8 = 4;
 
-/// What no window costs.
+/// Greater than the cost of any window.
 const IMPOSSIBLE: u8 = u8::MAX;
 
-/// Connected matches that cover less than one in so many pixels are a speck.
+/// Connected matches that cover less than `1 / SPECK` of the pixels are a speck.
 const SPECK: usize = 400;
 
-/// No fewer matches than these are more than a speck.
+/// Fewer connected matches than this are always a speck.
 const LEAST_PATCH: usize = 16;
 
-/// Trustworthy matches of the small left image.
+/// Reliable matches of the small left image.
 pub(super) struct Matches {
-    /// What a left pixel of row y shows was looked for in row `y + rows_down` of the right image.
+    /// The matches of row y of the left image were searched for in row `y + rows_down` of the right image.
     pub(super) rows_down: isize,
     /// Disparities in small pixels.
     map: DisparityMap,
@@ -34,7 +35,7 @@ impl Matches {
         self.found().count()
     }
 
-    /// Their share, 0 to 1.
+    /// The share of pixels that have a match, from 0 to 1.
     pub(super) fn share(&self) -> f64 {
         self.count() as f64 / self.map.size().pixels() as f64
     }
@@ -60,7 +61,7 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
     Ok(Matches { rows_down, map })
 }
 
-/// The costs of a pair, and room for one row of answers. Index `reach + d` stands for disparity d.
+/// The costs of a pair, and buffers for the results of one row. Index `reach + d` is disparity d.
 struct Search {
     width: usize,
     height: usize,
@@ -88,7 +89,7 @@ impl Search {
         Ok(search)
     }
 
-    /// Columns of left pixels that match inside the right image at disparity `index`, and of the pixels they match.
+    /// The columns of left pixels whose match at disparity `index` is inside the right image, and of these matches.
     fn columns(&self, index: usize) -> [Range<usize>; 2] {
         let end = (self.width + index).saturating_sub(self.reach).min(self.width);
         let left = index.saturating_sub(self.reach)..end;
@@ -118,7 +119,7 @@ impl Search {
         }
     }
 
-    /// Fills a row of matches with those that both sides agree on and that are distinct.
+    /// Fills a row with the matches that are distinct and agree in both directions.
     fn match_row(&mut self, y: usize, matches: &mut [f32]) {
         self.sum_windows(y);
         self.left.clear();
@@ -150,7 +151,7 @@ impl Search {
         }
     }
 
-    /// Finds the least cost of each left pixel at disparities that are no neighbours of its best one.
+    /// Finds the least cost of each left pixel at disparities that are not adjacent to its best one.
     fn find_second(&mut self) {
         self.second.fill(IMPOSSIBLE);
         for (index, windows) in self.windows.chunks_exact(self.width).enumerate() {
@@ -179,7 +180,7 @@ impl Best {
         self.cost.fill(IMPOSSIBLE);
     }
 
-    /// Takes what is cheaper at disparity `index`.
+    /// Updates the pixels whose cost is lower at disparity `index`.
     fn take(&mut self, columns: Range<usize>, costs: &[u8], index: u8) {
         let best = self.cost[columns.clone()].iter_mut().zip(&mut self.index[columns]);
         for ((least, best), &cost) in best.zip(costs) {
@@ -189,7 +190,7 @@ impl Best {
     }
 }
 
-/// Sums of the `2 * RADIUS + 1` values from each place on.
+/// Adds to each sum the `2 * RADIUS + 1` values that start at its index.
 fn add_shifted(sums: &mut [u8], values: &[u8]) {
     for shift in 0..=2 * RADIUS {
         sums.iter_mut().zip(&values[shift..]).for_each(|(sum, value)| *sum += value);

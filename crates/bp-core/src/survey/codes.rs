@@ -1,11 +1,11 @@
-//! Census codes of a rectangle at once: each grey value is looked up once, and rows of codes come eight comparisons a
-//! value.
+//! Census codes of a whole rectangle. It reads each grey value once, then computes the codes row by row, with eight
+//! comparisons per code.
 
 use std::ops::Range;
 
 use crate::Image;
 
-/// The codes of [`crate::census::code`] of the pixels at `columns` and `rows`, `[rows][columns]`.
+/// The codes of the pixels at `columns` and `rows`, `[rows][columns]`; see [`crate::census::code`].
 pub(super) fn of_rectangle(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<u8> {
     let (width, height) = (columns.len(), rows.len());
     let wide = width + 2;

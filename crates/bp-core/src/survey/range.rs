@@ -1,30 +1,30 @@
-//! From coarse matches to the labels that a pair needs.
+//! Derives the labels that a pair needs from its coarse matches.
 
 use super::coarse::Matches;
 use crate::{MAX_LABELS, Model};
 
-/// One in so many matches may lie beyond either end: what remains of false ones.
+/// One in this many matches may lie beyond either end of the range, because some false matches remain.
 const BEYOND: usize = 1000;
 
-/// Small pixels that both ends are widened by: a coarse disparity is off by as much as one, and surfaces that go on
-/// beyond what was found are narrow there and easily missed.
+/// The margin added at both ends, in shrunk pixels. A coarse disparity may be off by one, and parts of surfaces beyond
+/// the range found are narrow and easily missed.
 const MARGIN: i32 = 2;
 
-/// Labels come in multiples of these.
+/// The number of labels is a multiple of this.
 const LABEL_STEP: usize = 16;
 
-/// The disparities that a coarse look found, in pixels of the pair.
+/// The range of disparities that coarse matching found, in pixels of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SeenDisparities {
-    /// The least one, but for one match in a thousand.
+    /// The least disparity, ignoring one match in a thousand.
     pub least: i32,
-    /// The largest one, but for one match in a thousand.
+    /// The largest disparity, ignoring one match in a thousand.
     pub largest: i32,
-    /// By how much either may be off: a pixel of the shrunk images.
+    /// How far off either may be: one pixel of the shrunk images.
     pub step: i32,
 }
 
-/// Labels to match with.
+/// The labels to match with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DisparityRange {
     /// Disparity of the first label in pixels.
@@ -40,7 +40,7 @@ impl DisparityRange {
         self.min_disparity + self.labels as i32 - 1
     }
 
-    /// The range from another first disparity to the same last one, or past that to the next number of labels.
+    /// The range from another first disparity to the same last one, with the number of labels rounded up.
     #[must_use]
     pub fn starting_at(&self, min_disparity: i32) -> Self {
         Self::spanning(min_disparity, self.max_disparity())
@@ -62,14 +62,14 @@ impl SeenDisparities {
         Some(Self { least: step * least, largest: step * largest, step })
     }
 
-    /// Labels for all of them and a margin. Those left over by rounding go to the near end, and so do those beyond
-    /// [`MAX_LABELS`], which are left out.
+    /// Labels that cover this range and a margin. Rounding up adds labels at the near end (large disparities). Labels
+    /// beyond [`MAX_LABELS`] are dropped at the same end.
     #[must_use]
     pub fn range(&self) -> DisparityRange {
         DisparityRange::spanning(self.least - MARGIN * self.step, self.largest + MARGIN * self.step)
     }
 
-    /// Whether some lie below the first label of a model, and whether some lie above its last.
+    /// Whether some disparities lie below the first label of a model, and whether some lie above its last.
     #[must_use]
     pub fn beyond(&self, model: &Model) -> [bool; 2] {
         let (first, last) = (model.disparity(0), model.disparity(model.labels() as u16 - 1));

@@ -1,14 +1,14 @@
-//! Whether rows correspond: a few hundred matches looked at in full size, a window of census codes each.
+//! Checks whether rows correspond: compares windows of census codes around a few hundred matches at full resolution.
 
 use std::ops::Range;
 
 use super::{coarse::Matches, codes};
 use crate::{Image, Node, Size, StereoPair};
 
-/// Matches looked at, up to twice as many.
+/// The number of matches to check. Up to twice as many are checked.
 const POINTS: usize = 256;
 
-/// So many times more where there are coarse matches at several row offsets, many of which will be false.
+/// The factor on [`POINTS`] if there are coarse matches at several row offsets, because many of those are false.
 const MORE: usize = 4;
 
 /// Columns of a window: their codes fill 64 bits.
@@ -17,12 +17,12 @@ const WINDOW_WIDTH: usize = 8;
 /// Rows of a window.
 const WINDOW_HEIGHT: usize = 7;
 
-/// Another row offset is better where the sum of what points gain by it is so many times the root of the sum of the
-/// squares of that. Chance hardly ever gives 4, and fewer than 16 points never do.
+/// A row offset is clearly better if the sum of the points' gains is at least this many times the root of the sum of
+/// their squares. Chance hardly ever gives 4, and fewer than 16 points never do.
 const CLEARLY: i64 = 4;
 
-/// By how many rows the right image lies too low, in pixels of the pair: what left pixel (x, y) shows is seen at
-/// (x - d, y + offset). Where the offsets of the parts differ, one image is turned or scaled against the other.
+/// By how many rows the right image lies too low, in pixels of the pair: left pixel (x, y) corresponds to right pixel
+/// (x - d, y + offset). If the offsets of the parts differ, one image is rotated or scaled relative to the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RowOffsets {
     /// In all parts together.
@@ -37,14 +37,14 @@ pub struct RowOffsets {
     pub bottom: i32,
 }
 
-/// A left pixel, and what its window differs by from the best one at each row offset from `-reach` to `reach`.
+/// A left pixel, and how much its window differs from the best match at each row offset from `-reach` to `reach`.
 struct Point {
     x: usize,
     y: usize,
     costs: Vec<u32>,
 }
 
-/// The row offsets, if another than 0 is clearly better somewhere. `looks` are coarse matches at several offsets.
+/// The row offsets, if one other than 0 is clearly better in any part. `looks` are coarse matches at several offsets.
 pub(super) fn offsets(pair: &StereoPair, looks: &[Matches], factor: usize) -> Option<RowOffsets> {
     let most_down = looks.iter().map(|look| look.rows_down.unsigned_abs()).max()?;
     let reach = factor * (most_down + 2);
@@ -65,7 +65,7 @@ pub(super) fn offsets(pair: &StereoPair, looks: &[Matches], factor: usize) -> Op
     (offsets != RowOffsets::default()).then_some(offsets)
 }
 
-/// The row offset at which windows differ least, if the mean of what points gain by it is far above chance.
+/// The row offset at which windows differ least, if the points gain clearly more from it than by chance; otherwise 0.
 fn offset(points: &[&Point], reach: usize) -> i32 {
     let offset = |i: usize| i as i32 - reach as i32;
     let cost = |i: usize| points.iter().map(|point| u64::from(point.costs[i])).sum::<u64>();
@@ -75,7 +75,7 @@ fn offset(points: &[&Point], reach: usize) -> i32 {
     if gain > 0 && gain * gain >= CLEARLY * CLEARLY * squares { offset(best) } else { 0 }
 }
 
-/// Left pixels in full size, and columns that they match in the right image.
+/// Left pixels at full resolution, and the columns that they match in the right image.
 fn places(looks: &[Matches], factor: usize) -> impl Iterator<Item = (usize, usize, i64)> {
     let count: usize = looks.iter().map(Matches::count).sum();
     let each = move |look: &Matches| {
@@ -110,7 +110,7 @@ fn costs(pair: &StereoPair, Node { x, y }: Node, column: i64, reach: usize, fact
     Some(strips.windows(WINDOW_HEIGHT).map(least).collect())
 }
 
-/// The codes of each row of a rectangle, [`WINDOW_WIDTH`] from every place on where so many are left.
+/// The codes of each row of a rectangle as words: one for each run of [`WINDOW_WIDTH`] consecutive codes.
 fn words(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<Vec<u64>> {
     let width = columns.len();
     let word = |codes: &[u8]| codes.iter().fold(0, |word: u64, &code| word << 8 | u64::from(code));

@@ -1,15 +1,15 @@
-//! A tile: some columns and rows of an image, and the plan and the pair that they are matched with.
+//! A tile: some columns and rows of an image, with the plan and the part of the pair used to match them.
 
 use std::ops::Range;
 
 use crate::{Cut, Error, Plan, Settings, Size, StereoPair, image::APRON};
 
-/// The columns or the rows of a tile: those that it matches, and those of them whose labels are kept.
+/// The columns or the rows of a tile: all that it matches, and those whose labels are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Span {
-    /// All that are matched.
+    /// All columns or rows that are matched.
     pub all: Range<usize>,
-    /// Those that are kept. The spans of an image keep each of its columns, or rows, once.
+    /// Those whose labels are kept. Together, the spans of an image keep each column, or row, exactly once.
     pub kept: Range<usize>,
 }
 
@@ -63,14 +63,14 @@ impl Tile {
     }
 }
 
-/// How many columns or rows a tile has beside those that it keeps.
+/// The number of extra columns or rows that a tile has before and after those that it keeps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Margin {
     pub(super) before: usize,
     pub(super) after: usize,
 }
 
-/// Splits `len` columns or rows into spans that keep `kept` each. A span also has its margin, as far as the image goes.
+/// Splits `len` columns or rows into spans that keep `kept` each. A span also has the margin, clipped to the image.
 pub(super) fn spans(len: usize, kept: usize, Margin { before, after }: Margin) -> Vec<Span> {
     let span = |start: usize| {
         let end = (start + kept).min(len);

@@ -1,4 +1,4 @@
-//! How a plan is cut into tiles. It is known before anything runs.
+//! How a plan is cut into tiles. This is decided before anything runs.
 
 use super::tile::{Margin, Span, Tile, distinct, spans};
 use crate::{BAND_ROWS, Error, Plan, Schedule, Size};
@@ -7,19 +7,19 @@ use crate::{BAND_ROWS, Error, Plan, Schedule, Size};
 /// and the same colour as in the whole image.
 const ALIGN: usize = 32;
 
-/// How many columns a tile is matched with beside those that it keeps, on either side; rows too, except under `sweep`.
+/// The columns that a tile matches on each side of those that it keeps. The same applies to rows, except under `sweep`.
 pub const HALO: usize = 96;
 
 /// How close the result of tiles comes to that of the whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
-    /// The same to the bit. Either there is one tile, or there are strips under [`Schedule::Sweep`] that begin at seams of
-    /// the coarsest grid: a band depends only on the bands that cover it on coarser grids. A known match rules this out,
-    /// because it sets costs on both sides of a cut, which may be a seam.
+    /// Bit-identical. Either there is one tile, or there are strips under [`Schedule::Sweep`] that begin at seams of
+    /// the coarsest grid: a band depends only on the bands that cover it on coarser grids. A known match rules strips
+    /// out, because it sets costs on both sides of a cut, which may be a seam.
     Same,
     /// Nearly the same: only pixels beyond the halo have no influence.
     Near,
-    /// Less similar: tiles cut bands of coarser grids under [`Schedule::Sweep`].
+    /// Less similar: the tiles cut through bands of coarser grids under [`Schedule::Sweep`].
     Rough,
 }
 
@@ -52,8 +52,8 @@ impl Tiling {
     }
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32, with at least `halo` columns around
-    /// them. If labels match to the left, a tile has as many more columns on its left as the largest disparity, so that
-    /// the pixels it keeps have the costs of the whole image; likewise on the right. Rows have a halo too, but not under
+    /// them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
+    /// keeps have the same costs as in the whole image; likewise on the right. Rows have a halo too, except under
     /// [`Schedule::Sweep`], where bands of rows do not depend on each other.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
@@ -68,16 +68,16 @@ impl Tiling {
         Self { plan, columns, rows }
     }
 
-    /// The tiling that runs within `bytes`. `needed` says how many bytes a device needs for a plan, or why it cannot run it.
-    /// The first of these that fits is taken:
+    /// The tiling that runs within `bytes`. `needed` returns how many bytes a device needs for a plan, or why it cannot
+    /// run it. Takes the first of these that fits:
     ///
     /// 1. the whole image;
     /// 2. the fewest strips of rows that give the same result; see [`Likeness::Same`];
-    /// 3. tiles with a halo of [`HALO`]: those with the least work in all. Under [`Schedule::Sweep`], the highest tiles
-    ///    whose work is at most four times that of the whole image, if there are any.
+    /// 3. tiles with a halo of [`HALO`]: those with the least total work. Under [`Schedule::Sweep`], it prefers the
+    ///    tallest tiles whose work is at most four times that of the whole image.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] with the bytes that the smallest tiles need, or the reason why those cannot run.
+    /// [`Error::OutOfMemory`] with the bytes that the smallest tiles need, or the reason why they cannot run.
     pub fn within(plan: &Plan, bytes: u64, needed: &Needed<'_>) -> Result<Self, Error> {
         let fits = |tiling: &Self| tiling.bytes(needed).is_ok_and(|needed| needed <= bytes);
         let whole = Self::whole(plan.clone());
@@ -158,8 +158,8 @@ impl Tiling {
         plans.fold(0, |sum: u64, plan| sum.saturating_add(plan.message_updates()))
     }
 
-    /// The bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the labels of
-    /// all tiles.
+    /// The bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the
+    /// labels of all tiles.
     ///
     /// # Errors
     /// Those of `needed`.
@@ -178,7 +178,7 @@ impl Tiling {
         Ok(most.saturating_add(2 * self.plan.image_size().pixels() as u64))
     }
 
-    /// Pixels that are matched for each pixel of the image.
+    /// The number of matched pixels per pixel of the image.
     fn work(&self) -> f64 {
         let matched = |spans: &[Span]| spans.iter().map(|span| span.all.len()).sum::<usize>() as f64;
         matched(&self.columns) * matched(&self.rows) / self.plan.image_size().pixels() as f64
@@ -204,7 +204,7 @@ fn exact_strips(plan: &Plan, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
     evenly(size.height.div_ceil(unit), |units| fits(&strips(units))).map(strips)
 }
 
-/// Heights of tiles to try, from the highest.
+/// Heights of tiles to try, the tallest first.
 fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
     let height = plan.image_size().height;
     let highest = match plan.settings().schedule {
@@ -221,8 +221,8 @@ fn widest(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> Option<
     evenly(blocks, |blocks| fits(&tiles(blocks))).map(tiles)
 }
 
-/// Divides `units` into the fewest parts that fit, as even as possible, and returns the units of a part. If a part fits,
-/// every smaller part has to fit too. `None` if not even one unit fits.
+/// Divides `units` into the fewest parts that fit, as evenly as possible, and returns the units of a part. If a part
+/// fits, every smaller part must fit too. `None` if not even one unit fits.
 fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
     let (mut most, mut too_many) = (0, units + 1);
     while most + 1 < too_many {

@@ -17,7 +17,7 @@ pub(crate) struct StripBuffers {
     pub(crate) cost: [usize; 2],
     /// The unclipped data costs.
     pub(crate) sums: Option<[usize; 2]>,
-    /// The messages sent, `[set][side][colour]`. There are two sets under [`Schedule::Sync`], else one.
+    /// The messages sent, `[set][side][colour]`: two sets under [`Schedule::Sync`], otherwise one.
     pub(crate) sent: Vec<[[usize; 2]; 4]>,
 }
 
@@ -30,10 +30,10 @@ pub(crate) struct Buffers {
     pub(crate) features: [usize; 2],
     pub(crate) seed: usize,
     pub(crate) labels: usize,
-    /// Bound in place of sums that are not kept, where a kernel would read or write them.
+    /// Bound in place of sums that are not kept: one buffer to read, one to write.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
-    /// Grey values of the whole grid, where there are weak edges, `[grid]`.
+    /// Grey values of the whole grid, `[grid]`, if the model has weak edges.
     pub(crate) greys: Option<Vec<usize>>,
     /// `[grid][strip]`.
     pub(crate) strips: Vec<Vec<StripBuffers>>,
@@ -47,7 +47,7 @@ impl Buffers {
             list.push(Buffer { name, bytes: bytes.next_multiple_of(BUFFER_ALIGNMENT), memory });
             list.len() - 1
         };
-        // In the order of Program::PARAMETERS, UPLOAD and DOWNLOAD; the size of the first is not known yet.
+        // In the order of Program::PARAMETERS, UPLOAD and DOWNLOAD. The size of the first is not known yet.
         add("parameters", 0, Memory::Device);
         add("upload", 2 * image_bytes(size) + SEED_BYTES, Memory::Upload);
         add("download", label_bytes(size), Memory::Download);

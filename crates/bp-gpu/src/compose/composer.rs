@@ -1,4 +1,4 @@
-//! A program in the making: records dispatches with their buffers and parameters.
+//! Builds a program: records dispatches with their buffers and parameters.
 
 use bp_core::{Plan, Schedule};
 use indexmap::IndexSet;
@@ -28,7 +28,7 @@ pub(super) struct Rows {
     pub(super) count: usize,
 }
 
-/// A program in the making.
+/// A program under construction.
 pub(super) struct Composer<'a> {
     pub(super) plan: &'a Plan,
     pub(super) limits: &'a Limits,
@@ -39,7 +39,7 @@ pub(super) struct Composer<'a> {
     pub(super) bind_groups: IndexSet<BindGroup>,
 }
 
-/// The parameters of a dispatch, its rows, and the number of invocations of a row.
+/// The parameters of a dispatch, its rows, and the number of invocations per row.
 pub(super) struct Work {
     pub(super) parameters: Parameters,
     pub(super) rows: Rows,
@@ -70,8 +70,8 @@ impl Composer<'_> {
         }
     }
 
-    /// The message entries that a row of this work is worth. An invocation computes four messages at four nodes for every
-    /// label, or does less.
+    /// The message entries that a row of this work counts as. An invocation computes four messages at four nodes for
+    /// every label, or does less work.
     fn row_entries(&self, work: &Work) -> u64 {
         work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
     }

@@ -9,7 +9,7 @@ use super::{
 use crate::{Kernel, Pipeline};
 
 impl Composer<'_> {
-    /// The buffer of the grid's grey values. Without weak edges no kernel reads them, and a buffer of costs is bound instead.
+    /// The buffer of the grid's grey values. Without weak edges no kernel reads it, and a buffer of costs is bound.
     pub(super) fn greys_read(&self, nodes: Nodes) -> usize {
         self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
     }
@@ -28,8 +28,8 @@ impl Composer<'_> {
         Pipeline { kernel: Kernel::UpdateMessages, constants }
     }
 
-    /// The buffers of the data costs, of the messages from the other colour, of those that these nodes send, and of the grey
-    /// values.
+    /// The buffers of the data costs, of the messages from the other colour, of the messages that these nodes send, and
+    /// of the grey values.
     pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
         let strip = self.strip(nodes);
         let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
@@ -37,7 +37,7 @@ impl Composer<'_> {
         [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
     }
 
-    /// 1 if a stored data cost plus this many messages plus `more` may exceed 255, else 0.
+    /// 1 if a stored data cost plus this many messages plus `more` may exceed 255, otherwise 0.
     fn saturates(&self, messages: u32, more: u8) -> u32 {
         let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
         (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()

@@ -76,14 +76,14 @@ impl Composer<'_> {
         self.work(Nodes { grid, strip: 0, colour }, Rows { first: 0, step: 1, count })
     }
 
-    /// The buffers that data costs of these nodes are stored to.
+    /// The buffers that store the data costs of these nodes.
     fn costs_written(&self, nodes: Nodes) -> [usize; 2] {
         let strip = self.strip(nodes);
         let sums = strip.sums.map_or(self.buffers.unused_written, |sums| sums[nodes.colour]);
         [strip.cost[nodes.colour], sums]
     }
 
-    /// Computes the costs of a grid. Every strip of the finer grid gives its rows of this one.
+    /// Computes the costs of a grid. Every strip of the finer grid yields the rows that it covers.
     pub(super) fn coarsen(&mut self, part: &mut PartRecorder, grid: usize) {
         self.coarsen_greys(part, grid);
         let (fine, coarse) = (&self.grids[grid - 1], &self.grids[grid]);
@@ -155,7 +155,7 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, vec![sent, planes[0], planes[1]], work);
     }
 
-    /// Records one step, which depends only on the step before, or one loop of [`Schedule::Sweep`].
+    /// Records one step, which depends only on the previous step, or one loop of [`Schedule::Sweep`].
     pub(super) fn step(&mut self, part: &mut PartRecorder, grid: usize, step: u32) {
         let (read, written) = (self.set(step), self.set(step + 1));
         match self.plan.settings().schedule {
@@ -179,7 +179,7 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }
 
-    /// Copies messages that cross the border of two strips to the buffers of the other strip.
+    /// Copies messages that cross the border between two strips to the buffers of the other strip.
     fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, colours: &[usize]) {
         let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
         let bytes = layout.row_bytes();

@@ -29,7 +29,7 @@ impl Recorder {
         self.parts.push_mut(PartRecorder { segments: Vec::new(), most: self.most })
     }
 
-    /// All segments, and which of them are each part's.
+    /// All segments, and the range of segments of each part.
     pub(crate) fn finish(
         self,
         bind_groups: &IndexSet<BindGroup>,
@@ -48,7 +48,7 @@ impl Recorder {
 }
 
 impl PartRecorder {
-    /// Appends a command that is worth this many message entries.
+    /// Appends a command that counts as this many message entries.
     pub(crate) fn push(&mut self, command: Command, entries: u64) {
         match self.segments.last_mut() {
             Some(last) if last.entries + entries <= self.most => {
@@ -64,7 +64,7 @@ impl PartRecorder {
         self.push(command, 0);
     }
 
-    /// Counts the bytes that are moved: every buffer that a kernel binds once per part, and a copy twice.
+    /// Counts the bytes moved: each bound buffer once per part, and the bytes of a copy twice.
     fn count_moved_bytes(&mut self, bind_groups: &IndexSet<BindGroup>, buffers: &[Buffer]) {
         let mut bound: IndexMap<usize, u64> = IndexMap::new();
         let mut others = 0;

@@ -1,4 +1,4 @@
-//! The schedule `sweep`: all bands at the same time, their rows one after another.
+//! The schedule `sweep`: processes all bands at the same time, and their rows one after another.
 
 use bp_core::{BAND_ROWS, Side};
 
@@ -21,7 +21,7 @@ struct BandRow {
 }
 
 impl Composer<'_> {
-    /// Records one loop on a grid, forward and backward through every band; see [`bp_core::Schedule::Sweep`].
+    /// Records one loop on a grid: forward and backward through every band; see [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, part: &mut PartRecorder, grid: usize) {
         let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
         for row in 0..last {
@@ -48,7 +48,7 @@ impl Composer<'_> {
         part.push_short(Command::Barrier);
     }
 
-    /// Records the labels of every band from its top row to its bottom row, in each row first for even nodes.
+    /// Records label selection in every band from its top row to its bottom row, in each row first for even nodes.
     pub(super) fn decode(&mut self, part: &mut PartRecorder) {
         for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
             for (nodes, rows) in self.band_rows(BandRow { grid: 0, colour, row }) {

@@ -1,4 +1,4 @@
-//! What is to be done for each pair, and whether it can be.
+//! The work for each pair: its inputs, outputs and record, and checks before the work begins.
 
 use std::{
     collections::{BTreeSet, HashMap, HashSet},
@@ -18,28 +18,28 @@ use bp_io::{Files, MapFormat, create_folder, resolved};
 use super::{Also, BatchOptions};
 use crate::{Error, Making, Outputs, pairs::Pair};
 
-/// The folder of the records, in that of the outputs.
+/// The folder of the records, inside the output folder.
 pub(super) const RECORDS: &str = "records";
 
-/// After how long nobody can be writing to a temporary file any more.
+/// A temporary file this old is abandoned.
 const ABANDONED: Duration = Duration::from_hours(1);
 
-/// A pair, where its outputs go and where its record is.
+/// A pair, the paths of its outputs and the path of its record.
 pub(super) struct Job {
     pub(super) pair: Pair,
     pub(super) calibration: Option<PathBuf>,
     pub(super) outputs: Outputs,
-    /// Of the outputs, in the order in which their states are recorded.
+    /// The paths of the outputs, in the order in which their states are recorded.
     pub(super) paths: Vec<PathBuf>,
     pub(super) record: PathBuf,
-    /// Which of the pairs that are done together it belongs to.
+    /// The index of its chain; see [`BatchOptions::chain`].
     pub(super) chain: usize,
 }
 
-/// The jobs of a shard. Fails where outputs of any pairs, of other shards too, would be the same file or overwrite
-/// what is read.
+/// The jobs of a shard. Fails if any two pairs, those of other shards included, would write the same file, or if an
+/// output would overwrite an input.
 pub(super) fn jobs(options: &BatchOptions, making: &Making, pairs: &[Pair]) -> Result<Vec<Job>, Error> {
-    // An ending that stands for no format is the fault of none of the pairs.
+    // Checked once: an unknown extension is an error of the options, not of a pair.
     MapFormat::of(&Path::new("NAME").with_added_extension(&options.format))?;
     let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(options, making, index, pair)).collect();
     check_apart(options, &jobs)?;
@@ -71,30 +71,31 @@ impl Job {
         [&self.pair.left, &self.pair.right]
     }
 
-    /// Both images, as messages name them.
+    /// Both images, for messages.
     pub(super) fn images_name(&self) -> String {
         format!("{} and {}", self.pair.left.display(), self.pair.right.display())
     }
 
-    /// The files that the outputs are made of, the images first.
+    /// The files that the outputs are made from: the images, then the calibration.
     pub(super) fn inputs(&self) -> Vec<&Path> {
         self.images().into_iter().chain(self.calibration.as_deref()).collect()
     }
 
-    /// Fails where an output cannot be written.
+    /// Fails if an output cannot be written.
     pub(super) fn check(&self, making: &Making) -> Result<(), Error> {
         self.outputs.check(making, &self.inputs())
     }
 
-    /// Removes files that an earlier run wrote and this one did not: beside the new map they would be taken for its own.
+    /// Removes files that an earlier run wrote and this run did not. Beside the new map they would seem to belong to
+    /// it.
     pub(super) fn remove_others(&self) {
         let Some(earlier) = PairRecord::read(&self.record) else { return };
         let written: HashSet<OsString> = self.paths.iter().map(|path| key(path)).collect();
         self.earlier_outputs(&earlier).filter(|path| !written.contains(&key(path))).for_each(remove);
     }
 
-    /// Removes what an earlier command has made of other images than these, which failed now: it would be taken for
-    /// theirs.
+    /// Removes the outputs of an earlier run from other images, after these images failed. Otherwise those outputs
+    /// would seem to belong to these images.
     pub(super) fn remove_stale(&self, images: &[FileState]) {
         let Some(earlier) = PairRecord::read(&self.record) else { return };
         if !images.is_empty() && !earlier.is_of_contents(images) {
@@ -102,8 +103,8 @@ impl Job {
         }
     }
 
-    /// The outputs that a record tells of, where they are now, as they were: all of a pair are in one folder, which may
-    /// have been moved, and one of such a name may be another pair's by now, or the user's.
+    /// The outputs that a record lists and that are unchanged, at their current paths. All outputs of a pair are in one
+    /// folder, which may have been moved. A changed file of the same name may belong to another pair or to the user.
     fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = PathBuf> {
         earlier.done.outputs.iter().filter_map(|state| {
             let here = self.paths.first()?.with_file_name(state.path.file_name()?);
@@ -116,12 +117,12 @@ impl Job {
     }
 }
 
-/// A file that is not there is as good as removed, and one that cannot be is told where it is written next.
+/// Ignores errors: a missing file needs no removal, and if a file cannot be removed, the next write to it reports why.
 fn remove(path: PathBuf) {
     drop(fs::remove_file(path));
 }
 
-/// Whether nothing is to be done of pairs that are done together, in their order.
+/// Whether all pairs of a chain, given in order, are complete.
 pub(super) fn are_complete(chain: &[Job], settings_sha256: &str) -> bool {
     let mut follows = None;
     chain.iter().all(|job| {
@@ -132,7 +133,8 @@ pub(super) fn are_complete(chain: &[Job], settings_sha256: &str) -> bool {
     })
 }
 
-/// Fails where a job would write what is read, two would write the same file, or one's file is another's folder.
+/// Fails if a job would overwrite an input, two jobs would write the same file, or a file of one is a folder of
+/// another.
 fn check_apart(options: &BatchOptions, jobs: &[Job]) -> Result<(), Error> {
     let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(resolved).collect();
     let files = || jobs.iter().flat_map(|job| job.files().map(move |path| (job.pair.left.display(), path)));
@@ -154,7 +156,7 @@ fn check_apart(options: &BatchOptions, jobs: &[Job]) -> Result<(), Error> {
     files().find_map(taken).map_or(Ok(()), Err)
 }
 
-/// What tells paths apart: letters count as equal in both cases, as they do on some file systems.
+/// The form in which paths are compared. Upper and lower case are equal, as on some file systems.
 fn key(path: &Path) -> OsString {
     path.as_os_str().to_ascii_lowercase()
 }
@@ -164,13 +166,13 @@ fn clash(path: &Path, one: &str, other: &str) -> Error {
     Error::Options(format!("{}: {one} and {other} would both go there; {advice}", path.display()))
 }
 
-/// All folders that files of these jobs are in.
+/// All folders that hold files of these jobs.
 fn folders(options: &BatchOptions, jobs: &[Job]) -> BTreeSet<PathBuf> {
     let parents = jobs.iter().flat_map(Job::files).filter_map(Path::parent);
     parents.chain([options.output.as_path()]).map(Path::to_owned).collect()
 }
 
-/// Removes temporary files of an earlier run of this shard that was killed, and of others that nobody writes any more.
+/// Removes temporary files of a killed run of this shard, and abandoned ones of other shards.
 pub(super) fn clear_leftovers(options: &BatchOptions, jobs: &[Job], files: &Files) -> Result<(), Error> {
     for folder in folders(options, jobs) {
         let entries = fs::read_dir(&folder).map_err(|error| bp_io::Error::writing(&folder, &error))?;
@@ -183,7 +185,7 @@ pub(super) fn clear_leftovers(options: &BatchOptions, jobs: &[Job], files: &File
             };
             let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
             if is(files.prefix()) || (is(Files::PREFIX) && is_old()) {
-                // Another shard, started together with this one, may have been faster.
+                // Another shard that started at the same time may have removed it first.
                 match fs::remove_file(entry.path()) {
                     Err(error) if error.kind() != ErrorKind::NotFound => {
                         return Err(bp_io::Error::writing(&entry.path(), &error).into());

@@ -1,4 +1,4 @@
-//! What is written of every pair when it is done, by which it is known to be complete.
+//! The record of a matched pair. It shows a later run that the pair is complete.
 
 use std::{
     fs::{self, File},
@@ -17,19 +17,19 @@ use bp_io::{CalibrationFile, Colours, Files, Geometry, hex};
 use super::{Also, BatchOptions};
 use crate::{Error, Making, Options, Tiles, description};
 
-/// A file as it was when a pair was done.
+/// The state of a file when its pair was done.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct FileState {
     pub(super) path: PathBuf,
     bytes: u64,
-    /// Nanoseconds since 1970, where the file system tells.
+    /// Time of the last write in nanoseconds since 1970, if the file system knows it.
     modified_ns: Option<u64>,
-    /// The same of the last change in any way, which `cp --preserve` and `tar` do not set back.
+    /// Time of the last change of any kind (ctime), which `cp --preserve` and `tar` do not restore.
     changed_ns: Option<i128>,
     sha256: String,
 }
 
-/// What was done.
+/// The outputs of a pair and how they were made.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Done {
     pub(super) outputs: Vec<FileState>,
@@ -38,23 +38,23 @@ pub(super) struct Done {
     pub(super) backend: String,
     pub(super) device: description::Device,
     pub(super) settings: description::Settings,
-    /// None where the pair was matched as a whole.
+    /// `None` if the pair was matched as a whole.
     pub(super) tiles: Option<Tiles>,
     pub(super) energy: description::Energy,
     pub(super) warnings: Vec<String>,
     pub(super) times: PairTimes,
 }
 
-/// Milliseconds by the wall clock.
+/// Wall-clock times in milliseconds.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct PairTimes {
-    /// Reading both images, while another pair is matched.
+    /// Reading both images; overlaps with the matching of another pair.
     pub read_ms: f64,
     /// From the images in memory to the map in memory.
     pub solve_ms: f64,
-    /// The same with all that matching needs besides: preparing a device for another size, the energy, the map.
+    /// `solve_ms` and everything else that matching needs: planning, preparing the device for a new size, the energy.
     pub match_ms: f64,
-    /// Writing the outputs, while another pair is matched.
+    /// Writing the outputs; overlaps with the matching of another pair.
     pub write_ms: f64,
 }
 
@@ -77,18 +77,19 @@ pub(super) struct PairRecord {
     pub(super) name: PathBuf,
     pub(super) left: PathBuf,
     pub(super) right: PathBuf,
-    /// The [`history`] of the frames before it whose messages its own go back to; none where it started anew.
+    /// The [`history`] of the earlier frames that its messages depend on; `None` after a cold start.
     pub(super) follows: Option<String>,
-    /// Of all settings that outputs depend on; see [`settings_sha256`].
+    /// A hash of all settings that outputs depend on; see [`settings_sha256`].
     pub(super) settings_sha256: String,
     /// The images.
     pub(super) inputs: Vec<FileState>,
-    /// Milliseconds since the pair before it was done, or the command began: these of all pairs are the whole time.
+    /// Milliseconds since the previous pair was done, or since the batch began. Over all pairs they sum to the total
+    /// time.
     pub(super) elapsed_ms: f64,
     pub(super) done: Done,
 }
 
-/// SHA-256 of the images of a frame and, by those before them, of all frames that the messages go back to.
+/// SHA-256 of the images of a frame and of the history before it, and so of all frames that its messages depend on.
 pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
     let mut hash = Sha256::new();
     let frames = follows.into_iter().chain(images.iter().map(|state| state.sha256.as_str()));
@@ -97,17 +98,17 @@ pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
 }
 
 impl PairRecord {
-    /// Reads a record; none where there is none or it is broken.
+    /// Reads a record. Returns `None` if it is missing or broken.
     pub(super) fn read(path: &Path) -> Option<Self> {
         serde_json::from_slice(&fs::read(path).ok()?).ok()
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes the record, whole or not at all.
     pub(super) fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
         Ok(files.json(path, self)?)
     }
 
-    /// Whether its images and outputs are still these files, as they were.
+    /// Whether its images and outputs are these files, unchanged.
     pub(super) fn is_of(&self, images: &[&Path; 2], outputs: &[PathBuf]) -> bool {
         fn same(then: &[FileState], now: &[impl AsRef<Path>]) -> bool {
             then.len() == now.len() && then.iter().zip(now).all(|(then, now)| then.is_still(now.as_ref()))
@@ -115,14 +116,14 @@ impl PairRecord {
         same(&self.inputs, images) && same(&self.done.outputs, outputs)
     }
 
-    /// Whether it tells of images with these contents.
+    /// Whether its images have these contents.
     pub(super) fn is_of_contents(&self, images: &[FileState]) -> bool {
         self.inputs.iter().map(|state| &state.sha256).eq(images.iter().map(|state| &state.sha256))
     }
 }
 
 impl FileState {
-    /// A file as it is now.
+    /// The current state of a file.
     pub(super) fn of(path: &Path) -> io::Result<Self> {
         let path = std::path::absolute(path)?;
         let mut file = File::open(&path)?;
@@ -138,7 +139,7 @@ impl FileState {
         Ok(Self { path, bytes, modified_ns, changed_ns, sha256: hex(&hash.finalize()) })
     }
 
-    /// Whether `path` holds the same. A file that was not written to since is not read again.
+    /// Whether `path` has the same contents. Reads the file only if its path or times changed.
     pub(super) fn is_still(&self, path: &Path) -> bool {
         let Ok(metadata) = fs::metadata(path) else { return false };
         let (bytes, modified_ns, changed_ns) = Self::stamp(&metadata);
@@ -178,7 +179,7 @@ struct OutputSettings<'a> {
     geometry: Option<GeometrySettings>,
 }
 
-/// A geometry as it was read: its file may be another by now.
+/// The values of a geometry, since its file may change later.
 #[derive(Serialize)]
 struct GeometrySettings {
     focal: f64,
@@ -197,8 +198,8 @@ impl From<&Geometry> for GeometrySettings {
     }
 }
 
-/// SHA-256 of the program's version and of everything that outputs depend on: not of where files lie, nor of the device,
-/// since every device gives the same answer.
+/// SHA-256 of the program's version and of everything that outputs depend on. Paths and the device are left out: every
+/// device gives the same answer.
 pub(super) fn settings_sha256(options: &BatchOptions, making: &Making) -> Result<String, Error> {
     let unnamed = Options { backend: String::new(), device: None, threads: None, ..options.matching.clone() };
     let settings = OutputSettings {

@@ -1,4 +1,4 @@
-//! Three threads, a pair in each: one reads, one matches, one writes.
+//! Runs a batch on three threads: one reads, one matches and one writes, each a different pair.
 
 use std::{
     collections::BTreeMap,
@@ -32,7 +32,7 @@ struct Read<'a> {
     read_ms: f64,
 }
 
-/// Two images, and what a quick look at them found.
+/// Two images and their survey.
 struct Surveyed {
     pair: StereoPair,
     survey: Survey,
@@ -45,7 +45,7 @@ struct Matched<'a> {
     answer: Result<Answer, Error>,
 }
 
-/// What an answer depends on: its images, and the history of the frames that its messages go back to.
+/// The inputs of an answer: its images, and the history of the earlier frames that its messages depend on.
 struct PairOrigin {
     inputs: Vec<FileState>,
     follows: Option<String>,
@@ -57,7 +57,7 @@ struct Answer {
     pair: StereoPair,
 }
 
-/// A batch at work.
+/// A running batch.
 pub(super) struct Run<'a> {
     pub(super) options: &'a BatchOptions,
     pub(super) making: &'a Making,
@@ -87,9 +87,9 @@ impl Warned {
 }
 
 impl Run<'_> {
-    /// Matches and writes all jobs; where a pair fails, the others go on.
+    /// Matches and writes all jobs. If a pair fails, the others continue.
     pub(super) fn all(&self, jobs: &[&Job]) -> Result<Vec<Failed>, Error> {
-        // Nothing waits in the channels: at most three pairs are in memory.
+        // The channels have no buffer, so at most three pairs are in memory.
         let (read, to_match) = sync_channel(0);
         let (matched, to_write) = sync_channel(0);
         let writer = Writer { run: self, pairs: jobs.len() as u64, last: Instant::now(), failed: Vec::new() };
@@ -99,16 +99,16 @@ impl Run<'_> {
             let solved = self.solve_all(to_match, matched);
             let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             self.warned.tell_others(self.watch);
-            // Where writing fails, matching ends for want of a writer.
+            // If writing fails, its channel closes and matching ends too; the error to report is the writer's.
             written.and_then(|failed| solved.map(|()| failed))
         })
     }
 
-    /// Reads pair after pair until nobody wants more.
+    /// Reads one pair after another until the batch stops or the receiver is gone.
     fn read_all<'a>(&self, jobs: &[&'a Job], to: &SyncSender<Read<'a>>) {
         for &job in jobs {
             let start = Instant::now();
-            // Taken before the images are read, so that a later change of them is noticed.
+            // Recorded before the images are decoded, so that a later run notices any change since.
             let inputs: io::Result<Vec<FileState>> = job.images().into_iter().map(FileState::of).collect();
             let pair = self.read(job);
             let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
@@ -127,12 +127,12 @@ impl Run<'_> {
         Ok(Surveyed { survey: Survey::of(&pair)?, pair })
     }
 
-    /// Matches pair after pair. A device that is lost is opened again for the next.
+    /// Matches one pair after another. If the device is lost, it is opened again for the next pair.
     fn solve_all<'a>(&self, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Error> {
         let mut matcher = self.matcher()?;
         let mut before: Option<(usize, String)> = None;
         for Read { job, inputs, pair, read_ms } in from {
-            // Not from another chain's messages: whether that is matched in this run must make no difference.
+            // Never from the messages of another chain: the result must not depend on whether this run matched it.
             let follows = before.take().filter(|(chain, _)| *chain == job.chain).map(|(_, history)| history);
             let start = if follows.is_some() { Start::Warm } else { Start::Cold };
             let answer = pair.and_then(|pair| self.match_one(&mut matcher, job, pair, start, read_ms));
@@ -169,7 +169,7 @@ impl Run<'_> {
         let begun = Instant::now();
         let planned = matcher.plan_within(&pair, &survey, &|disparity| job.outputs.hold(disparity))?;
         let warnings: Vec<String> = planned.warnings.iter().map(|warning| warning.about(&job.images_name())).collect();
-        // Told first: exchanged images may be why the outputs cannot hold what is asked for.
+        // Warnings come before the check: exchanged images may be the reason that the outputs cannot hold the labels.
         let is_first = |warning: &Warning| self.warned.count(warning) == 1;
         let firsts = planned.warnings.iter().zip(&warnings).filter(|(warning, _)| is_first(warning));
         firsts.for_each(|(_, text)| self.watch.warn(text));
@@ -190,7 +190,7 @@ fn milliseconds_since(start: Instant) -> f64 {
     1000.0 * start.elapsed().as_secs_f64()
 }
 
-/// The record of an answer, but for the files that are still to be written.
+/// The record of an answer, without its outputs, which are not written yet.
 fn done(matcher: &Matcher, pair: &StereoPair, disparity: &Disparity, warnings: Vec<String>, times: PairTimes) -> Done {
     let solve_ms = 1000.0 * disparity.times.total().as_secs_f64();
     Done {
@@ -207,7 +207,7 @@ fn done(matcher: &Matcher, pair: &StereoPair, disparity: &Disparity, warnings: V
     }
 }
 
-/// Writes outputs and, after them, records.
+/// Writes the outputs and then the record of each pair.
 struct Writer<'a> {
     run: &'a Run<'a>,
     pairs: u64,
@@ -232,7 +232,7 @@ impl Writer<'_> {
             }
             let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
             self.run.watch.tell(Event::Task(&format!("{} pairs{failed}", index + 1)));
-            // Stopping is for the thread that matches; what it has handed over is still written.
+            // Only the matching thread stops. Answers that it has handed over are still written.
             let _ = self.run.watch.progress(index as u64 + 1, self.pairs);
         }
         Ok(self.failed)

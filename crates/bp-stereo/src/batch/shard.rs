@@ -1,4 +1,4 @@
-//! Which part of the pairs a process matches.
+//! The part of the pairs that one process matches.
 
 use std::{
     fmt,
@@ -10,12 +10,12 @@ use std::{
 use crate::Error;
 use bp_io::create_folder;
 
-/// One of several processes that share the pairs; by default the only one.
+/// One of several processes that share the pairs. By default it is the only one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which one, from 0.
+    /// The index of the process, from 0.
     index: usize,
-    /// Of how many.
+    /// The number of processes.
     count: usize,
 }
 
@@ -26,35 +26,35 @@ impl Default for Shard {
 }
 
 impl Shard {
-    /// Whether it has the pair of this index. Every pair is one shard's.
+    /// Whether this shard has the chain of pairs with this index. Every chain belongs to exactly one shard.
     pub(super) fn has(self, pair: usize) -> bool {
         pair % self.count == self.index
     }
 
-    /// How files of its own are told apart.
+    /// The part of a file name that identifies the shard.
     pub(super) fn file_part(self) -> String {
         format!("{}-of-{}", self.index + 1, self.count)
     }
 
-    /// Fails where another process matches this shard: each would take the other's temporary files for leftovers. The
-    /// system ends the lock with the process, however that ends.
+    /// Locks the shard. Fails if another process matches it, because each would remove the other's temporary files as
+    /// leftovers. The system releases the lock when the process ends, however it ends.
     pub(super) fn lock(self, folder: &Path) -> Result<File, Error> {
         create_folder(folder)?;
         let path = folder.join(format!("{}.lock", self.file_part()));
         let file = File::options().create(true).truncate(false).write(true).open(&path);
-        // Somebody else's lock file, in a folder that is shared, can be locked without writing to it.
+        // The lock file of another user, in a shared folder, can be locked without write permission.
         let file = file.or_else(|error| File::open(&path).map_err(|_| bp_io::Error::writing(&path, &error)))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 let advice = "wait for it, choose another `output`, or share the pairs by `shard`";
                 Err(Error::System(format!("{}: another process matches these pairs; {advice}", path.display())))
             }
-            // Some file systems have no locks.
+            // Some file systems do not support locks.
             Err(TryLockError::Error(_)) | Ok(()) => Ok(file),
         }
     }
 
-    /// Where the summary of its pairs is written.
+    /// The path of the summary of its pairs.
     #[must_use]
     pub fn summary_path(self, output: &Path) -> PathBuf {
         output.join(if self.is_all() {
@@ -64,7 +64,7 @@ impl Shard {
         })
     }
 
-    /// Whether there is no other.
+    /// Whether it is the only shard.
     pub(super) fn is_all(self) -> bool {
         self.count == 1
     }

@@ -1,4 +1,4 @@
-//! The summary of a batch, computed from the records of its pairs, so that it covers what earlier runs did.
+//! The summary of a batch, computed from the records of its pairs, so that it includes the work of earlier runs.
 
 use std::{
     collections::HashSet,
@@ -16,34 +16,34 @@ use bp_io::Files;
 
 use crate::{Error, Tiles, description, pairs::Pair};
 
-/// What `--json` prints and summary.json holds.
+/// The contents of summary.json and of `--json`.
 #[derive(Serialize)]
 pub struct Summary {
-    /// I/N, where the work is shared.
+    /// I/N if the batch is shared by several processes.
     pub shard: Option<String>,
     /// Pairs of the shard.
     pub pairs: usize,
-    /// Pairs that are done, now or before.
+    /// Pairs that are done, by this run or an earlier one.
     pub done: usize,
-    /// Pairs among these that were complete before this command.
+    /// Pairs among these that were complete before this run.
     pub skipped: usize,
-    /// Pairs that failed now.
+    /// Pairs that failed in this run.
     pub failures: Vec<Failed>,
-    /// Of every size of images, in the order in which they first came.
+    /// The distinct settings of the pairs, in order of first appearance.
     pub settings: Vec<description::Settings>,
-    /// Those of pairs that were not matched as a whole.
+    /// The distinct tilings of the pairs that were not matched as a whole.
     pub tiles: Vec<Tiles>,
-    /// Devices that matched them.
+    /// The distinct devices that matched the pairs.
     pub devices: Vec<description::Device>,
     /// Sums over all pairs.
     pub times: PairTimes,
-    /// The whole time, start-up and failures before the last pair that is done included.
+    /// Total time in milliseconds, including start-up and failures before the last completed pair.
     pub total_ms: f64,
     /// Median milliseconds from images in memory to the map in memory.
     pub median_solve_ms: Option<f64>,
-    /// Rate from file to file.
+    /// Throughput from file to file.
     pub pairs_per_second: Option<f64>,
-    /// Of matching alone, from images in memory to labels in memory.
+    /// Throughput of matching alone, from images in memory to the map in memory.
     pub solved_per_second: Option<f64>,
     /// The folder of the outputs.
     pub output: PathBuf,
@@ -52,18 +52,18 @@ pub struct Summary {
 /// A pair that could not be matched, and why.
 #[derive(Serialize)]
 pub struct Failed {
-    /// The name of its outputs.
+    /// The name of the pair and its outputs.
     pub name: PathBuf,
     /// The left image.
     pub left: PathBuf,
     /// The right image.
     pub right: PathBuf,
-    /// Why.
+    /// The reason.
     pub failure: String,
 }
 
 impl Summary {
-    /// Sums up a shard's jobs, of which these failed just now.
+    /// Summarises the jobs of a shard; `failures` are those of this run.
     pub(super) fn of(
         output: &Path,
         shard: Shard,
@@ -78,7 +78,7 @@ impl Summary {
         let records = succeeded.map(read).collect::<Result<Vec<_>, _>>()?;
         let done: Vec<&Done> = records.iter().map(|record| &record.done).collect();
         let times = done.iter().fold(PairTimes::default(), |sum, done| sum + done.times);
-        // From 0: the sum of no numbers is -0, and is written so.
+        // Starts from 0.0 because the empty `sum` is -0.0, which would be written as such.
         let total_ms = records.iter().fold(0.0, |sum, record| sum + record.elapsed_ms);
         let rate = |ms: f64| (ms > 0.0 && !done.is_empty()).then(|| 1000.0 * done.len() as f64 / ms);
         Ok(Self {
@@ -99,21 +99,19 @@ impl Summary {
         })
     }
 
-    /// Writes it.
     pub(super) fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
         Ok(files.json(path, self)?)
     }
 }
 
 impl Failed {
-    /// A pair that failed.
     pub(super) fn new(pair: &Pair, failure: &Error) -> Self {
         let Pair { name, left, right } = pair.clone();
         Self { name, left, right, failure: failure.to_string() }
     }
 }
 
-/// All different values, each once.
+/// The distinct values, in order of first appearance.
 fn distinct<'a, T: Clone + PartialEq + 'a>(values: impl Iterator<Item = &'a T>) -> Vec<T> {
     let mut found: Vec<T> = Vec::new();
     for value in values {

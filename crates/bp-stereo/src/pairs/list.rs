@@ -1,14 +1,14 @@
-//! Lists of pairs: a text file with a pair a line.
+//! Lists of pairs: text files with one pair per line.
 
 use std::path::{Component, Path, PathBuf};
 
 use super::{Pair, name_of};
 use crate::Error;
 
-/// What a line may be, as messages say it.
+/// The format of a line, for messages.
 const LINE: &str = "a line holds left, right and, where wanted, a name, with tabs between them if a path has spaces";
 
-/// The pairs of a list that messages call `source`. Empty lines, those that start with # and a heading of
+/// Parses a list of pairs. Messages call it `source`. Empty lines, lines that start with # and the heading
 /// "left,right,name" are skipped.
 ///
 /// # Errors
@@ -39,7 +39,7 @@ fn fields(line: &str) -> Result<Vec<String>, csv::Error> {
     let mut reader = csv::ReaderBuilder::new();
     let mut reader = reader.has_headers(false).delimiter(delimiter).trim(csv::Trim::All).from_reader(line.as_bytes());
     let fields = reader.records().next().transpose()?.unwrap_or_default();
-    // Several spaces are one.
+    // Several spaces count as one.
     Ok(fields.iter().filter(|field| delimiter == b',' || !field.is_empty()).map(str::to_owned).collect())
 }
 

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-/// Compares texts with their runs of digits as numbers: frame2 before frame10. Texts that differ at all are never equal.
+/// Compares texts with their runs of digits as numbers: frame2 before frame10. Different texts never compare as equal.
 pub(super) fn compare(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     loop {
@@ -22,7 +22,7 @@ pub(super) fn compare(a: &str, b: &str) -> Ordering {
     }
 }
 
-/// The digits that a text starts with, without leading zeros, and what follows them.
+/// Splits a text into its leading digits, without leading zeros, and the rest.
 fn split_number(text: &str) -> (&str, &str) {
     let (digits, rest) = text.split_at(text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len()));
     (digits.trim_start_matches('0'), rest)

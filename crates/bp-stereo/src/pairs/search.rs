@@ -1,4 +1,4 @@
-//! Pairs that lie below a folder in a known layout.
+//! Finds the pairs below a folder with a known layout.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,24 +10,24 @@ use walkdir::WalkDir;
 
 use super::{Found, Pair, natural};
 
-/// What the two images of a folder are called, the surest sign of a pair first: a folder of nine views has im0 and im1
-/// too, but its pair is im2 and im6.
+/// The names of the two images of a folder, the most reliable first: a folder of nine views has im0 and im1 too, but
+/// its pair is im2 and im6.
 const IN_ONE_FOLDER: [[&str; 2]; 5] =
     [["view1", "view5"], ["im2", "im6"], ["im0", "im1"], ["left", "right"], ["imL", "imR"]];
 
-/// Folders beside one another that hold images of equal names.
+/// The names of sibling folders that hold images of equal names.
 const IN_TWO_FOLDERS: [[&str; 2]; 3] = [["left", "right"], ["image_2", "image_3"], ["image_0", "image_1"]];
 
-/// Endings of images, in the order in which one of several is taken; a `.pfm` in such folders is a disparity map.
+/// Extensions of images, the preferred ones first. A `.pfm` in such folders is a disparity map.
 const ENDINGS: [&str; 8] = ["png", "ppm", "pgm", "pnm", "tif", "tiff", "jpg", "jpeg"];
 
-/// Images by their folders, which are relative to where the search began.
+/// Images by folder. Folders are relative to the root of the search.
 type Folders = BTreeMap<PathBuf, Images>;
 
-/// Names of files.
+/// File names.
 type Images = BTreeSet<String>;
 
-/// The image of a name, or else the one whose name differs by upper and lower case alone: cameras write VIEW1.PNG.
+/// The image with this name, or else one whose name differs only in case: cameras write VIEW1.PNG.
 fn named<'a>(images: &'a Images, name: &str) -> Option<&'a String> {
     images.get(name).or_else(|| images.iter().find(|image| image.eq_ignore_ascii_case(name)))
 }
@@ -47,7 +47,7 @@ pub(super) fn search(root: &Path, output: &Path) -> Found {
     found
 }
 
-/// All images below a folder; what cannot be read is told.
+/// All images below a folder. Entries that cannot be read become notes.
 fn images(root: &Path, output: &Path, notes: &mut Vec<String>) -> Folders {
     let output = output.canonicalize().ok();
     let is_output = |path: &Path| output.is_some() && path.canonicalize().ok() == output;
@@ -80,7 +80,7 @@ fn is_ending(ending: &OsStr) -> bool {
     ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// The one pair of a folder whose images are called as in a known data set.
+/// Finds the pair of a folder whose images are named as in a known data set.
 fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
     let mut taken: Option<[&String; 2]> = None;
     let mut lonely = Vec::new();
@@ -107,7 +107,7 @@ fn in_one_folder(folder: &Path, images: &Images, found: &mut Found) {
     }
 }
 
-/// The pairs of a folder and the one beside it, where they are called as in a known data set.
+/// Finds the pairs of a folder and its sibling, if they are named as in a known data set.
 fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
     for layout in IN_TWO_FOLDERS {
         let Some(side) = layout.iter().position(|&name| folder.file_name().is_some_and(|own| own == name)) else {
@@ -130,7 +130,8 @@ fn in_two_folders(folder: &Path, folders: &Folders, found: &mut Found) {
     }
 }
 
-/// The image beside one of a folder: another one of that folder may have it for its own by its very name.
+/// The partner of an image in the sibling folder. A name that differs in case matches only if `images` does not contain
+/// that name itself.
 fn partner<'a>(image: &str, images: &Images, partners: &'a Images) -> Option<&'a String> {
     named(partners, image).filter(|partner| *partner == image || !images.contains(*partner))
 }

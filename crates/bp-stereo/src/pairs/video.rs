@@ -1,4 +1,4 @@
-//! The frames of a video: two patterns with one place each where frames differ.
+//! Finds the frames of a video from two patterns with one placeholder each.
 
 use std::{
     collections::BTreeMap,
@@ -9,8 +9,8 @@ use std::{
 use super::{Found, Pair, natural};
 use crate::Error;
 
-/// Pairs of frames for which the same stands in the place of both patterns, which names them, in natural order. Frames
-/// of one side only and gaps in the numbers are told.
+/// Pairs of frames with the same text at the placeholder of both patterns, in natural order. The text names the pair.
+/// Frames without a partner and gaps in the numbers become notes.
 pub(super) fn frames(left: &str, right: &str) -> Result<Found, Error> {
     let (lefts, mut rights) = (Pattern::parse(left)?.files()?, Pattern::parse(right)?.files()?);
     let mut found = Found::default();
@@ -28,7 +28,7 @@ pub(super) fn frames(left: &str, right: &str) -> Result<Found, Error> {
     Ok(found)
 }
 
-/// Where numbers leave out some.
+/// Notes on gaps in the frame numbers.
 fn gaps(frames: &[Pair]) -> Vec<String> {
     let number = |pair: &Pair| pair.name.to_string_lossy().parse::<u64>().ok();
     let numbers: Option<Vec<u64>> = frames.iter().map(number).collect();
@@ -40,17 +40,17 @@ fn gaps(frames: &[Pair]) -> Vec<String> {
     numbers.unwrap_or_default().windows(2).filter_map(gap).collect()
 }
 
-/// A path with one place where frames differ.
+/// A path with one placeholder.
 struct Pattern<'a> {
     text: &'a str,
-    /// The folder of the names that differ.
+    /// The folder of the name with the placeholder.
     folder: &'a Path,
-    /// What such a name begins and ends with.
+    /// The parts of that name before and after the placeholder.
     before: &'a str,
     after: &'a str,
-    /// The path below that name, empty where it is the image itself.
+    /// The path below that name; empty if the name is that of the image.
     below: &'a str,
-    /// Whether only digits may stand in the place.
+    /// Whether the placeholder matches digits only.
     is_number: bool,
 }
 
@@ -72,7 +72,7 @@ impl<'a> Pattern<'a> {
         Ok(Self { text, folder, before, after, below, is_number })
     }
 
-    /// The files that fit, by what stands in the place.
+    /// The files that match, by their text at the placeholder.
     fn files(&self) -> Result<BTreeMap<String, PathBuf>, Error> {
         let failed = |error| Error::Input(format!("`video` {}: {}: {error}", self.text, self.folder.display()));
         let mut files = BTreeMap::new();
@@ -88,7 +88,7 @@ impl<'a> Pattern<'a> {
         Ok(files)
     }
 
-    /// What stands in the place of a name, if the name fits.
+    /// The text of a name at the placeholder, if the name matches.
     fn frame<'b>(&self, name: &'b str) -> Option<&'b str> {
         let frame = name.strip_prefix(self.before)?.strip_suffix(self.after)?;
         let hidden = self.before.is_empty() && frame.starts_with('.');

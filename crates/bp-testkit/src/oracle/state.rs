@@ -4,8 +4,8 @@ use bp_core::{Node, Plan, Side};
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
-/// The values of one grid: greys `[node]`, sums of data costs and the costs made from them `[node][label]`, and received
-/// messages `[node][side][label]`.
+/// The values of one grid: greys `[node]`, sums of data costs and the costs made from them `[node][label]`, and
+/// received messages `[node][side][label]`.
 pub(super) struct Grid {
     pub(super) greys: Vec<i64>,
     pub(super) sums: Vec<Vec<i64>>,
@@ -62,8 +62,8 @@ impl State {
         move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
     }
 
-    /// The message that the node `from` sends to the side `to`, given the messages it `received`. It uses all but the one
-    /// from that side.
+    /// The message that the node `from` sends to the side `to`, given the messages it `received`. It uses all but the
+    /// one from that side.
     pub(super) fn message(&self, grid: usize, from: Node, received: &[Vec<i64>; 4], to: Side) -> Vec<i64> {
         let costs = &self.grids[grid].costs[self.index(grid, from)];
         let smoothness = self.smoothness(grid, from, to);

@@ -1,4 +1,4 @@
-//! The schedule `sweep`, sentence by sentence as its definition reads.
+//! The schedule `sweep`, which follows its definition sentence by sentence.
 
 use std::ops::Range;
 
@@ -48,7 +48,7 @@ impl State {
         }
     }
 
-    /// The even or odd nodes of row y send to `sides`, all messages computed before any is sent.
+    /// Sends the messages of the even or odd nodes of row y to `sides`. All are computed before any is sent.
     fn send_row(&mut self, grid: usize, y: usize, parity: usize, sides: &[Side]) {
         let width = self.plan.size(grid).width;
         let received = &self.grids[grid].received;
@@ -76,7 +76,7 @@ impl State {
         }
     }
 
-    /// The first message that a node holds from `side`, where it has a neighbour.
+    /// The first message that a node holds from `side`, if it has a neighbour there.
     pub(super) fn first_sweep_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
         let parent = node.parent();
         let coarse = self.plan.size(grid + 1);
@@ -92,7 +92,7 @@ impl State {
         Some(self.grids[grid + 1].received[receiver][side as usize].clone())
     }
 
-    /// Decides labels one after another.
+    /// Selects labels one after another.
     pub(super) fn decode(&self, labels: &mut [u16]) {
         let width = self.plan.image_size().width;
         for rows in self.bands(0) {

@@ -1,4 +1,4 @@
-//! From surfaces to two photographs and their ground truth.
+//! Renders surfaces to two photographs and their ground truth.
 
 use bp_core::Size;
 
@@ -7,16 +7,16 @@ use super::texture::uniform;
 use std::ops::RangeInclusive;
 use std::ptr;
 
-/// Places at which the way to the light is probed.
+/// The number of places probed on the way to the light.
 const SHADOW_STEPS: u32 = 3;
 
-/// What stands before the cameras. Of the surfaces that cover a line of sight the nearest is seen.
+/// The scene in front of the cameras. Of the surfaces on a line of sight, the nearest is seen.
 pub(super) struct World {
     pub(super) backdrop: Surface,
     pub(super) objects: Vec<Surface>,
 }
 
-/// An exposure: what a camera makes of radiance.
+/// An exposure: how a camera turns radiance into pixel values.
 #[derive(Clone, Copy)]
 pub(super) struct Exposure {
     pub(super) gain: f64,
@@ -35,21 +35,21 @@ struct Radiance {
 }
 
 impl World {
-    /// What the given camera sees at (x, y) of its image.
+    /// The place that a camera sees at (x, y) of its image.
     pub(super) fn look(&self, view: View, x: f64, y: f64) -> Hit<'_> {
         let hits = self.objects.iter().filter_map(|object| object.seen_at(view, x, y));
         let behind = self.backdrop.met_at(view, x, y);
         hits.fold(behind, |best, hit| if hit.disparity > best.disparity { hit } else { best })
     }
 
-    /// Whether the right camera sees what the left one sees at (x, y) within `columns` of its image.
+    /// Whether the right camera sees, within `columns` of its image, the same point that the left one sees at (x, y).
     pub(super) fn is_shared(&self, x: f64, y: f64, columns: &RangeInclusive<f64>) -> bool {
         let seen = self.look(View::Left, x, y);
         let right_x = x - seen.disparity;
         columns.contains(&right_x) && ptr::eq(self.look(View::Right, right_x, y).surface, seen.surface)
     }
 
-    /// The image of one camera before exposure, `[height][width]`: `divisor` squared samples a pixel.
+    /// The image of one camera before exposure, `[height][width]`, from `divisor` squared samples per pixel.
     pub(super) fn photograph(&self, view: View, size: Size, divisor: usize) -> Vec<[f64; 3]> {
         let sharp = Radiance::from_fn(size.width * divisor, size.height * divisor, |x, y| {
             let (x, y) = (x as f64, y as f64);
@@ -68,8 +68,8 @@ impl World {
         (1.0 + 0.7 * facing).clamp(0.4, 1.5) * (1.0 - 0.1 * blocked as f64)
     }
 
-    /// Whether something stands in the light's way `step` steps from a surface. What stands far before the surface
-    /// does not count: its shadow falls elsewhere.
+    /// Whether an object blocks the light `step` steps from a surface. Objects far in front of the surface do not
+    /// count, since their shadows fall elsewhere.
     fn blocks(&self, hit: Hit<'_>, y: f64, step: f64) -> bool {
         let ray = hit.disparity + 2.0 * step;
         let (x, y) = (hit.x - 4.0 * step, y - 5.0 * step);
@@ -84,7 +84,7 @@ impl Radiance {
         Self { width, height, colours }
     }
 
-    /// What a lens passes: each pixel mixed with its neighbours, so that edges are not sharper than a camera's.
+    /// The effect of a lens: each pixel is mixed with its neighbours, so that edges are not sharper than a camera's.
     fn blurred(&self) -> Self {
         let tent = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| [0, 1, 2].map(|i| 0.25 * (a[i] + c[i]) + 0.5 * b[i]);
         let (w, h) = (self.width, self.height);

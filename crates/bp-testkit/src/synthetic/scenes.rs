@@ -1,4 +1,4 @@
-//! What the six scenes consist of, in pixels of the full-size left image. Shared pieces come first.
+//! The surfaces of the six scenes, in pixels of the full-size left image. Shared pieces come first.
 
 use super::render::World;
 use super::surface::{Folds, Profile, Relief, Strip, Surface};
@@ -24,7 +24,7 @@ fn paint(ramp: Ramp, pattern: Pattern, grain: f64, seed: u32) -> Paint {
     Paint { ramp, pattern, grain, seed }
 }
 
-/// A surface behind all others. Its strip only lends it coordinates: the world takes it to go on without end.
+/// A surface behind all others. Its strip only provides coordinates, since the world treats it as endless.
 fn backdrop(relief: Relief, paint: Paint) -> Surface {
     Surface::new(Strip::new([0.0, 0.0], [0.0, 600.0], 1000.0, Profile::Bar), relief, paint)
 }
@@ -48,7 +48,7 @@ fn leaf(from: [f64; 2], to: [f64; 2], half_width: f64, bend: f64, levels: [f64; 
     Surface::new(strip, relief, paint(LEAF, Pattern::Veins { period: 9.0 }, 7.0, seed))
 }
 
-/// A doll before a map, on a blanket: round, weakly textured limbs on a rich background.
+/// A doll in front of a map, on a blanket: round, weakly textured limbs on a rich background.
 fn doll() -> World {
     let map = [[58, 74, 96], [190, 176, 136], [128, 72, 56]];
     let blanket = [[70, 62, 88], [128, 116, 132], [186, 172, 166]];
@@ -110,7 +110,7 @@ fn doll_face() -> Vec<Surface> {
     ]
 }
 
-/// A plant of many narrow leaves before a printed cloth: occlusions everywhere.
+/// A plant of many narrow leaves in front of a printed cloth: occlusions everywhere.
 fn leaves() -> World {
     let print = [[46, 44, 60], [138, 116, 104], [214, 200, 176]];
     let backdrop = backdrop(
@@ -137,7 +137,7 @@ fn plant_leaf(i: i32) -> Surface {
     leaf(foot, tip, random(5, 11.0, 21.0), random(6, -40.0, 40.0), [level, level + rise], 100 + i as u32)
 }
 
-/// One cloth in deep folds with a flap before it: smooth, all fine texture.
+/// One cloth in deep folds with a flap in front of it: smooth, all fine texture.
 fn cloth() -> World {
     let dye = [[92, 62, 50], [156, 118, 92], [214, 184, 148]];
     let deep = Folds { amplitude: 33.0, wavelength: [260.0, 520.0], lean: 0.35, seed: 40 };
@@ -154,7 +154,7 @@ fn cloth() -> World {
     World { backdrop, objects: vec![Surface::new(flap, relief, lining)] }
 }
 
-/// Flower pots of bare clay before plaster: large areas almost without texture.
+/// Flower pots of bare clay in front of plaster: large areas almost without texture.
 fn pots() -> World {
     let plaster = paint(PLASTER, Pattern::Mottle { across: 90.0, along: 90.0 }, 4.5, 50);
     let backdrop = backdrop(Relief { level: 8.05, slant: [-0.01, 0.0], ..Relief::default() }, plaster);
@@ -236,7 +236,7 @@ fn bowling_ball(centre: [f64; 2], radius: f64, level: f64, bulge: f64) -> [Surfa
     [whole, hole(-18.0, -42.0), hole(18.0, -46.0), hole(4.0, -6.0)]
 }
 
-/// A pin with a red band about its neck.
+/// A pin with a red band around its neck.
 fn pin(top: [f64; 2], bottom: [f64; 2], scale: f64, level: f64, seed: u32) -> [Surface; 2] {
     const SHAPE: Profile = Profile::Turned(&[0.1, 0.46, 0.5, 0.42, 0.38, 0.46, 0.68, 0.92, 1.0, 0.96, 0.82, 0.6]);
     let (bulge, half_width) = (11.0 * scale, 36.0 * scale);
@@ -283,7 +283,7 @@ const COVERS: [Ramp; 7] = [
     [[196, 150, 60], [130, 80, 50], [40, 36, 40]],
 ];
 
-/// A cover, trapezoid by perspective, and the edges of the pages on its right.
+/// A cover, a trapezoid in perspective, and the edges of the pages on its right.
 fn book(
     top: [f64; 2],
     bottom: [f64; 2],

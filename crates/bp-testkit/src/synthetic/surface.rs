@@ -1,9 +1,9 @@
-//! Surfaces: where they lie in the left image, how near they are, what they show.
+//! Surfaces: their place in the left image, their disparity and their paint.
 
 use super::spot::Spot;
 use super::texture::{NOISE_BOUND, Paint, noise};
 
-/// Which camera.
+/// One of the two cameras.
 #[derive(Clone, Copy)]
 pub(super) enum View {
     Left,
@@ -18,7 +18,7 @@ pub(super) struct Surface {
     paint: Paint,
 }
 
-/// What a line of sight meets: a place of a surface at column `x` of the left image.
+/// The place where a line of sight meets a surface, at column `x` of the left image.
 #[derive(Clone, Copy)]
 pub(super) struct Hit<'a> {
     pub(super) surface: &'a Surface,
@@ -26,7 +26,7 @@ pub(super) struct Hit<'a> {
     pub(super) disparity: f64,
 }
 
-/// Cheap bounds of where a strip is seen.
+/// Cheap bounds of the places that a strip covers.
 struct Bounds {
     rows: (f64, f64),
     /// Columns of each view, relative to the spine's in the left image.
@@ -45,11 +45,11 @@ pub(super) struct Strip {
     /// Greatest half width in pixels.
     half_width: f64,
     profile: Profile,
-    /// How far the spine's middle lies aside, in half widths.
+    /// The sideways offset of the spine's middle, in half widths.
     bend: f64,
     /// How far both ends bulge along the spine, in lengths: the rim of a pot seen from above.
     sag: f64,
-    /// What a pixel in [x, y] adds along the spine in lengths and across it in half widths.
+    /// The gain per pixel in [x, y], along the spine in lengths and across it in half widths.
     axis: [f64; 2],
     normal: [f64; 2],
 }
@@ -63,7 +63,7 @@ pub(super) enum Profile {
     Round,
     /// Pointed at the end, narrow at the start.
     Leaf,
-    /// A smooth curve through values at equal steps: what a lathe turns.
+    /// A smooth curve through values at equal steps: shapes turned on a lathe.
     Turned(&'static [f64]),
 }
 
@@ -100,7 +100,7 @@ impl Surface {
         Self { bounds: Bounds::new(&strip, &relief), strip, relief, paint }
     }
 
-    /// What a view shows of the surface at (x, y), if it covers that place.
+    /// The place of the surface that a view shows at (x, y), if the surface covers that place.
     pub(super) fn seen_at(&self, view: View, x: f64, y: f64) -> Option<Hit<'_>> {
         let [left, top] = self.strip.from;
         if !self.bounds.hold(view, x - left, y - top) {
@@ -111,7 +111,7 @@ impl Surface {
         spot.is_inside().then(|| Hit { surface: self, x, disparity: self.height(spot, x, y) })
     }
 
-    /// What a view would show at (x, y) if the surface went on without end.
+    /// The place that a view would show at (x, y) if the surface were endless.
     pub(super) fn met_at(&self, view: View, x: f64, y: f64) -> Hit<'_> {
         let x = self.left_x(view, x, y);
         Hit { surface: self, x, disparity: self.disparity(x, y) }
@@ -122,7 +122,7 @@ impl Surface {
         self.height(self.strip.spot(x, y), x, y)
     }
 
-    /// The disparity at (x, y), which is `spot`.
+    /// The disparity at (x, y), which is `spot` in the surface's own coordinates.
     fn height(&self, spot: Spot, x: f64, y: f64) -> f64 {
         let (relief, strip) = (&self.relief, &self.strip);
         let (rim, aside) = (spot.rim, spot.aside.abs());
@@ -132,8 +132,8 @@ impl Surface {
         relief.folds.iter().fold(smooth, |sum, folds| sum + folds.height(x, y))
     }
 
-    /// The left image's column of what a view shows at (x, y): from the right one the root of
-    /// `left - disparity(left) - x`, by secants. It is the only one: disparity gains less than a pixel per pixel.
+    /// The left image's column of the place that a view shows at (x, y). For the right view it is the only root of
+    /// `left - disparity(left) - x`, found by secants: disparity gains less than a pixel per pixel.
     fn left_x(&self, view: View, x: f64, y: f64) -> f64 {
         if matches!(view, View::Left) {
             return x;
@@ -166,7 +166,7 @@ impl Bounds {
         Self { rows: (top, bottom), columns: [(-reach, reach), (-reach - near, reach - far)], lean }
     }
 
-    /// Whether the strip may be seen at (x, y) of a view, counted from its start; never wrongly false.
+    /// Whether the strip may cover (x, y) of a view, counted from its start. Never false if it does.
     fn hold(&self, view: View, x: f64, y: f64) -> bool {
         let within = |(low, high): (f64, f64), value: f64| low <= value && value <= high;
         within(self.rows, y) && within(self.columns[view as usize], x - self.lean * y)
@@ -198,7 +198,7 @@ impl Strip {
         Self::new([x, y - ry], [x, y + ry], rx, Profile::Round)
     }
 
-    /// A bar alongside, its spine `aside` pixels across from this one's.
+    /// A parallel bar whose spine is `aside` pixels across from this one's.
     pub(super) fn beside(&self, aside: f64, half_width: f64) -> Self {
         let ([x, y], [dx, dy]) = (self.from, self.way);
         let from = [x + aside * dy / self.length, y - aside * dx / self.length];
@@ -214,8 +214,8 @@ impl Strip {
         Spot { t, aside, rim, along: t * self.length, across: aside * self.half_width }
     }
 
-    /// Pixels in x that the spine gains per row, and how far in x from that line the strip may reach. A spine along
-    /// the rows counts as upright and wide.
+    /// Pixels in x that the spine gains per row, and how far in x from that line the strip may reach. A spine that is
+    /// nearly horizontal counts as upright and wide.
     fn lean(&self) -> (f64, f64) {
         let (aside, [dx, dy]) = (self.half_width * (1.0 + self.bend.abs()), self.way);
         if dy.abs() < 0.2 * self.length {

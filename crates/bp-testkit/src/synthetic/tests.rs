@@ -1,6 +1,6 @@
 use super::*;
 
-/// Least and largest disparity of the scenes stood in for, in pixels at full size.
+/// Least and largest disparity of the real scenes that these replace, in pixels at full size.
 const RANGES: [(f32, f32); 6] = [(12.5, 68.5), (21.5, 105.5), (19.5, 86.0), (1.5, 90.5), (19.5, 99.0), (4.5, 110.5)];
 
 fn worlds() -> impl Iterator<Item = (usize, World)> {
@@ -121,7 +121,7 @@ fn the_views_differ_by_noise_and_exposure_only() {
     assert!((1.0..1.8).contains(&(noise / count)), "{}", noise / count);
 }
 
-/// The bits must not depend on machine, compiler or optimisation: results of different machines are compared.
+/// The bits must not depend on machine, compiler or optimisation, since results of different machines are compared.
 #[test]
 fn the_bits_stay_the_same() {
     let scene = scene(4, 3);

@@ -8,12 +8,12 @@ pub(super) struct Paint {
     /// Colours of the pattern's values 0, 1/2 and 1, [3][RGB].
     pub(super) ramp: [[u8; 3]; 3],
     pub(super) pattern: Pattern,
-    /// Amplitude of the fine texture that every surface has, in grey levels: near 1 it drowns in the sensor's noise.
+    /// Amplitude of the fine texture that every surface has, in grey levels. Near 1 it drowns in the sensor's noise.
     pub(super) grain: f64,
     pub(super) seed: u32,
 }
 
-/// What a surface shows; lengths in pixels of the full-size left image.
+/// The pattern of a surface. Lengths are in pixels of the full-size left image.
 #[derive(Clone, Copy)]
 pub(super) enum Pattern {
     /// One colour.
@@ -102,7 +102,7 @@ fn cover(seed: u32, spot: Spot) -> f64 {
     margin + 0.85 * lettering + picture * (0.5 + 0.9 * fractal(seed + 4, p / 45.0, q / 45.0))
 }
 
-/// Four octaves of [`noise`] from one unit down, each of half the wavelength and two thirds the amplitude.
+/// Four octaves of [`noise`] from wavelength 1 down. Each has 1/2 the wavelength and 2/3 the amplitude of the last.
 fn fractal(seed: u32, x: f64, y: f64) -> f64 {
     let (mut sum, mut weight, mut zoom) = (0.0, 0.5, 1.0);
     for octave in 0..4 {
@@ -113,7 +113,7 @@ fn fractal(seed: u32, x: f64, y: f64) -> f64 {
     sum
 }
 
-/// [`noise`] lies between minus this and this; it seldom exceeds 1.
+/// The largest magnitude of [`noise`], which seldom exceeds 1.
 pub(super) const NOISE_BOUND: f64 = 1.8;
 
 /// Smooth noise around 0 with the wavelength 1: gradient noise on the integer lattice.
@@ -130,30 +130,30 @@ pub(super) fn noise(seed: u32, x: f64, y: f64) -> f64 {
     NOISE_BOUND * (upper * (1.0 - t) + lower * t)
 }
 
-/// The integer below a number, and the rest. Not `floor`, which is a slow call where the processor may be any.
+/// The integer below a number, and the rest. Avoids `floor`, which is a slow call in programs built for any CPU.
 fn split(x: f64) -> (i32, f64) {
     let towards_zero = x as i32;
     let below = towards_zero - i32::from(x < f64::from(towards_zero));
     (below, x - f64::from(below))
 }
 
-/// Rises from 0 to 1 with no slope or bend at either end.
+/// Rises from 0 to 1 with zero slope and zero curvature at both ends.
 fn fade(t: f64) -> f64 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
-/// A sine-like wave of period 1 and amplitude 1, of parabolas.
+/// A sine-like wave of period 1 and amplitude 1, made of parabolas.
 fn ripple(x: f64) -> f64 {
     let h = 2.0 * split(x).1 - 1.0;
     4.0 * h * (1.0 - h.abs())
 }
 
-/// 0 below -1, 1 above 1, straight between: an edge that does not alias.
+/// 0 below -1, 1 above 1, and linear in between: an edge that does not alias.
 fn soft_step(x: f64) -> f64 {
     (0.5 + 0.5 * x).clamp(0.0, 1.0)
 }
 
-/// A number in 0..1 that depends on nothing but the arguments.
+/// A number in 0..1 that depends only on the arguments.
 pub(super) fn uniform(seed: u32, i: i32, j: i32) -> f64 {
     f64::from(hash(seed, i, j)) / 4_294_967_296.0
 }

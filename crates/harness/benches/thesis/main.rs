@@ -2,18 +2,18 @@
 //!
 //! `[BP_BENCH=quick] [BP_BENCH_BACKEND=NAMES] [BP_DATA=DIR] cargo bench [-- FILTER]`
 //!
-//! Criterion would measure bench after bench, so that minutes of a machine that is never quiet lay between two algorithms
-//! whose ratio is the result. So everything is measured beforehand, in turns and by the code of `bp reproduce` and `bp
-//! speed`, and criterion is handed the samples: what it says of warming up, iterations and estimated times is about
-//! that. A scene is measured where criterion's filter leaves one of its benches. Criterion shows means with their
-//! intervals and what changed since the last run; the tables and charts, of medians, are made of our own records and
-//! written to a new folder in `bench-results` of the target folder.
+//! Criterion would measure one bench after another. On a machine that is never quiet, minutes would pass between two
+//! algorithms whose ratio is the result. So the code of `bp reproduce` and `bp speed` measures everything beforehand,
+//! in turns, and criterion receives the samples. Its messages about warm-up, iterations and estimated times refer to
+//! this transfer. A scene is measured if criterion's filter leaves one of its benches. Criterion shows means with their
+//! intervals, and the changes since the last run. Our tables and charts show medians. They are made from our own
+//! records and written to a new folder in `bench-results` of the target folder.
 //!
-//! Groups are called after the tables that show their times. Totals go from images to labels by the wall clock, waiting
-//! for the device included; a device with a clock of its own has a bench by that one beside it.
+//! Groups are named after the tables that show their times. Totals go from images to labels by the wall clock and
+//! include the wait for the device. A device with a clock of its own has a second bench by that clock.
 //!
-//! `BP_BENCH` is `full`, the default, or `quick`: small images and few loops, on every backend. A full run leaves out
-//! the reference and software rasterisers unless `BP_BENCH_BACKEND` names them.
+//! `BP_BENCH` is `full`, the default, or `quick`: small images and few iterations, on every backend. A full run leaves
+//! out the reference and software rasterisers unless `BP_BENCH_BACKEND` names them.
 
 mod replay;
 
@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints what a bench has to say beside criterion's lines.
+/// Prints a bench's messages, in addition to criterion's.
 fn tell(event: Event<'_>) {
     match event {
         Event::Line(line) | Event::Note(line) => eprintln!("{line}"),
@@ -63,7 +63,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         replay::list(&mut criterion, &bench::possible(&environment, &watch)?);
         return Ok(());
     }
-    // As criterion tells a test of benches from a run.
+    // Criterion distinguishes a test of benches from a run in the same way.
     if has("--test") || !has("--bench") {
         eprintln!("nothing is measured: run it by cargo bench");
         return Ok(());
@@ -81,7 +81,8 @@ fn run(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The benches that criterion would run. It alone knows which its options leave, and tells when it is asked for a list.
+/// The benches that criterion would run. Only criterion knows which benches its options leave, so it is asked to list
+/// them.
 fn asked(arguments: &[String]) -> Result<HashSet<String>, String> {
     let failed = |error: &dyn std::fmt::Display| format!("cannot list the benches: {error}");
     let program = std::env::current_exe().map_err(|error| failed(&error))?;

@@ -1,21 +1,21 @@
-//! Hands criterion the samples that were taken.
+//! Passes the samples to criterion.
 
 use std::time::Duration;
 
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, measurement::WallTime};
 use harness::bench::Bench;
 
-/// Criterion takes no fewer samples.
+/// The fewest samples that criterion accepts.
 pub(crate) const FEWEST: usize = 10;
 
 /// Criterion's resamples, as many as ours.
 const RESAMPLES: usize = 2000;
 
-/// Criterion derives from this and from how long handing over a sample took how many iterations to ask for: it warns of a
-/// single one, and of a million the times are still exact.
+/// From this time and the duration of passing one sample, criterion derives the number of iterations. It warns about a
+/// single one, and with a million the times are still exact.
 const TIME: Duration = Duration::from_millis(100);
 
-/// Names all benches, of which criterion shows those that its options leave.
+/// Names all benches; criterion shows those that its options leave.
 pub(crate) fn list(criterion: &mut Criterion, benches: &[Bench]) {
     for group in benches.chunk_by(|a, b| a.group == b.group) {
         let mut named = criterion.benchmark_group(&group[0].group);
@@ -25,7 +25,7 @@ pub(crate) fn list(criterion: &mut Criterion, benches: &[Bench]) {
     }
 }
 
-/// Runs all benches that have samples enough, and tells which have too few.
+/// Runs all benches that have enough samples, and reports those that have too few.
 pub(crate) fn replay(criterion: &mut Criterion, benches: &[Bench]) {
     let (enough, few): (Vec<_>, Vec<_>) = benches.iter().partition(|bench| bench.samples.len() >= FEWEST);
     for group in enough.chunk_by(|a, b| a.group == b.group) {
@@ -47,7 +47,7 @@ fn one(group: &mut BenchmarkGroup<'_, WallTime>, bench: &Bench) {
         (None, Some(bytes)) => _ = group.throughput(Throughput::Bytes(bytes)),
         (None, None) => (),
     }
-    // The first call is the warm-up: it has the last sample, so that those that count come in their order.
+    // The first call is the warm-up. It gets the last sample, so that the samples that count come in order.
     let mut next = bench.samples.len() - 1;
     group.bench_function(&bench.name, |bencher| {
         bencher.iter_custom(|iterations| {

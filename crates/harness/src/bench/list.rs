@@ -1,4 +1,4 @@
-//! The benches by their names, of a table's rows and of kernels, with the samples of records.
+//! The named benches, for table rows and kernels, with their samples from records.
 
 use std::time::Duration;
 
@@ -11,24 +11,24 @@ use crate::{
     speed::Problem,
 };
 
-/// One time of one contestant, as criterion is to know it.
+/// One time of one contestant, as passed to criterion.
 #[derive(Clone, Debug)]
 pub struct Bench {
     /// The table, or the kernel, that it belongs to.
     pub group: String,
     /// Its name in the group.
     pub name: String,
-    /// Message entries that a sample computes, where the time is that of computing them.
+    /// Message entries that a sample computes, if the time is that of computing them.
     pub entries: Option<u64>,
-    /// Bytes that a sample reads and writes at least, where they are counted.
+    /// Minimum number of bytes that a sample reads and writes, if counted.
     pub bytes: Option<u64>,
-    /// Every sample in the order taken; none of what was not asked for or cannot be measured.
+    /// Every sample in the order taken; empty if it was not requested or cannot be measured.
     pub samples: Vec<Duration>,
     pub(super) of: Of,
 }
 
 impl Bench {
-    /// The name that criterion gives it, and filters by.
+    /// The name that criterion displays and filters by.
     #[must_use]
     pub fn id(&self) -> String {
         format!("{}/{}", self.group, self.name)
@@ -45,11 +45,11 @@ pub(super) enum Of {
 /// A time of a solve.
 #[derive(Clone, Copy)]
 enum Part {
-    /// From images to labels, all transfers and waiting included.
+    /// From images to labels, including all transfers and waiting.
     Total,
-    /// All stages by the device's own clock, where it has one.
+    /// All stages by the device's own clock, if it has one.
     OnDevice,
-    /// `refine` and `update_messages`, by the device's clock where it has one.
+    /// `refine` and `update_messages`, by the device's clock if it has one.
     MessagePassing,
 }
 
@@ -73,7 +73,7 @@ impl Part {
     }
 }
 
-/// All benches of these scenes and backends, with their samples where they have been measured.
+/// All benches of these scenes and backends, with their samples if they have been measured.
 pub(super) fn benches(
     scenes: &[&'static str],
     backends: &[String],
@@ -110,7 +110,7 @@ fn samples(cell: Option<&Cell>, part: Part) -> Vec<Duration> {
     durations(measured.iter().flat_map(|measured| &measured.samples).map(|sample| part.ms(sample)))
 }
 
-/// A bench for every stage of every problem. Which stages are kernels of their own differs between backends.
+/// A bench for every stage of every problem. Backends differ in which stages are separate kernels.
 fn of_kernels(backends: &[String], speed: Option<&Speed>) -> Vec<Bench> {
     let mut benches = Vec::new();
     for stage in Stage::ALL {
@@ -142,7 +142,7 @@ fn kernel(stage: Stage, problem: &'static str, backend: &str, speed: Option<&Spe
     }
 }
 
-/// Times as criterion takes them; none where one of them is missing or nothing.
+/// Times in the type that criterion needs; empty if any of them is missing or zero.
 fn durations(ms: impl Iterator<Item = Option<f64>>) -> Vec<Duration> {
     let duration = |ms: Option<f64>| Duration::try_from_secs_f64(ms? / 1000.0).ok().filter(|time| !time.is_zero());
     ms.map(duration).collect::<Option<_>>().unwrap_or_default()

@@ -1,4 +1,4 @@
-//! What is asked for by variables of the environment: the command line of a bench is criterion's.
+//! Settings from environment variables, because the command line of a bench belongs to criterion.
 
 use std::{
     ffi::OsString,
@@ -11,34 +11,34 @@ use bp_stereo::Watch;
 
 use crate::{backends, failure::Failure};
 
-/// How much is measured: "quick" or "full".
+/// The size of the run: "quick" or "full".
 const SIZE: &str = "BP_BENCH";
 
-/// On which backends, separated by commas.
+/// The backends, separated by commas.
 pub(super) const BACKEND: &str = "BP_BENCH_BACKEND";
 
-/// The folder of public data, as for the program.
+/// The folder of public data, as for `bp`.
 const DATA: &str = "BP_DATA";
 
-/// Rounds of a quick run: as many as criterion takes samples at least.
+/// Rounds of a quick run: the fewest samples that criterion accepts.
 const QUICK_ROUNDS: u32 = 10;
 
 /// Rounds of a full run.
 const ROUNDS: u32 = 20;
 
-/// What is asked for.
+/// The settings of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Settings {
-    /// Small images and few loops, on every backend.
+    /// Small images and few iterations, on every backend.
     pub(super) quick: bool,
-    /// The backends, where they are named.
+    /// The backends, if named.
     named: Option<Vec<String>>,
-    /// The folder of public data; cargo runs benches in their package's folder, so it is taken from the workspace's.
+    /// The folder of public data, relative to the workspace, because cargo runs benches in their package's folder.
     pub(super) data: Option<PathBuf>,
 }
 
 impl Settings {
-    /// Reads them; a variable that is empty is none.
+    /// Reads the settings. An empty variable counts as unset.
     pub(super) fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, Failure> {
         let value = |name| variable(name).filter(|value| !value.is_empty());
         let text = |name| value(name).map(|value| value.to_string_lossy().into_owned());
@@ -52,12 +52,12 @@ impl Settings {
         Ok(Self { quick, named, data: value(DATA).map(|folder| workspace.join(folder)) })
     }
 
-    /// Rounds, in each of which every contestant takes its turn.
+    /// Number of rounds. Every contestant takes one turn in each.
     pub(super) fn rounds(&self) -> u32 {
         if self.quick { QUICK_ROUNDS } else { ROUNDS }
     }
 
-    /// The backends as records name them: those asked for, else all; in a full run only those whose times matter.
+    /// The backends by their names in records: those requested, otherwise all, or in a full run those that matter.
     pub(super) fn backends(&self, watch: &Watch<'_>) -> Result<Vec<String>, Failure> {
         let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend, watch));
         let names =
@@ -74,8 +74,8 @@ impl Settings {
     }
 }
 
-/// Whether a full run has the backend without being asked: the reference and software rasterisers would make an hour of
-/// minutes, and tell nothing of the algorithms that the quick run does not.
+/// Whether a full run includes the backend by default. The reference and software rasterisers would turn minutes into
+/// an hour, and a quick run says as much about the algorithms on them.
 fn matters(backend: &dyn Backend, watch: &Watch<'_>) -> bool {
     let name = backend.name();
     let software = backend.devices().into_iter().next().filter(|info| info.kind == DeviceKind::SoftwareRasteriser);

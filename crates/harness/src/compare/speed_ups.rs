@@ -1,5 +1,5 @@
-//! How many times as fast as BP the other plans are, record by record, and whether runs agree about it. Ratios within a
-//! round hold across runs what times do not: both plans of a round met the same machine.
+//! The speed-ups of the other plans over BP in each record, and whether the records agree. Ratios within a round can be
+//! compared across runs although times cannot: both plans ran under the same conditions.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ use crate::{
     statistics::{interval, median},
 };
 
-/// The plan that others are held against.
+/// The baseline.
 const BASE: &str = "bp";
 
 /// Every plan on every backend and scene, and how far the records agree.
@@ -32,9 +32,9 @@ struct SpeedUp<'a> {
     plan: &'a str,
     backend: &'a str,
     scene: &'a str,
-    /// Of the whole solve, one a record.
+    /// The ratios of the whole solve, one per record.
     total: Vec<Option<Ratio>>,
-    /// Of message passing, one a record.
+    /// The ratios of message passing, one per record.
     message_passing: Vec<Option<Ratio>>,
 }
 
@@ -48,7 +48,7 @@ struct Ratio {
 /// How many intervals of a record overlap those of the first.
 #[derive(Serialize)]
 struct Agreement {
-    /// Ratios that have an interval in both.
+    /// How many ratios have an interval in both records.
     intervals: usize,
     overlapping: usize,
 }
@@ -77,7 +77,7 @@ impl<'a> SpeedUps<'a> {
     }
 }
 
-/// The ratio of BP's time to a plan's in the same round; none where they share no round.
+/// The ratio of BP's time to a plan's in the same round; `None` if they share no round.
 fn ratio(record: &Record, (scene, plan, backend): (&str, &str, &str), ms: fn(&Sample) -> f64) -> Option<Ratio> {
     let samples = |plan| Some(&record.cell(scene, plan, backend)?.measured()?.samples);
     let (base, own) = (samples(BASE)?, samples(plan)?);
@@ -85,7 +85,7 @@ fn ratio(record: &Record, (scene, plan, backend): (&str, &str, &str), ms: fn(&Sa
     Some(Ratio { median: median(ratios.iter().copied())?, interval: interval(&[ratios]) })
 }
 
-/// Whether the intervals of a record and the first one overlap; none where one of them has too few samples.
+/// Whether the intervals of a record and the first one overlap; `None` if either lacks an interval.
 fn overlap(ratios: &[Option<Ratio>], place: usize) -> Option<bool> {
     let interval = |place: usize| ratios.get(place)?.as_ref()?.interval;
     let [[low, high], [other_low, other_high]] = [interval(0)?, interval(place)?];
@@ -101,7 +101,7 @@ impl Agreement {
     }
 }
 
-/// The section of the page; empty where BP stands alone.
+/// The section of the page; empty if no plan can be compared with BP.
 pub(super) fn section(speed_ups: &SpeedUps<'_>) -> String {
     let SpeedUps { rows, agreement } = speed_ups;
     if rows.is_empty() {

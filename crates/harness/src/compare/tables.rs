@@ -59,7 +59,9 @@ fn times(comparison: &Comparison<'_>) -> String {
 
 fn results(comparison: &Comparison<'_>) -> String {
     let headings = |record: usize| {
-        ["wrong by > 1 px, visible, %", "RMSE, visible, px", "energy"].map(|what| format!("{record}: {what}")).to_vec()
+        ["wrong by > 1 px, non-occluded, %", "RMSE, non-occluded, px", "energy"]
+            .map(|what| format!("{record}: {what}"))
+            .to_vec()
     };
     let cells = |_, means: &Means| {
         let Means { visible_bad_1px_percent, visible_rmse_px, energy, .. } = means;
@@ -72,7 +74,7 @@ fn results(comparison: &Comparison<'_>) -> String {
     format!("{}\n{}\n", table(comparison, headings, cells), rows.join("\n"))
 }
 
-/// A line for every record whose labels or settings of a plan differ from the first's.
+/// A line for every record whose labels or settings of this plan differ from the first's.
 fn flags(comparison: &Comparison<'_>, row: &Row<'_>) -> Vec<String> {
     let line = |(place, value): (usize, &Value<'_>)| {
         let on = |scenes: &[&str]| format!("on {} of {} scenes", scenes.len(), comparison.scenes.len());
@@ -111,7 +113,7 @@ fn table(
     lines(&columns, &comparison.rows.iter().map(row).collect::<Vec<_>>())
 }
 
-/// What but one record has, a line for each record.
+/// The plans and backends that only one record has, one line per record.
 fn alone(comparison: &Comparison<'_>) -> String {
     let line = |place: usize| {
         let rows = comparison.rows.iter().filter(|row| row.only_in == Some(place));

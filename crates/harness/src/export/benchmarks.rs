@@ -1,4 +1,4 @@
-//! The formats of two programs that watch times from commit to commit.
+//! The formats of two programs that track times from commit to commit.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -29,7 +29,7 @@ pub(super) fn github_action_benchmark(record: &Record) -> Value {
     json!(entries.collect::<Vec<_>>())
 }
 
-/// Bencher Metric Format: the measure `latency`, which Bencher knows, is in nanoseconds.
+/// Bencher Metric Format. Bencher's own measure `latency` is in nanoseconds.
 pub(super) fn bencher(record: &Record) -> Value {
     let ns = |ms: f64| 1e6 * ms;
     let mut benchmarks = Map::new();

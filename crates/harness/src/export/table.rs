@@ -19,7 +19,7 @@ struct Row<'a> {
     round: u32,
     prepare_ms: Option<f64>,
     total_ms: f64,
-    /// Whose clock the stages are by: the device's, where it has one.
+    /// The clock of the stages: the device's, if it has one.
     stages_clock: &'static str,
     match_cost_ms: Option<f64>,
     coarsen_ms: Option<f64>,
@@ -81,7 +81,7 @@ fn row<'a>(cell: &Cell, measured: &Measurement, sample: &Sample, shown: [&'a Str
     }
 }
 
-/// Text that no spreadsheet takes for a formula, which it might run.
+/// Escapes text that a spreadsheet might run as a formula.
 fn harmless(text: &str) -> String {
     let text = printable(text);
     let formula = text.trim_start().starts_with(['=', '+', '-', '@']);

@@ -1,11 +1,11 @@
-//! A record as a chart in the language Vega-Lite.
+//! A record as a Vega-Lite chart.
 
 use serde_json::{Value, json};
 
 use super::{setting, times};
 use crate::{escape::printable, record::Record};
 
-/// Total times of every plan and backend, with their intervals and the numbers in it.
+/// Total times of every plan and backend, with their intervals. The chart includes its data.
 pub(super) fn chart(record: &Record) -> Value {
     let times = times(record).into_iter().filter(|time| time.part == "total");
     let values = times.map(|time| {
@@ -14,7 +14,7 @@ pub(super) fn chart(record: &Record) -> Value {
         json!({ "plan": plan, "backend": backend, "device": time.device(), "ms": time.ms, "low": low, "high": high })
     });
     let values: Vec<_> = values.collect();
-    // All layers say the same of their common axis, or its title would be put together from both.
+    // All layers give their common axis the same title; otherwise Vega-Lite would join their titles.
     let title = "total time, ms";
     let y = |field: &str| json!({ "field": field, "type": "quantitative", "title": title, "scale": { "type": "log" } });
     let tooltip = ["plan", "backend", "device", "ms", "low", "high"].map(|field| json!({ "field": field }));

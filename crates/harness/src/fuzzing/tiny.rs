@@ -1,4 +1,4 @@
-//! Tiny pairs with settings that nobody thought of, drawn from bytes.
+//! Tiny pairs with arbitrary settings, drawn from bytes.
 
 use arbitrary::Unstructured;
 use bp_core::{
@@ -11,7 +11,8 @@ use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{Case, compare, solve};
 
-/// Most data costs of a pair, so that hundreds are matched in a second though every comparison is watched.
+/// Maximum number of data costs of a pair. It allows hundreds of matches per second, although the fuzzer watches every
+/// comparison.
 const VOLUME: usize = 4096;
 
 /// Size of [`map`].
@@ -23,7 +24,7 @@ pub(super) fn map() -> DisparityMap {
     DisparityMap::new(MAP, values).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What is drawn.
+/// Everything that is drawn from the bytes.
 struct Drawn {
     case: Case,
     finish: Finish,
@@ -31,11 +32,11 @@ struct Drawn {
     tile: (Size, usize),
     /// Bytes that a tiling may take.
     memory: u64,
-    /// Which of the instruction sets.
+    /// Index of the instruction set.
     level: usize,
 }
 
-/// Draws everything and runs it; tells whether there is a plan of such settings.
+/// Draws everything and runs it; returns whether the settings make a valid plan.
 pub(super) fn run(bytes: &[u8]) -> bool {
     let Ok(Some(drawn)) = draw(Unstructured::new(bytes)) else { return false };
     let fast = Rayon.open(drawn.level % Rayon.devices().len());
@@ -65,13 +66,13 @@ fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     surveyed(pair)
 }
 
-/// No energy of a plan is larger.
+/// Upper bound of a plan's energy.
 fn most(plan: &Plan) -> u64 {
     let (pixels, model) = (plan.image_size().pixels() as u64, plan.model());
     pixels * (u64::from(model.profile().max_cost()) + 2 * u64::from(model.truncation()))
 }
 
-/// Devices give the same labels of a tiling, and those of the whole image where that is promised.
+/// Checks that devices give the same labels for a tiling, and those of the whole image if the tiling promises them.
 fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Device; 2]) -> Result<(), Error> {
     let labels = devices.map(|device| {
         let mut tiled = Tiled::new(device, tiling.clone())?;
@@ -85,7 +86,7 @@ fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Devic
     Ok(())
 }
 
-/// A map keeps its size and its range, whatever is done to it.
+/// Checks that finishing a map keeps its size and range.
 fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> Result<(), Error> {
     let trust = confidence(&left, right)?;
     assert!(trust.len() == left.size().pixels() && trust.iter().all(|share| (0.0..=1.0).contains(share)), "{trust:?}");
@@ -98,7 +99,7 @@ fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> Result<
     Ok(())
 }
 
-/// Labels that a survey proposes are some that there are models of.
+/// Checks that the labels that a survey proposes make a valid model.
 fn surveyed(pair: &StereoPair) -> Result<(), Error> {
     let survey = Survey::of(pair)?;
     assert!((0.0..=1.0).contains(&survey.matched), "{survey:?}");
@@ -121,7 +122,7 @@ fn draw(mut from: Unstructured<'_>) -> arbitrary::Result<Option<Drawn>> {
     Ok(pair.zip(plan.ok()).map(|(pair, plan)| Drawn { case: Case { pair, plan }, finish, tile, memory, level }))
 }
 
-/// Up to 24 pixels a side; now and then a ribbon, of which several tiles can be made.
+/// Up to 24 pixels a side; sometimes a ribbon that can be cut into several tiles.
 fn size(from: &mut Unstructured<'_>) -> arbitrary::Result<Size> {
     let [long, short] = [from.int_in_range(1..=24)?, from.int_in_range(1..=24)?];
     let ribbon = (8 * long, short.min(3));
@@ -179,7 +180,7 @@ fn finish(from: &mut Unstructured<'_>) -> arbitrary::Result<Finish> {
     })
 }
 
-/// Both images show the bytes that are left over and over, the right one from where the left one ends.
+/// Both images repeat the remaining bytes. The right one continues where the left one ends.
 fn pair(size: Size, bytes: &[u8]) -> Result<StereoPair, Error> {
     let mut values = bytes.iter().chain([&0]).copied().cycle();
     let mut pixels = |_| std::array::from_fn(|_| values.next().unwrap_or(0));

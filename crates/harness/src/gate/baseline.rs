@@ -1,4 +1,4 @@
-//! What is expected: files that are committed, one for this kind of machine and one for all machines.
+//! Baselines: committed files, one for each kind of machine and one for all machines.
 
 use std::{
     collections::BTreeMap,
@@ -10,28 +10,28 @@ use serde::{Deserialize, Serialize};
 use super::{file, subject::Renewal};
 use crate::{failure::Failure, machine, record::Machine};
 
-/// A file. Which machine it is for, its name tells programs and its fields tell readers.
+/// A baseline file. Programs identify its machine by the file's name, people by its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Baseline {
-    /// The processor and the number of its cores; empty and 0 in the file for all machines.
+    /// The CPU and its number of cores; empty and 0 in the file for all machines.
     cpu: String,
     cores: usize,
-    /// Of runs with and without --quick, where there were any.
+    /// Expected results of runs with and without --quick, if any were measured.
     pub(super) runs: BTreeMap<String, Expected>,
 }
 
-/// What a run is expected to give.
+/// Expected results of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Expected {
-    /// Commit of the program that was measured for it.
+    /// Commit of the measured program.
     pub(super) commit: String,
     /// The device of each runner, with its driver.
     pub(super) devices: BTreeMap<String, String>,
     /// Median of each speed-up.
     pub(super) speed_ups: BTreeMap<String, f64>,
-    /// What does not vary.
+    /// Results that do not vary.
     pub(super) facts: BTreeMap<String, String>,
 }
 
@@ -40,13 +40,13 @@ pub(super) struct Expected {
 pub(super) struct Baselines {
     path_here: PathBuf,
     path_anywhere: PathBuf,
-    /// For this kind of machine, where there is one.
+    /// For this kind of machine, if the file exists.
     pub(super) here: Option<Baseline>,
     pub(super) anywhere: Option<Baseline>,
 }
 
 impl Baselines {
-    /// Reads the files of a folder that are for this machine; the folder must be there unless they are to be renewed.
+    /// Reads the folder's files for this machine. The folder must exist unless the baselines are to be renewed.
     pub(super) fn read(folder: &Path, machine: &Machine, renews: bool) -> Result<Self, Failure> {
         if !renews && !folder.is_dir() {
             let what =
@@ -69,7 +69,7 @@ impl Baselines {
         &self.path_anywhere
     }
 
-    /// Writes what was renewed; the names of the files.
+    /// Writes the renewed baselines; returns the names of the files.
     pub(super) fn write(&self, renewal: Renewal) -> Result<Vec<String>, Failure> {
         let here = [(&self.path_here, &self.here)];
         let all = [(&self.path_here, &self.here), (&self.path_anywhere, &self.anywhere)];
@@ -82,7 +82,7 @@ impl Baselines {
 }
 
 impl Baseline {
-    /// One of a machine, or of all machines, that expects nothing yet.
+    /// An empty baseline for a machine, or for all machines.
     pub(super) fn new(machine: Option<&Machine>) -> Self {
         Self {
             cpu: machine.map_or_else(String::new, machine::processor),

@@ -1,12 +1,12 @@
-//! Instructions that kernels take, counted by valgrind's callgrind. Where times vary by percents, these are the same in
-//! every run however busy the machine is; only where buffers lie in memory, which is the C library's to decide, moves
-//! them, by parts of a percent.
+//! Counts the instructions of kernels with valgrind's callgrind. Times vary by several percent. Counts are the same in
+//! every run, however busy the machine is. Only the placement of buffers in memory, which the C library decides,
+//! changes them, by fractions of a percent.
 //!
-//! They are no times. They tell of work added to a kernel, and of no other kernel's. A kernel that waits for memory,
-//! say because its working set left the cache, takes no more of them.
+//! Counts are not times: they reveal extra work in one kernel, independent of the others. A kernel that waits for
+//! memory, say because its working set left the cache, takes no more instructions.
 //!
-//! Every solve has a process of its own, which valgrind runs on a processor that it makes up. That one has no AVX-512,
-//! so that a count is of another device than the times are, and says which.
+//! Every solve runs in a process of its own, on a CPU that valgrind simulates. That CPU lacks AVX-512, so the counts
+//! may belong to another device than the times. The result names the device.
 
 use std::{
     collections::BTreeMap,
@@ -29,22 +29,22 @@ use crate::{
     speed::Problem,
 };
 
-/// What the sides of the problems' images are divided by: valgrind takes some fifty times as long as the processor.
+/// Divisor of the width and height of the problems' images: under valgrind, a solve takes about fifty times as long.
 const DIVISOR: usize = 6;
 
 /// Disparity of all pixels.
 const SHIFT: usize = 20;
 
-/// A stage of less than this part of its solve's instructions is not told: it hardly does anything.
+/// Stages below this fraction of their solve's instructions are not reported, because they hardly do anything.
 const TOLD_FROM: f64 = 0.001;
 
-/// What was counted, and with what: counts of other processors, compilers, flags or valgrinds do not compare.
+/// Counts, and the CPU and tools behind them. Counts of other CPUs, compilers, flags or valgrinds are not comparable.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Counts {
     /// Commit of the program.
     pub(super) commit: String,
-    /// The processor.
+    /// The CPU.
     pub(super) processor: String,
     /// The compiler.
     pub(super) rustc: String,
@@ -52,20 +52,20 @@ pub(super) struct Counts {
     pub(super) flags: String,
     /// Name and version of valgrind.
     pub(super) valgrind: String,
-    /// The device of each backend, of those that valgrind's own processor has.
+    /// The device of each backend on valgrind's simulated CPU.
     pub(super) devices: BTreeMap<String, String>,
     /// Instructions by problem, backend and stage, over all grids.
     pub(super) counts: BTreeMap<String, u64>,
 }
 
 impl Counts {
-    /// What counts of the same program depend on, in words.
+    /// Describes everything, besides the program, that counts depend on.
     pub(super) fn tools(&self) -> String {
         format!("{}, {}, {}, {}", self.processor, self.rustc, self.flags, self.valgrind)
     }
 }
 
-/// A problem of `bp speed`, in small, on one thread of a CPU backend. It is solved in a process of its own.
+/// A smaller version of a problem of `bp speed`, solved on one thread of a CPU backend in a process of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counted {
     backend: &'static str,
@@ -73,7 +73,7 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// The CPU backends on the update alone and on our two plans.
+    /// The CPU backends on the message update alone and on our two plans.
     fn all() -> impl Iterator<Item = Self> {
         Problem::KERNELS.into_iter().flat_map(|problem| ["scalar", "rayon"].map(|backend| Self { backend, problem }))
     }
@@ -83,22 +83,22 @@ impl Counted {
         format!("{}:{}", self.problem, self.backend)
     }
 
-    /// What the hidden option says.
+    /// Parses the value of the hidden option.
     ///
     /// # Errors
-    /// Where there is no such solve.
+    /// If no solve has this name.
     pub fn parse(name: &str) -> Result<Self, String> {
         Self::all().find(|solve| solve.name() == name).ok_or_else(|| "not counted".to_owned())
     }
 
-    /// Solves it once, in the process that valgrind runs; the device's name.
+    /// Solves it once, in the process that valgrind runs; returns the device's name.
     pub fn run(self) -> Result<String, Failure> {
         let problem = Problem::asked(&[self.problem.to_owned()]).into_iter().next();
         let problem = problem.ok_or_else(|| Failure::other("there is no such problem"))?;
         solve(self.backend, problem.plan(DIVISOR)?)
     }
 
-    /// Counts it: the device's name, and instructions by name.
+    /// Counts its instructions; returns the device's name and the counts by name.
     fn count(self, program: &Path, watch: &Watch<'_>) -> Result<(String, Vec<(String, u64)>), Failure> {
         watch.check()?;
         let counted =
@@ -113,7 +113,7 @@ impl Counted {
     }
 }
 
-/// Solves a plan once on one thread; the device's name.
+/// Solves a plan once on one thread; returns the device's name.
 fn solve(backend: &str, plan: Plan) -> Result<String, Failure> {
     let runner = Asked::open(&format!("{backend}@1"))?.runner.map_err(Failure::unavailable)?;
     let pair = pair(plan.image_size())?;
@@ -121,7 +121,7 @@ fn solve(backend: &str, plan: Plan) -> Result<String, Failure> {
     Ok(runner.info.name)
 }
 
-/// Noise, seen from two places: valgrind would take longer to render a scene than for all kernels.
+/// Two shifted views of noise: under valgrind, rendering a scene would take longer than all kernels.
 fn pair(size: Size) -> Result<StereoPair, Error> {
     let mut random = fastrand::Rng::with_seed(1);
     let noise: Vec<u8> = std::iter::repeat_with(|| random.u8(..)).take(size.pixels() + SHIFT).collect();
@@ -129,13 +129,13 @@ fn pair(size: Size) -> Result<StereoPair, Error> {
     StereoPair::new(view(0)?, view(SHIFT)?)
 }
 
-/// Name and version of valgrind; `None` where there is none.
+/// Name and version of valgrind; `None` if it cannot be run.
 pub(super) fn valgrind() -> Option<String> {
     let output = Command::new("valgrind").arg("--version").stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
-/// Counts all solves with this valgrind, several at once: they do not disturb one another.
+/// Counts all solves with this valgrind. Several run at once, since they do not affect one another's counts.
 pub(super) fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failure> {
     let failed = |error| Failure::other(format!("cannot find this program's own file: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
@@ -153,26 +153,26 @@ pub(super) fn count(valgrind: String, watch: &Watch<'_>) -> Result<Counts, Failu
     })
 }
 
-/// A program that ran under callgrind.
+/// The result of a program that ran under callgrind.
 struct Profile {
     /// Its standard output.
     printed: String,
-    /// Instructions of the solver's kernels and of all that they call, in the order of [`Stage::ALL`].
+    /// Instructions of the solver's kernels and of everything they call, in the order of [`Stage::ALL`].
     instructions: [u64; Stage::ALL.len()],
 }
 
-/// Runs a program that solves something.
+/// Runs a program under callgrind and reads the kernels' instructions from the profile.
 fn callgrind(program: &Path, arguments: &[&str], watch: &Watch<'_>) -> Result<Profile, Failure> {
     let failed = |what: &dyn std::fmt::Display| Failure::other(format!("valgrind: {what}"));
     let folder = tempfile::tempdir().map_err(|e| failed(&format!("no temporary folder: {e}")))?;
-    // Its own settings, for profiles that are plain to read, and none of the user's.
+    // Ignores the user's valgrind settings, and writes profiles that are easy to parse.
     let options = "--command-line-only=yes --quiet --tool=callgrind --callgrind-out-file=profile --demangle=no \
         --compress-strings=no --compress-pos=no";
     let mut command = Command::new("valgrind");
     command.args(options.split_whitespace()).arg(program).args(arguments);
     let output = command.current_dir(&folder).stdin(Stdio::null()).output().map_err(|e| failed(&e))?;
     if !output.status.success() {
-        // Ctrl-C may have ended it before this program was told.
+        // Ctrl-C may have ended valgrind before this program received it.
         std::thread::sleep(Duration::from_millis(50));
         watch.check()?;
         let said = String::from_utf8_lossy(&output.stderr);
@@ -186,8 +186,8 @@ fn callgrind(program: &Path, arguments: &[&str], watch: &Watch<'_>) -> Result<Pr
     Ok(Profile { printed: String::from_utf8_lossy(&output.stdout).into_owned(), instructions })
 }
 
-/// Instructions of the kernels in a profile. There, `cfn=` names a function that is called, and the line after `calls=`
-/// ends with what those calls took, all included.
+/// Instructions of the kernels in a profile. `cfn=` names a called function, and the line after `calls=` ends with the
+/// inclusive cost of those calls.
 fn of_stages(profile: &str) -> [u64; Stage::ALL.len()] {
     let mut sums = [0; Stage::ALL.len()];
     let (mut called, mut lines) = (None, profile.lines());
@@ -204,8 +204,8 @@ fn of_stages(profile: &str) -> [u64; Stage::ALL.len()] {
     sums
 }
 
-/// The kernel that a symbol is of, as the trait `Solver` names it: not what it calls, be it of the same name. Either way
-/// of mangling names a function by its length and name, and ends there but for a hash.
+/// The kernel that a symbol implements as a method of the trait `Solver`. Functions that a kernel calls do not match,
+/// even with the same name. Both mangling schemes write a function's length and name; then only a hash may follow.
 fn stage(symbol: &str) -> Option<Stage> {
     let (symbol, _) = symbol.split_once(".llvm.").unwrap_or((symbol, ""));
     let ends = |name: &str| match symbol.rsplit_once(name) {
@@ -264,7 +264,7 @@ mod tests {
         solve("rayon", plan).unwrap();
     }
 
-    /// Counted below, as is the next.
+    /// Run under callgrind by the last test, as is `ten_loops`.
     #[test]
     fn five_loops() {
         solve_loops(5);

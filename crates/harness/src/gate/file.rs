@@ -1,4 +1,4 @@
-//! Files of baselines: JSON with a version, written whole.
+//! Baseline files: JSON with a version, written whole.
 
 use std::{fs, io::ErrorKind, path::Path};
 
@@ -25,7 +25,7 @@ struct Version {
     schema_version: u32,
 }
 
-/// Reads a file; `None` where there is none.
+/// Reads a file; `None` if it does not exist.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failure> {
     let text = match fs::read_to_string(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -34,10 +34,10 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failur
     parse(path, &text).map(Some)
 }
 
-/// The baseline in the text of a file.
+/// Parses the text of a baseline file.
 pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Failure> {
     let failed = |error: serde_json::Error| Failure::reading(path, &error);
-    // The version comes first: another one may well have other fields.
+    // The version is checked first, because other versions may have other fields.
     let Version { schema_version } = serde_json::from_str(text).map_err(failed)?;
     if schema_version != SCHEMA_VERSION {
         let what = format!("version {schema_version} of baselines, this program has {SCHEMA_VERSION}");
@@ -47,7 +47,7 @@ pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, F
     Ok(file.baseline)
 }
 
-/// Writes a file, and its folder where that is missing.
+/// Writes a file, and creates its folder if that is missing.
 pub(super) fn write(path: &Path, baseline: &impl Serialize) -> Result<(), Failure> {
     create_folder(path.parent().unwrap_or(Path::new(".")))?;
     let file = Versioned { schema_version: SCHEMA_VERSION, baseline };

@@ -1,21 +1,21 @@
-//! What is guarded: which speed-ups, of whom over whom.
+//! The guarded speed-ups: which runner and plan over which.
 
 use bp_core::Stage;
 
 use crate::record::Sample;
 
-/// The plans of the thesis that are held against its first.
+/// The thesis's plans that are compared with its first, plain BP.
 const AGAINST_BP: [&str; 4] = ["cfbp", "cfcsbp", "ctbp", "ctcsbp"];
 
-/// The part of a speed-up that may be lost where both sides run on one thread of the processor: noise and where memory
-/// happens to lie make out a few percent.
+/// The fraction of a speed-up that may be lost if both sides run on one CPU thread. Noise and memory placement account
+/// for a few percent.
 const ONE_THREAD: f64 = 0.12;
 
-/// The same of a device that is asked as one, be it several threads of a software rasteriser.
+/// The same for a device that runs as a whole, such as a GPU or a software rasteriser with several threads.
 const DEVICE: f64 = 0.2;
 
-/// The same of all threads over one. Where the system puts them, and what else it runs there, make so much that only
-/// threads that hardly help any more can be told.
+/// The same for all threads over one. Scheduling and other work on the cores vary so much that the gate only detects
+/// threads that hardly help any more.
 const THREADS: f64 = 0.35;
 
 /// A plan on a runner.
@@ -27,18 +27,18 @@ pub(super) struct Entrant {
     pub(super) plan: &'static str,
 }
 
-/// Which time of a solve.
+/// The part of a solve that is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// From images to labels, by the wall clock.
     Total,
-    /// First messages and their updates.
+    /// Initial messages and their updates.
     MessagePassing,
     /// A kernel.
     Kernel(Stage),
 }
 
-/// A speed-up: how many times as long as `of` it takes `over`.
+/// A speed-up: the time of `over` divided by the time of `of`.
 #[derive(Clone, Debug)]
 pub(super) struct Guarded {
     pub(super) of: Entrant,
@@ -48,16 +48,16 @@ pub(super) struct Guarded {
     pub(super) tolerance: f64,
 }
 
-/// Those who run plans, by name.
+/// The runners, by name.
 #[derive(Clone, Debug)]
 pub(super) struct Lineup {
-    /// The reference, of which times are taken as given.
+    /// The reference, whose times are taken as given.
     pub(super) reference: String,
-    /// The fast processor backend on one thread.
+    /// The fast CPU backend on one thread.
     pub(super) one_thread: String,
-    /// The same on all threads, where those are several.
+    /// The same on all threads, if there are several.
     pub(super) all_threads: Option<String>,
-    /// Devices that share no thread with us, software rasterisers among them.
+    /// Devices that do not use our threads, including software rasterisers.
     pub(super) devices: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! `bp gate --instructions`: counts beside those that were recorded.
+//! `bp gate --instructions`: compares instruction counts with the recorded ones.
 
 use std::{
     fmt::Write as _,
@@ -16,26 +16,26 @@ use bp_stereo::Watch;
 
 use crate::{failure::Failure, report::format::whole};
 
-/// Name of the file.
+/// Name of the baseline file.
 const FILE: &str = "instructions.json";
 
-/// A count may differ by this fraction. The same program takes the same instructions; what is built anew from the same
-/// sources may differ by a few.
+/// A count may grow by this fraction. The same program takes the same instructions, but a new build of the same sources
+/// may differ by a few.
 const TOLERANCE: f64 = 0.01;
 
-/// What was counted, judged.
+/// The counts, judged.
 #[derive(Serialize)]
 pub struct CountJudgement {
     #[serde(skip)]
     baselines: PathBuf,
     counts: Counts,
-    /// Counts of the same tools; none where there are none, or of others only.
+    /// Recorded counts of the same tools, if any.
     recorded: Option<Counts>,
-    /// Why none is compared.
+    /// Why the counts cannot be compared.
     unlike: Option<String>,
 }
 
-/// Counts, and holds against the file what is comparable.
+/// Counts instructions and compares them with the file, if its counts are comparable.
 pub fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
@@ -51,7 +51,7 @@ pub fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgemen
 }
 
 impl CountJudgement {
-    /// Each count with its name, what it was, and by what fraction it is more.
+    /// Each count with its name, its recorded value, and the fraction by which it grew.
     fn rows(&self) -> impl Iterator<Item = (&String, u64, Option<(u64, f64)>)> {
         self.counts.counts.iter().map(|(name, &count)| {
             let before = self.recorded.as_ref().and_then(|recorded| recorded.counts.get(name));
@@ -59,7 +59,7 @@ impl CountJudgement {
         })
     }
 
-    /// Counts that grew beyond the tolerance or are no more, and backends that went to another device, in words.
+    /// Describes counts that grew beyond the tolerance or disappeared, and backends that moved to another device.
     pub fn failures(&self) -> Vec<String> {
         let grown = self.rows().filter_map(|(name, now, before)| {
             let (before, more) = before.filter(|&(_, more)| more > TOLERANCE)?;
@@ -94,7 +94,7 @@ impl CountJudgement {
         text
     }
 
-    /// Writes the counts as the new baseline; the file's name.
+    /// Writes the counts as the new baseline; returns the file's name.
     pub fn update(&self) -> Result<String, Failure> {
         let path = self.baselines.join(FILE);
         file::write(&path, &self.counts)?;

@@ -1,4 +1,4 @@
-//! What was measured beside what was expected.
+//! Compares measurements with baselines.
 
 use serde::Serialize;
 
@@ -15,19 +15,20 @@ use crate::{
     record::{Machine, Program},
 };
 
-/// The tolerance of speed-ups that have a baseline for all machines only, a fraction: how much work is saved does not
-/// depend on the machine, how fast its caches are does.
+/// Tolerated loss, a fraction, of speed-ups that only have a baseline for all machines. The work that a plan saves does
+/// not depend on the machine, but the speed of the caches does.
 const TOLERANCE_ANYWHERE: f64 = 0.4;
 
-/// What a gate found.
+/// The result of a gate.
 #[derive(Serialize)]
 pub struct Judgement {
     pub(super) program: Program,
     pub(super) machine: Machine,
     pub(super) quick: bool,
     pub(super) rounds: u32,
-    /// The file of baselines for this kind of machine, and whether it expects anything of this run.
+    /// The baseline file for this kind of machine.
     pub(super) baseline: String,
+    /// Whether that file has expectations for this run.
     pub(super) has_baseline: bool,
     /// Runners, each with its device.
     pub(super) devices: Vec<(String, String)>,
@@ -35,7 +36,7 @@ pub struct Judgement {
     pub(super) unavailable: Vec<String>,
     pub(super) speed_ups: Vec<SpeedUp>,
     pub(super) facts: Vec<JudgedFact>,
-    /// What is expected of devices that are here, and was not measured.
+    /// Expected results of available devices that were not measured.
     pub(super) missing: Vec<String>,
     /// Baselines that were written.
     pub written: Vec<String>,
@@ -46,20 +47,20 @@ pub struct Judgement {
 pub(super) struct SpeedUp {
     pub(super) name: String,
     pub(super) first: Ratio,
-    /// Measured again, where one was worse at first.
+    /// The second measurement, if the first was worse.
     pub(super) second: Option<Ratio>,
     pub(super) baseline: Option<f64>,
-    /// How much of the baseline may be lost, a fraction.
+    /// The fraction of the baseline that may be lost.
     pub(super) tolerance: f64,
     pub(super) verdict: Verdict,
 }
 
-/// Something that does not vary, judged.
+/// A result that does not vary, judged.
 #[derive(Serialize)]
 pub(super) struct JudgedFact {
     pub(super) name: String,
     pub(super) value: String,
-    /// What it was; none where nothing is known of it.
+    /// The expected value, if known.
     pub(super) baseline: Option<String>,
 }
 
@@ -101,7 +102,7 @@ impl Judgement {
         self.speed_ups.iter().any(SpeedUp::is_worse)
     }
 
-    /// Judges again what was worse: only what is worse both times fails.
+    /// Judges again the speed-ups that were worse: they fail only if they are worse both times.
     pub(super) fn repeat(&mut self, measured: &Measured) {
         for speed_up in self.speed_ups.iter_mut().filter(|speed_up| speed_up.is_worse()) {
             let again = measured.ratios.iter().find(|(guarded, _)| guarded.name() == speed_up.name);
@@ -112,7 +113,7 @@ impl Judgement {
         }
     }
 
-    /// What is worse than it may be, or not what it was, in words.
+    /// Describes the speed-ups that are worse, the results that changed, and the expected results that are missing.
     pub fn failures(&self) -> Vec<String> {
         let worse = self.speed_ups.iter().filter(|speed_up| speed_up.is_worse()).map(|speed_up| {
             let now = speed_up.second.unwrap_or(speed_up.first).median;
@@ -127,25 +128,25 @@ impl Judgement {
     }
 }
 
-/// What baselines say of a run.
+/// What the baselines expect of a run.
 struct Known<'a> {
     gate: &'a Gate<'a>,
     baselines: &'a Baselines,
 }
 
 impl<'a> Known<'a> {
-    /// What a baseline expects of a run like this one.
+    /// What a baseline expects of a run with these settings.
     fn expected(&self, baseline: Option<&'a Baseline>) -> Option<&'a Expected> {
         baseline?.runs.get(self.gate.setting())
     }
 
-    /// What this machine's baseline expects, where these runners were the same devices then.
+    /// What this machine's baseline expects, if these runners used the same devices when it was recorded.
     fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
         let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.runners.devices());
         runners.iter().all(|&runner| here.devices.get(runner) == devices.get(runner)).then_some(here)
     }
 
-    /// What is expected of the devices that are here, and was not measured.
+    /// Expected results of available devices that were not measured.
     fn missing(&self, measured: &Measured) -> Vec<String> {
         let devices = self.gate.runners.devices();
         let of_device = |expected: &Expected, name: &str| {

@@ -1,4 +1,4 @@
-//! Takes the samples of everything that is guarded, and notes what does not vary.
+//! Takes the samples of everything that is guarded, and collects the results that do not vary.
 
 use std::{cell::RefCell, collections::BTreeMap};
 
@@ -19,45 +19,45 @@ use crate::{
     scenes::Scene,
 };
 
-/// A problem is solved again and again until a turn has taken so many milliseconds: the times of a short solve alone
-/// would mostly tell about what came before it.
+/// A turn repeats a solve for about this many milliseconds. The time of a single short solve would mostly reflect what
+/// ran before it.
 const TURN_MS: f64 = 20.0;
 
-/// The same of all threads of the fast processor backend. Systems take their time to spread threads that have just been
-/// woken over the processors: until then two are no faster than one.
+/// The same for all threads of the fast CPU backend. The system needs a while to spread threads that just woke up over
+/// the cores; until then two threads are no faster than one.
 const TURN_OF_THREADS_MS: f64 = 300.0;
 
-/// The most solves of a turn.
+/// Maximum number of solves per turn.
 const MOST_SOLVES: u32 = 400;
 
-/// What is solved.
+/// The problem to solve.
 pub(super) struct Problem {
     pub(super) scene: Scene,
     pub(super) labels: usize,
-    /// Loops of plain BP.
+    /// Iterations of plain BP.
     pub(super) k: u32,
 }
 
 /// What was measured.
 pub(super) struct Measured {
-    /// Every guarded speed-up, in order, but those that could not be had.
+    /// Every guarded speed-up that could be measured, in order.
     pub(super) ratios: Vec<(Guarded, Ratio)>,
-    /// What does not vary, by name.
+    /// Results that do not vary, by name.
     pub(super) facts: Facts,
 }
 
-/// Something that does not vary.
+/// A result that does not vary.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Fact {
     pub(super) value: String,
-    /// Whose it is; none where it must be the same on every machine.
+    /// The runner it belongs to; `None` if it must be the same on every machine.
     pub(super) runner: Option<String>,
 }
 
-/// By name.
+/// Facts by name.
 pub(super) type Facts = BTreeMap<String, Fact>;
 
-/// Measures everything that is guarded in so many rounds.
+/// Measures everything that is guarded.
 pub(super) fn measure(
     guarded: &[Guarded],
     runners: &Runners,
@@ -81,7 +81,7 @@ pub(super) fn measure(
     Ok(Measured { ratios, facts })
 }
 
-/// Everyone who is guarded, once; the reference first, since all others must answer as it did.
+/// All guarded entrants, without duplicates. The reference comes first, because all others must give its answers.
 fn entrants<'a>(guarded: &'a [Guarded], reference: &str) -> Vec<&'a Entrant> {
     let mut entrants: Vec<&Entrant> = Vec::new();
     for entrant in guarded.iter().flat_map(|guarded| [&guarded.over, &guarded.of]) {
@@ -100,9 +100,9 @@ struct Turn<'a> {
     planned: Planned,
     problem: &'a Problem,
     facts: &'a RefCell<Facts>,
-    /// Whose bytes are the same on every machine.
+    /// The runner whose memory use is the same on every machine.
     reference: &'a str,
-    /// How long a turn takes at least, unless that were too many solves.
+    /// Minimum duration of a turn, unless that needs too many solves.
     turn_ms: f64,
     solves: u32,
     ready: Option<Solve<'a>>,
@@ -124,7 +124,7 @@ impl<'a> Turn<'a> {
         Ok(Self { entrant, runner, planned, problem, facts, reference, turn_ms, solves: 1, ready: None })
     }
 
-    /// Adds what the plan answers and how many bytes it takes.
+    /// Adds the plan's results and the bytes that it allocates.
     fn add_facts(&self, driver: &Driver) -> Result<(), Failure> {
         let (runner, facts) = (&self.runner.name, &mut self.facts.borrow_mut());
         add_answer(runner, self.entrant.plan, driver, self.problem, facts)?;
@@ -145,8 +145,8 @@ impl Contestant for Turn<'_> {
         Ok(first)
     }
 
-    /// Solves the problem as often as a turn takes; the medians count. Nothing is reported meanwhile: it would take part
-    /// in the times of short solves.
+    /// Repeats the solve as often as a turn needs; returns the medians. Reports nothing meanwhile, because reporting
+    /// would add to the times of short solves.
     fn turn(&mut self, round: u32, _: &Meter<'_>) -> Result<Sample, Failure> {
         let not_ready = || Failure::other("it is not ready");
         let solve = self.ready.as_mut().ok_or_else(not_ready)?;
@@ -161,7 +161,7 @@ impl Contestant for Turn<'_> {
     }
 }
 
-/// Adds what the plans answer whose times are not guarded, by the fast processor backend.
+/// Adds the results of the plans whose times are not guarded, solved by the fast CPU backend.
 fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut Facts, watch: &Watch<'_>) -> Result<(), Failure> {
     let Some(runner) = runners.get(&runners.lineup.one_thread) else { return Ok(()) };
     for planned in plans::all() {
@@ -175,7 +175,7 @@ fn add_other_plans(runners: &Runners, problem: &Problem, facts: &mut Facts, watc
     Ok(())
 }
 
-/// Adds what a plan answers; fails where another runner answered otherwise.
+/// Adds a plan's results; fails if another runner gave different ones.
 fn add_answer(runner: &str, plan: &str, driver: &Driver, problem: &Problem, facts: &mut Facts) -> Result<(), Failure> {
     for (name, value) in answer(driver, problem)? {
         let new = Fact { value: value.clone(), runner: None };
@@ -193,7 +193,7 @@ fn prepare<'a>(runner: &'a Runner, planned: &Planned, problem: &'a Problem) -> R
     Solve::prepare(runner, plan, &problem.scene.pair).map_err(|failure| failure.of(&runner.name))
 }
 
-/// What every backend must answer, by name.
+/// The results that all backends must agree on, by name.
 fn answer(driver: &Driver, problem: &Problem) -> Result<[(&'static str, String); 5], Failure> {
     let (scene, plan) = (&problem.scene, driver.plan());
     let errors = scene.truth.errors(&driver.disparities())?;
@@ -208,8 +208,8 @@ fn answer(driver: &Driver, problem: &Problem) -> Result<[(&'static str, String);
     ])
 }
 
-/// A speed-up, from the two times of each round; `None` where one of its entrants did not run, or where a device without
-/// a clock of its own hides how long a stage took.
+/// A speed-up, from the two times of each round. `None` if one of its entrants did not run, or if a device without a
+/// clock of its own cannot time a stage.
 fn ratio(guarded: &Guarded, entrants: &[measure::Entrant<Turn<'_>>]) -> Option<Ratio> {
     let samples = |entrant: &Entrant| {
         let own = entrants.iter().find(|own| own.contestant.entrant == entrant)?;

@@ -9,7 +9,7 @@ use super::{
 use crate::{failure::Failure, machine, statistics::median};
 
 impl Gate<'_> {
-    /// Puts what was measured into the baselines and writes them; the names of the files.
+    /// Puts the measurements into the baselines and writes them; returns the names of the files.
     pub(super) fn renew(
         &self,
         renewal: Renewal,
@@ -30,7 +30,7 @@ impl Gate<'_> {
         baselines.write(renewal)
     }
 
-    /// The median of each speed-up over some measurements, and the facts, of those that are chosen.
+    /// The chosen speed-ups, each the median over the measurements, and the chosen facts.
     fn expected(
         &self,
         measured: &[Measured],

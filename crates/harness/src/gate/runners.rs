@@ -1,4 +1,4 @@
-//! Who runs plans: devices, and the threads that they run in.
+//! The runners: devices, and the threads that they run on.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::{
     measure::{Asked, Runner},
 };
 
-/// The backend whose one thread is held against the reference's, and all of its threads against one.
+/// This backend's one thread is compared with the reference, and all of its threads with one.
 const THREADED: &str = "rayon";
 
 /// All runners that this machine has.
@@ -20,7 +20,7 @@ pub(super) struct Runners {
     pub(super) unavailable: Vec<String>,
 }
 
-/// Opens a device under a name of its own, as baselines have it.
+/// Opens a device under the name that baselines use.
 fn open(option: &str, name: &str) -> Result<Runner, Failure> {
     let unavailable = |reason| Failure::unavailable(format!("backend {option}: {reason}"));
     Ok(Asked::open(option)?.runner.map_err(unavailable)?.named(name))
@@ -35,7 +35,7 @@ impl Runners {
         let mut all = vec![open(reference, reference)?, open(&format!("{THREADED}@1"), &one_thread)?];
         let all_threads = (threads > 1).then(|| format!("{THREADED} on {threads} threads"));
         if let Some(name) = &all_threads {
-            // In the pool that this runs in: it has them all.
+            // Runs in the current thread pool, which has all threads.
             all.push(open(THREADED, name)?);
         }
         let (mut devices, mut unavailable) = (Vec::new(), Vec::new());
@@ -53,12 +53,12 @@ impl Runners {
         Ok(Self { all, lineup, unavailable })
     }
 
-    /// The runner of a name.
+    /// The runner with this name.
     pub(super) fn get(&self, name: &str) -> Option<&Runner> {
         self.all.iter().find(|runner| runner.name == name)
     }
 
-    /// The device of each runner, with its driver: what its times depend on.
+    /// The device and driver of each runner, which its times depend on.
     pub(super) fn devices(&self) -> BTreeMap<String, String> {
         let device = |runner: &Runner| {
             let driver = runner.info.driver.as_ref();

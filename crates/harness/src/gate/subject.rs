@@ -11,25 +11,25 @@ use bp_stereo::Watch;
 
 use crate::{failure::Failure, record::Machine};
 
-/// Which baselines.
+/// Which baselines to renew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Renewal {
     /// The file for this kind of machine.
     Here,
-    /// That and the file for all machines.
+    /// The file for this kind of machine and the file for all machines.
     Everywhere,
 }
 
-/// What is measured, and what it is held against.
+/// How to measure, and which baselines to compare with.
 #[derive(Debug)]
 pub struct GateOptions {
-    /// A smaller image and fewer loops.
+    /// A smaller image and fewer iterations.
     pub quick: bool,
     /// Rounds of a measurement.
     pub rounds: u32,
     /// The folder of the baselines.
     pub baselines: PathBuf,
-    /// Baselines to write anew.
+    /// Baselines to renew, if any.
     pub update: Option<Renewal>,
 }
 
@@ -47,7 +47,7 @@ impl Gate<'_> {
         measure(&self.guarded, &self.runners, &self.problem, self.options.rounds, watch)
     }
 
-    /// Which of a baseline's runs is like this one.
+    /// The name in a baseline of runs with these settings.
     pub(super) fn setting(&self) -> &'static str {
         if self.options.quick { "quick" } else { "full" }
     }

@@ -1,4 +1,4 @@
-//! What a gate found, as Markdown.
+//! The result of a gate, as Markdown.
 
 use std::fmt::Write as _;
 
@@ -75,7 +75,7 @@ fn fact(fact: &JudgedFact) -> Vec<String> {
     vec![name.clone(), value.clone(), baseline.clone().unwrap_or_default()]
 }
 
-/// Three figures.
+/// Formats a number with three significant digits.
 fn figures(value: f64) -> String {
     let decimals = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
     format!("{value:.decimals$}")

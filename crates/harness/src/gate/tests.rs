@@ -1,10 +1,10 @@
-//! From a measurement to a verdict, on an image so small that only what is exact means anything.
+//! From a measurement to a verdict, on an image so small that only the exact results are meaningful.
 
 use std::{fs, path::Path};
 
 use super::{baseline::Baseline, measure::Measured, *};
 
-/// The processor's backends on a tiny scene.
+/// The CPU backends on a tiny scene.
 fn gate(options: &GateOptions) -> Gate<'_> {
     let runners = Runners::open().unwrap();
     let lineup = guarded::Lineup { devices: Vec::new(), ..runners.lineup.clone() };
@@ -21,7 +21,7 @@ fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
     Judgement::new(gate, &baselines, measured).unwrap()
 }
 
-/// Changes a file as a person would.
+/// Edits a file as a person might.
 fn edit(path: &Path, change: impl FnOnce(&mut serde_json::Value)) {
     let mut json = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
     change(&mut json);

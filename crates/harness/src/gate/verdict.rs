@@ -9,34 +9,34 @@ use crate::statistics::{interval, median};
 pub(super) struct Ratio {
     /// Median over the rounds.
     pub(super) median: f64,
-    /// Its 95 % interval begins here,
+    /// Lower end of its 95 % interval.
     pub(super) low: f64,
-    /// and ends here.
+    /// Upper end of its 95 % interval.
     pub(super) high: f64,
 }
 
-/// What is said of a speed-up.
+/// How a speed-up compares with its baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Verdict {
-    /// The interval reaches into what the baseline tolerates.
+    /// The interval overlaps the range that the baseline tolerates.
     AsBefore,
-    /// All of the interval is above that: the baseline should be renewed.
+    /// The whole interval is above that range: the baseline should be renewed.
     Better,
-    /// All of the interval is below that.
+    /// The whole interval is below that range.
     Worse,
-    /// There is nothing to compare with.
+    /// No baseline to compare with.
     NoBaseline,
 }
 
 impl Ratio {
-    /// From the ratios of the rounds; `None` where those are too few for an interval.
+    /// Computes it from the rounds' ratios; `None` if they are too few for an interval, or not numbers.
     pub(super) fn of(rounds: &[f64]) -> Option<Self> {
         let [low, high] = interval(&[rounds.to_vec()])?;
         Some(Self { median: median(rounds.iter().copied())?, low, high })
     }
 
-    /// Compares with a baseline, from which `tolerance`, a fraction, is no difference.
+    /// Compares with a baseline. A change by less than the fraction `tolerance` does not count.
     pub(super) fn judge(self, baseline: f64, tolerance: f64) -> Verdict {
         if self.high < baseline * (1.0 - tolerance) {
             Verdict::Worse
@@ -66,7 +66,7 @@ mod tests {
 
     use super::*;
 
-    /// Ratios of ten rounds about a middle, as noise makes them: most within 3 %, now and then one far off.
+    /// Noisy ratios of ten rounds around `middle`: most within 3 %, about one in ten far below.
     fn rounds(middle: f64, random: &mut Rng) -> Vec<f64> {
         let mut round = |_| {
             let stray = if random.u8(..10) == 0 { 1.0 - 0.4 * random.f64() } else { 1.0 };
@@ -75,7 +75,7 @@ mod tests {
         (0..10).map(&mut round).collect()
     }
 
-    /// How many of 1000 measurements, the second of those that were worse included, are worse.
+    /// How many of 1000 measurements are worse both at first and when repeated.
     fn alarms(speed_up: f64) -> usize {
         let random = &mut Rng::with_seed(1);
         let mut worse = || Ratio::of(&rounds(speed_up, random)).unwrap().judge(50.0, 0.12) == Verdict::Worse;

@@ -1,4 +1,4 @@
-//! How far the measuring has come.
+//! The progress of a measurement.
 
 use std::ops::ControlFlow;
 
@@ -9,31 +9,31 @@ use crate::failure::Failure;
 /// Reports progress in message entries, over one loop or several.
 pub struct Meter<'a> {
     watch: Watch<'a>,
-    /// Entries of the turns that are over.
+    /// Entries of finished turns.
     done: u64,
-    /// Entries to come in this loop.
+    /// Remaining entries of this loop.
     left: u64,
     /// Entries of later loops.
     pub ahead: u64,
 }
 
 impl<'a> Meter<'a> {
-    /// A meter that starts at nothing.
+    /// A meter at zero.
     pub fn new(watch: &Watch<'a>) -> Self {
         Self { watch: *watch, done: 0, left: 0, ahead: 0 }
     }
 
-    /// Reports how far the turn has come; breaks if the work should stop.
+    /// Reports `entries` of this turn as done; breaks if the work should stop.
     pub fn observe(&self, entries: u64) -> ControlFlow<()> {
         self.watch.progress(self.done + entries, self.done + self.left + self.ahead)
     }
 
-    /// Adds turns that are over.
+    /// Adds the entries of finished turns.
     pub(super) fn add(&mut self, entries: u64) {
         self.done += entries;
     }
 
-    /// Begins a turn, with so many entries to come in this loop; fails if the work should stop.
+    /// Begins a turn with `left` entries remaining in this loop; fails if the work should stop.
     pub(super) fn begin(&mut self, task: &str, left: u64) -> Result<(), Failure> {
         self.left = left;
         self.watch.check()?;

@@ -15,35 +15,35 @@ use crate::{
     failure::Failure,
 };
 
-/// The most threads that a name may ask for.
+/// The largest number of threads that a name can request.
 const MOST_THREADS: usize = 1024;
 
-/// A device on the threads that it works with. It is opened again after it was lost.
+/// A device and the threads that it runs on. A lost device is opened again.
 pub struct Runner {
     /// Its name in options and records.
     pub name: String,
-    /// What is known of the device.
+    /// The description of the device.
     pub info: DeviceInfo,
-    /// How long opening took, the test of the device included.
+    /// The time to open and test the device.
     pub open_time: Duration,
     opened: Mutex<Opened>,
-    /// Its own threads; without them it works in the pool of its caller.
+    /// Its own threads. Without them it runs in the pool of its caller.
     pool: Option<ThreadPool>,
 }
 
-/// A runner that somebody asked for.
+/// A requested runner, which may be unavailable.
 pub struct Asked {
     /// Its name in records.
     pub name: String,
-    /// The runner, or why there is none.
+    /// The runner, or why it could not be opened.
     pub runner: Result<Runner, String>,
 }
 
 impl Asked {
-    /// The runner that `NAME`, `NAME:DEVICE`, `NAME@THREADS` or `NAME:DEVICE@THREADS` means.
+    /// Opens the runner that `NAME`, `NAME:DEVICE`, `NAME@THREADS` or `NAME:DEVICE@THREADS` selects.
     ///
     /// # Errors
-    /// If there is no such backend or device, or if the device has no threads to choose.
+    /// If no such backend or device exists, if THREADS is out of range, or if the device has no threads to choose.
     pub fn open(option: &str) -> Result<Self, Failure> {
         let (device, threads) = split(option)?;
         let pool = threads.map(pool).transpose()?;
@@ -56,7 +56,7 @@ impl Asked {
             .and_then(|asked| asked.checked(option, threads))
     }
 
-    /// Fails if the device does not work with the threads that its name asks for.
+    /// Fails if the device does not use the number of threads that its name requests.
     fn checked(self, option: &str, threads: Option<usize>) -> Result<Self, Failure> {
         match (&self.runner, threads) {
             (Ok(runner), Some(threads)) if runner.info.workers != threads => {
@@ -66,7 +66,7 @@ impl Asked {
         }
     }
 
-    /// Opens the runners that a run asks for, each once. It fails only if none of them can be opened.
+    /// Opens the requested runners. Fails if a name is wrong or repeated, or if none of the runners can be opened.
     pub fn open_all(names: &[String], watch: &Watch<'_>) -> Result<Vec<Self>, Failure> {
         let mut all: Vec<Self> = Vec::new();
         for name in names {
@@ -88,7 +88,7 @@ impl Asked {
         all.iter().filter_map(|asked| asked.runner.as_ref().ok())
     }
 
-    /// What a reader must know before the numbers.
+    /// A warning about the device, for readers of the numbers.
     fn caution(&self) -> Option<String> {
         let name = &self.name;
         match &self.runner {
@@ -101,7 +101,7 @@ impl Asked {
     }
 }
 
-/// The device and the number of threads in a name.
+/// Splits a name into the device and the number of threads.
 fn split(option: &str) -> Result<(&str, Option<usize>), Failure> {
     let Some((device, threads)) = option.rsplit_once('@') else { return Ok((option, None)) };
     let threads = threads.parse().ok().filter(|threads| (1..=MOST_THREADS).contains(threads));
@@ -137,7 +137,7 @@ impl Runner {
         within(self.pool.as_ref(), work).inspect_err(|failure| self.opened().note(failure.cause()))
     }
 
-    /// Runs some work on the device, which is opened again if it was lost.
+    /// Runs some work on the device, which is reopened first if it was lost.
     pub fn on_device<T: Send>(
         &self,
         work: impl FnOnce(&dyn Device) -> Result<T, Failure> + Send,
@@ -153,8 +153,8 @@ impl Runner {
         self.opened.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the stages of its samples are times. Calls of a CPU backend take as long as the work. Calls of a GPU
-    /// backend only hand the work over, so that only the device's own clock knows.
+    /// Whether the wall clock can time its stages. A call to a CPU backend takes as long as the work. A call to a GPU
+    /// backend only submits the work, so only the device's own clock can time it.
     pub fn waits(&self) -> bool {
         self.info.api.is_none()
     }
@@ -162,7 +162,7 @@ impl Runner {
 
 #[cfg(test)]
 impl Runner {
-    /// The device of a test.
+    /// A runner for tests.
     pub fn of(opened: Opened) -> Self {
         Self::new(opened.name.clone(), opened, None)
     }

@@ -24,7 +24,7 @@ pub struct Solve<'a> {
 }
 
 impl<'a> Solve<'a> {
-    /// Prepares a plan, on a device that is opened again if it was lost.
+    /// Prepares a plan. A lost device is reopened first.
     pub fn prepare(runner: &'a Runner, plan: Plan, pair: &'a StereoPair) -> Result<Self, Failure> {
         runner.on_device(|device| {
             machine::check_memory(runner.info.kind, device.planned_bytes(&plan), "--quick needs less")?;

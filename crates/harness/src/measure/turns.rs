@@ -1,18 +1,18 @@
-//! The one measuring loop.
+//! The measuring loop.
 
 use super::Meter;
 use crate::{failure::Failure, record::Sample};
 
-/// Solves that take more milliseconds are slow: all rounds of them would take too long, and short disturbances average
+/// A solve that takes more milliseconds is slow. All rounds of it would take too long, and short disturbances average
 /// out within a long solve anyway.
 pub const SLOW_MS: f64 = 5000.0;
 
-/// Nanoseconds of a message entry, to guess which contestants are slow before their first solve.
+/// Assumed nanoseconds per message entry, to guess which contestants are slow before their first solve.
 const GUESSED_NS: f64 = 2.5;
 
-/// Takes part in the loop.
+/// A participant in the loop.
 pub trait Contestant {
-    /// Gets ready before the first round and warms up; returns the time of the warm-up, which counts in no other number.
+    /// Prepares and warms up before the first round. Returns the sample of the warm-up, which is not one of the rounds.
     fn warm_up(&mut self, meter: &Meter<'_>) -> Result<Sample, Failure> {
         self.turn(0, meter)
     }
@@ -20,12 +20,12 @@ pub trait Contestant {
     /// Takes one turn.
     fn turn(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure>;
 
-    /// Keeps what came of a turn. A failure here, as of a full disk, ends the loop.
+    /// Keeps the result of a turn. A failure here, such as a full disk, ends the loop.
     fn keep(&mut self, _taken: Result<&Sample, &Failure>) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Message entries of a turn, which progress is reported in.
+    /// Message entries per turn, the unit of progress.
     fn entries(&self) -> u64 {
         1
     }
@@ -38,7 +38,7 @@ impl<F: FnMut(u32) -> Result<Sample, Failure>> Contestant for F {
     }
 }
 
-/// A contestant and what came of its turns.
+/// A contestant and the results of its turns.
 pub struct Entrant<C> {
     /// Its name in progress and messages.
     pub name: String,
@@ -52,21 +52,21 @@ pub struct Entrant<C> {
     pub failure: Option<Failure>,
 }
 
-/// How the loop goes.
+/// The rules of the loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
     /// Rounds, in each of which every contestant takes one turn.
     pub rounds: u32,
     /// Rounds of a contestant whose first solve is slow, see [`SLOW_MS`].
     pub slow_rounds: u32,
-    /// Whether contestants warm up before the first round. If they do not, each turn makes everything ready anew.
+    /// Whether contestants warm up before the first round. If they do not, each turn prepares everything anew.
     pub warm_up: bool,
     /// Whether one failure ends everything. If not, the contestant that failed takes no more turns.
     pub fail_fast: bool,
 }
 
 impl Rules {
-    /// Rounds of a contestant whose first solve took so long.
+    /// Rounds of a contestant whose first solve took `first_ms`.
     pub fn rounds_for(&self, first_ms: f64) -> u32 {
         if first_ms > SLOW_MS { self.rounds.min(self.slow_rounds) } else { self.rounds }
     }
@@ -78,7 +78,7 @@ impl<C: Contestant> Entrant<C> {
         Self { name, contestant, first_ms: None, samples: Vec::new(), failure: None }
     }
 
-    /// A contestant that goes on with the samples of an interrupted run.
+    /// The contestant, resumed with the samples of an interrupted run.
     pub fn resumed(self, samples: &[Sample]) -> Self {
         Self { first_ms: samples.first().map(|sample| sample.total_ms), samples: samples.to_vec(), ..self }
     }
@@ -91,14 +91,14 @@ impl<C: Contestant> Entrant<C> {
         self.failure.is_none() && self.samples.len() as u32 == round && round < self.rounds(rules)
     }
 
-    /// Message entries to come.
+    /// Remaining message entries.
     fn left(&self, rules: &Rules) -> u64 {
         let warm_up = u32::from(rules.warm_up && self.first_ms.is_none());
         let turns = (warm_up + self.rounds(rules)).saturating_sub(self.samples.len() as u32);
         if self.failure.is_some() { 0 } else { u64::from(turns) * self.contestant.entries() }
     }
 
-    /// Takes a turn, or warms up where no round is given.
+    /// Takes a turn, or warms up if `round` is `None`.
     fn take(&mut self, round: Option<u32>, rules: &Rules, meter: &mut Meter<'_>) -> Result<(), Failure> {
         let taken = match round {
             Some(round) => self.contestant.turn(round, meter),
@@ -124,7 +124,7 @@ impl<C: Contestant> Entrant<C> {
     }
 }
 
-/// Runs the loop: round after round, in each of which every contestant takes one turn, one after another.
+/// Runs the loop. In each round every contestant takes one turn, one after another.
 pub fn take_turns<C: Contestant>(
     entrants: &mut [Entrant<C>],
     rules: &Rules,
@@ -174,7 +174,7 @@ mod tests {
         Fake { name: "b", ms }
     }
 
-    /// Runs them by the loop; who took turns, in order, and how it ended.
+    /// Runs the loop with them. Returns who took turns, in order, and how it ended.
     fn turns(rules: &Rules, all: &[Fake<'_>], watch: &Watch<'_>) -> String {
         let taken = RefCell::new(String::new());
         let mut entrants = Vec::new();

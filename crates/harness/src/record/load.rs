@@ -1,5 +1,5 @@
-//! Reading records, ours and strangers'. This is the one place where it is done: what it hands on fits the types and
-//! this program's schema. Strings in it are whatever its author wrote, and no path in it has been followed.
+//! Reads records, which may be untrusted. No other code does. A loaded record fits the types and this program's schema.
+//! Its strings are still whatever its author wrote, and no path in it has been followed.
 
 use std::{
     borrow::Cow,
@@ -23,13 +23,13 @@ pub const RECORD_FILE: &str = "record.json";
 /// Name of the record of `bp speed` in a run's folder.
 pub const SPEED_FILE: &str = "speed.json";
 
-/// Name of the folder of maps beside it.
+/// Name of the folder of disparity maps beside the record.
 pub const MAPS_FOLDER: &str = "maps";
 
-/// Larger files are not read: ours are below one MiB, and somebody's may be of any size.
+/// Larger files are not read. Our records are below 1 MiB, but an untrusted one may have any size.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// What is shown at most of why a record is refused: a stranger's may quote itself at any length.
+/// The most characters shown of the reason for a refusal, which may quote an untrusted record at any length.
 const MAX_MESSAGE: usize = 300;
 
 /// The one field that every version of the schema has.
@@ -38,13 +38,13 @@ struct Versioned {
     schema_version: u32,
 }
 
-/// Reads a record: the file, or the one in a run's folder.
+/// Reads a record from its file, or from a run's folder.
 pub fn load(path: &Path) -> Result<Record, Failure> {
     let path = record_file(path);
     parse(&path, &read(&path)?)
 }
 
-/// The record in the text of a file.
+/// Parses the text of a record's file.
 pub fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
     let record: Record = versioned(path, text, &REPRODUCE)?;
     match record.cells.iter().filter_map(Cell::measured).find(|measured| !is_beside(&measured.map)) {
@@ -53,7 +53,7 @@ pub fn parse(path: &Path, text: &str) -> Result<Record, Failure> {
     }
 }
 
-/// Reads the record of a run of `bp speed`: the file, or the one in its folder.
+/// Reads a record of `bp speed` from its file, or from a run's folder.
 pub fn load_speed(path: &Path) -> Result<Speed, Failure> {
     let path: Cow<'_, Path> = if path.is_dir() { path.join(SPEED_FILE).into() } else { path.into() };
     versioned(&path, &read(&path)?, &SPEED)
@@ -75,9 +75,9 @@ fn refused(path: &Path, kind: &Kind, error: &dyn Display) -> Failure {
     Failure::reading(path, &format!("not a {}: {why}", kind.what))
 }
 
-/// A record of the version that this program reads.
+/// Parses a record, which must have the version that this program reads.
 fn versioned<T: DeserializeOwned>(path: &Path, text: &str, kind: &Kind) -> Result<T, Failure> {
-    // The version comes first: another one may well have other fields.
+    // Check the version first, because another version may have other fields.
     let Versioned { schema_version } = serde_json::from_str(text).map_err(|error| refused(path, kind, &error))?;
     if schema_version != kind.version {
         let what = format!("schema version {schema_version}, this program reads {}", kind.version);
@@ -86,21 +86,21 @@ fn versioned<T: DeserializeOwned>(path: &Path, text: &str, kind: &Kind) -> Resul
     serde_json::from_str(text).map_err(|error| refused(path, kind, &error))
 }
 
-/// Whether a map is where ours are: reports show it, and a stranger's record may name any file.
+/// Whether a map lies in the maps folder. Reports show the map, and an untrusted record may name any file.
 fn is_beside(map: &str) -> bool {
     let name = map.strip_prefix(MAPS_FOLDER).and_then(|rest| rest.strip_prefix('/'));
     name.is_some_and(|name| !name.is_empty() && !name.contains(['/', '\\']) && name != "..")
 }
 
-/// The file that a record is in, where its folder may have been named.
+/// The file of a record, given the file or its folder.
 pub fn record_file(path: &Path) -> Cow<'_, Path> {
     if path.is_dir() { path.join(RECORD_FILE).into() } else { path.into() }
 }
 
-/// The text of a plain file that is not too large.
+/// The text of a regular file that is not too large.
 fn read(path: &Path) -> Result<String, Failure> {
     let failed = |error: &dyn Display| Failure::reading(path, error);
-    // Asked before it is opened: opening a pipe waits for its other end.
+    // Checked before opening, because opening a pipe waits for its other end.
     let about = fs::metadata(path).map_err(|error| failed(&error))?;
     if !about.is_file() {
         return Err(failed(&format!("not a file; name a {RECORD_FILE} or its folder")));
@@ -110,7 +110,7 @@ fn read(path: &Path) -> Result<String, Failure> {
         return Err(too_large());
     }
     let mut text = String::new();
-    // It may have grown since, or be one of those whose size the system does not tell.
+    // The file may have grown since, or the system may not report its size.
     let limited = File::open(path).map(|file| file.take(MAX_BYTES + 1));
     let count = limited.and_then(|mut file| file.read_to_string(&mut text)).map_err(|error| failed(&error))?;
     if count as u64 > MAX_BYTES { Err(too_large()) } else { Ok(text) }

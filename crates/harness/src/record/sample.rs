@@ -1,4 +1,4 @@
-//! One timed solve. Every experiment records its times as these.
+//! One timed solve. Every experiment records its times in this form.
 
 use bp_core::{Stage, Times};
 use bp_stereo::description::{Clock, Clocked, Stages, clocks, milliseconds};
@@ -12,21 +12,21 @@ use crate::statistics::{Spread, median};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
-    /// Which round of taking turns it belongs to, from 0.
+    /// The round that it belongs to, from 0.
     pub round: u32,
-    /// Milliseconds to allocate by the wall clock, apart from the total.
-    // Every sample of `bp reproduce` prepares anew, as its schema says. The other experiments prepare once and keep this
-    // time elsewhere.
+    /// Wall-clock milliseconds to allocate, not part of the total.
+    // Every sample of `bp reproduce` prepares anew, so its schema requires this. The other experiments prepare once and
+    // record that time elsewhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(required)]
     pub prepare_ms: Option<f64>,
-    /// Milliseconds of these that compiling kernels took, where the device compiles any.
+    /// The part of these spent compiling kernels, if the device compiles any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = null))]
     pub compile_ms: Option<f64>,
-    /// Milliseconds from images to labels by the wall clock.
+    /// Wall-clock milliseconds from images to labels.
     pub total_ms: f64,
-    /// Milliseconds of each stage, by the wall clock first.
+    /// Milliseconds of each stage, first by the wall clock, then by the device's own if it has one.
     pub clocks: Vec<Clocked>,
 }
 
@@ -51,7 +51,7 @@ impl Sample {
         })
     }
 
-    /// How many times as long `over` took as `of`, round by round: samples of the same round met the same machine.
+    /// The ratio of `over` to `of` in each round that both have, in which they ran under the same conditions.
     pub fn ratios(over: &[Self], of: &[Self], ms: impl Fn(&Self) -> f64) -> Vec<f64> {
         let in_round = |of: &Self| Some(ms(over.iter().find(|over| over.round == of.round)?) / ms(of));
         of.iter().filter_map(in_round).collect()
@@ -62,18 +62,18 @@ impl Sample {
         Spread::of(samples.iter().map(ms))
     }
 
-    /// Milliseconds of message passing, `refine` and `update_messages`, by the device's clock where it has one.
+    /// Milliseconds of message passing (`refine` and `update_messages`), by the device's clock if it has one.
     #[must_use]
     pub fn message_passing_ms(&self) -> f64 {
         self.clocks.last().map_or(0.0, |clocked| clocked.stages.refine_ms + clocked.stages.update_messages_ms)
     }
 
-    /// Milliseconds of each stage, by the device's clock where it has one.
+    /// Milliseconds of each stage, by the device's clock if it has one.
     pub fn stages_ms(&self) -> [f64; Stage::ALL.len()] {
         self.clocks.last().map_or([0.0; 5], |clocked| clocked.stages.in_order())
     }
 
-    /// Milliseconds of all stages by the device's clock, where it has one.
+    /// Milliseconds of all stages by the device's clock, if it has one.
     pub fn device_ms(&self) -> Option<f64> {
         let device = self.clocks.iter().find(|clocked| clocked.clock == Clock::Device);
         device.map(|clocked| clocked.stages.in_order().iter().sum())

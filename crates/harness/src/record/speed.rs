@@ -1,5 +1,5 @@
-//! What `bp speed` found. These types are the JSON of `speed.json`; the types that it shares with `record.json` are in
-//! [`crate::record`].
+//! The record of `bp speed`. These types define the JSON of `speed.json`. Those that it shares with `record.json` are
+//! in [`crate::record`].
 
 use bp_core::Stage;
 use serde::{Deserialize, Serialize};
@@ -7,28 +7,28 @@ use serde::{Deserialize, Serialize};
 use super::{Device, Machine, Outcome, Program, Sample, Settings};
 use crate::statistics::Spread;
 
-/// Version of the schema; changes with every change of meaning.
+/// Version of the schema. It changes with every change of meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Everything that was measured.
+/// A run of `bp speed`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Speed {
     /// [`SCHEMA_VERSION`] of the program that wrote it.
     pub schema_version: u32,
-    /// When it was begun, RFC 3339.
+    /// When the run started, RFC 3339.
     pub started: String,
     /// The program.
     pub program: Program,
     /// The machine.
     pub machine: Machine,
-    /// Whether the images were small.
+    /// Whether it was a quick run on small images.
     pub quick: bool,
-    /// Rounds asked for.
+    /// Requested rounds.
     pub rounds: u32,
-    /// Threads that those contestants share which have threads.
+    /// Threads of the pool that contestants share unless they have their own.
     pub threads: usize,
-    /// Who was asked to take part; the others are compared with the first.
+    /// The requested contestants. The others are compared with the first.
     pub contestants: Vec<Contestant>,
     /// The problems, in order.
     pub contests: Vec<Contest>,
@@ -40,40 +40,40 @@ pub struct Speed {
 pub struct Contestant {
     /// Name of the backend, with the device's index unless that is 0.
     pub name: String,
-    /// The device; none where the backend could not open it.
+    /// The device, unless the backend could not open it.
     pub device: Option<Device>,
     /// Why it could not be opened.
     pub unavailable: Option<String>,
-    /// Milliseconds to open it, its test included, for which kernels may be compiled.
+    /// Milliseconds to open and test it, which may include compiling kernels.
     pub open_ms: Option<f64>,
-    /// 10^9 bytes a second that it reads and writes, together, while it copies its own memory; none where that says
+    /// 10^9 bytes per second that it reads and writes in total while it copies its own memory; `None` if that means
     /// nothing or could not be measured.
     pub copy_gb_per_s: Option<f64>,
 }
 
-/// A problem, and what came of it on every device that could be opened.
+/// A problem and its results on every device that could be opened.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contest {
     /// Name of the problem.
     pub problem: String,
-    /// What grows from it to the next problem, all else being alike; none where there is no such problem, and in
-    /// records from before there were any.
+    /// The family, if the problem belongs to one. Its problems differ in one number only. Older records have no
+    /// families.
     #[serde(default)]
     pub family: Option<Family>,
     /// Pixels per row.
     pub width: usize,
     /// Pixels per column.
     pub height: usize,
-    /// What was run; the bytes it predicts are those of no device in particular.
+    /// The settings. The predicted bytes are not those of a particular device.
     pub settings: Settings,
-    /// SHA-256 of the labels that every contestant gave, two bytes each, low byte first; none where none was measured.
+    /// SHA-256 of the labels that every contestant gave, two bytes each, low byte first; `None` if no solve succeeded.
     pub labels_sha256: Option<String>,
-    /// In the order of the contestants.
+    /// The results, in the order of the contestants.
     pub entries: Vec<Entry>,
 }
 
-/// Problems that are alike but for one number.
+/// Problems that differ in one number only, which names the family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
@@ -81,7 +81,7 @@ pub enum Family {
     Pixels,
     /// Labels of a pixel.
     Labels,
-    /// Loops on the one grid.
+    /// Loops on the only grid.
     Loops,
     /// Pixels, up to 30 megapixels, by the schedule `sweep`.
     SweepPixels,
@@ -97,26 +97,26 @@ pub enum Family {
 pub struct Entry {
     /// Its name.
     pub contestant: String,
-    /// What came of it. Other labels than those of the contestants before it are an error.
+    /// The result. Labels that differ from those of the contestants before it are an error.
     pub outcome: Outcome<Measurement>,
 }
 
-/// What was measured.
+/// The measured values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
-    /// Milliseconds to make the device ready for the problem, which was done once.
+    /// Milliseconds to prepare the device for the problem, which happens once.
     pub prepare_ms: f64,
-    /// Milliseconds of these that compiling kernels took, where the device compiles any. Kernels that a problem before
-    /// this one brought along are not compiled again.
+    /// The part of these spent compiling kernels, if the device compiles any. Kernels that an earlier problem compiled
+    /// are not compiled again.
     pub compile_ms: Option<f64>,
     /// Bytes allocated, counted.
     pub allocated_bytes: u64,
-    /// Bytes that each stage has to read and write at least, where the device counts them.
+    /// The least bytes that each stage has to read and write, if the device counts them.
     pub moved_bytes: Option<StageBytes>,
-    /// Milliseconds of the first solve by the wall clock, which counts in no other number.
+    /// Wall-clock milliseconds of the first solve, which is not one of the samples.
     pub first_ms: f64,
-    /// Rounds that it took part in: fewer than asked for where the first solve took long.
+    /// Its number of rounds: fewer than requested if the first solve was slow.
     pub rounds: u32,
     /// Every sample, by round.
     pub samples: Vec<Sample>,
@@ -165,7 +165,7 @@ impl Family {
         }
     }
 
-    /// What grows.
+    /// The name of the number that varies.
     pub const fn grows(self) -> &'static str {
         match self {
             Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => "pixels",
@@ -174,7 +174,7 @@ impl Family {
         }
     }
 
-    /// The number that grows.
+    /// The number that varies, for a problem of the family.
     pub fn number_of(self, contest: &Contest) -> u64 {
         match self {
             Self::Pixels | Self::SweepPixels | Self::HalfStepPixels => contest.width as u64 * contest.height as u64,
@@ -185,7 +185,7 @@ impl Family {
 }
 
 impl Speed {
-    /// The problems of a family, or those of none.
+    /// The problems of a family, or those without one.
     pub fn contests_of(&self, family: Option<Family>) -> impl Iterator<Item = &Contest> {
         self.contests.iter().filter(move |contest| contest.family == family)
     }
@@ -195,24 +195,24 @@ impl Speed {
         self.contestants.iter().find(|contestant| contestant.name == entry.contestant)
     }
 
-    /// The place of a contestant among all, which its colour tells in charts.
+    /// The index of a contestant, which decides its colour in charts.
     pub fn place(&self, name: &str) -> usize {
         self.contestants.iter().position(|contestant| contestant.name == name).unwrap_or(0)
     }
 
-    /// An entry's contestant as tables and charts name it.
+    /// The name of an entry's contestant in tables and charts.
     pub fn label(&self, entry: &Entry) -> String {
         self.contestant(entry).map_or_else(|| entry.contestant.clone(), Contestant::label)
     }
 }
 
 impl Contestant {
-    /// Whether its stages are timed: a processor's take as long as their calls, of a GPU only its own clock tells.
+    /// Whether its stages are timed. A CPU's take as long as their calls; a GPU's can be timed only by its own clock.
     pub fn times_stages(&self, measurement: &Measurement) -> bool {
         self.device.as_ref().is_some_and(|device| device.api.is_none()) || measurement.has_clock()
     }
 
-    /// The stages of a measurement of its that took any time.
+    /// The stages that took any time in one of its measurements.
     pub fn stages(&self, measurement: &Measurement) -> impl Iterator<Item = StageTime> {
         let moved = measurement.moved_bytes.as_ref().filter(|_| self.times_stages(measurement));
         let time = move |stage: Stage| {
@@ -223,7 +223,7 @@ impl Contestant {
         Stage::ALL.into_iter().filter_map(time)
     }
 
-    /// Its name; what is no GPU says so wherever its times may stand.
+    /// Its name in tables and charts, which always marks a software rasteriser, since that is no GPU.
     pub fn label(&self) -> String {
         let software = self.device.as_ref().is_some_and(|device| device.software_rasteriser);
         format!("{}{}", self.name, if software { " (software rasteriser)" } else { "" })
@@ -236,12 +236,12 @@ pub struct StageTime {
     pub stage: Stage,
     /// Milliseconds.
     pub ms: Spread,
-    /// What it has to read and write at least, where the device counts it and times the stage.
+    /// The least bytes that it has to read and write, if the device counts them and times the stage.
     pub bytes: Option<u64>,
 }
 
 impl StageTime {
-    /// 10^9 bytes a second, with their range.
+    /// 10^9 bytes per second, with their range.
     pub fn gb_per_s(&self) -> Option<Spread> {
         let bytes = self.bytes? as f64;
         let Spread { median, low, high, count } = self.ms;

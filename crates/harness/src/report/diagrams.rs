@@ -14,7 +14,7 @@ use crate::{failure::Failure, record::Measurement};
 /// A value for each scene.
 type PerScene = Series<Option<Value>>;
 
-/// What a chart shows of one plan: its series, and their entries in the legend.
+/// The part of a chart that shows one plan: its series, and their entries in the legend.
 #[derive(Default)]
 struct Group {
     series: Vec<PerScene>,
@@ -100,7 +100,7 @@ fn errors(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) 
     let groups = measured(results, plans, |measured| measured.all.rmse);
     let axis = Axis::linear("R, root mean squared error over all known pixels, px");
     let chart = chart(results, format!("{what}: reliability"), axis, groups, None);
-    drawing(numbers, chart, "R is defined by equation 2.82. Less is better. The thesis prints no reliability figure.")
+    drawing(numbers, chart, "R is defined by equation 2.82. Lower is better. The thesis prints no reliability figure.")
 }
 
 /// One value of each plan's measurement.
@@ -141,8 +141,8 @@ impl Group {
         self.keys.push(Key { style: legend::any_device(results, plan).filled(fill), name });
     }
 
-    /// Adds the printed speed-ups of a plan, beside the measured ones. The thesis's Z'''' is not known, so each plan of
-    /// CTCSBP has the same.
+    /// Adds the printed speed-ups of a plan, beside the measured ones. The thesis's Z'''' is not known, so all plans of
+    /// CTCSBP have the same.
     fn add_printed(&mut self, results: &Results<'_>, plan: &Named) {
         let value = |index| {
             let value = results.thesis.time_ms("bp", index)? / results.thesis.time_ms(plan.printed?, index)?;
@@ -193,7 +193,7 @@ fn drawing(Numbers { diagram, table }: Numbers, chart: DotChart, caption: &str) 
     })
 }
 
-/// What a chart shows, in numbers: a row for each scene.
+/// The numbers of a chart: a row for each scene.
 fn data_table(chart: &DotChart) -> Table {
     let columns: Vec<&str> =
         std::iter::once("scene").chain(chart.series().map(|series| series.name.as_str())).collect();

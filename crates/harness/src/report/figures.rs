@@ -19,15 +19,15 @@ use crate::{
     files::{PixelLimit, read_map},
 };
 
-/// Space around and between maps, and for words and the bar, in pixels of the drawing.
+/// Space around and between maps, and for text and the colour bar, in pixels of the drawing.
 const GAP: usize = 14;
 const NAME_HEIGHT: usize = 24;
 const TITLE_HEIGHT: usize = 48;
 const BAR_HEIGHT: usize = 64;
-/// Maps a row.
+/// Maps per row.
 const ACROSS: usize = 3;
 
-/// One figure an algorithm; those of the thesis, and ours.
+/// One figure per algorithm: those of the thesis, and ours.
 pub(super) fn all(folder: &Path, results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
     let figures = [("3.2", BP), ("3.3", CFBP), ("3.4", CFCSBP), ("3.5", CTBP), ("3.6", CTCSBP[0]), ("A.1", CENSUS)];
     figures.into_iter().map(|(number, plan)| figure(folder, results, number, &plan)).collect()
@@ -35,7 +35,7 @@ pub(super) fn all(folder: &Path, results: &Results<'_>) -> Result<Vec<Drawing>, 
 
 fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> Result<Drawing, Failure> {
     let maps = results.scenes().map(|(index, scene)| {
-        // All backends give the same labels, so one map a scene is enough.
+        // All backends give the same labels, so one map per scene is enough.
         let measured = results.rows().filter(|row| row.index == index).find_map(|row| row.measured(plan.plan));
         let limit = PixelLimit::megapixels(PixelLimit::MEGAPIXELS);
         let map = measured.map(|measured| read_map(&folder.join(&measured.map), None, limit));
@@ -58,7 +58,7 @@ fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> R
     })
 }
 
-/// Every second pixel of every second row: the page stays small.
+/// Every second pixel of every second row, to keep the page small.
 fn halved(map: DisparityMap) -> DisparityMap {
     let size = map.size();
     let half = size.coarser();
@@ -112,7 +112,7 @@ fn embedded(map: &DisparityMap, x: usize, y: usize, last: f32) -> Result<String,
     ))
 }
 
-/// A bar of the colours with its range; its gradient's name is made from `title`, to be one of its kind on the page.
+/// A colour bar with its range. The id of its gradient derives from `title`, to be unique on the page.
 fn colour_bar(title: &str, width: usize, top: usize, last: f32) -> String {
     let id: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     const STOPS: usize = 16;

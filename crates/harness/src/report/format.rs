@@ -15,7 +15,7 @@ pub fn mebibytes(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
-/// A value, or the word for there being none.
+/// The value, or the word for a missing one.
 pub fn or(value: Option<String>, none: &str) -> String {
     value.unwrap_or_else(|| none.to_owned())
 }

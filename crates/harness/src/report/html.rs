@@ -72,7 +72,7 @@ pub(super) fn page(report: &Report<'_>) -> String {
     .into_string()
 }
 
-/// The contents: beside the text on wide screens, where the switch is hidden, and folded on narrow ones.
+/// The table of contents. Wide screens show it beside the text without its switch; narrow ones fold it.
 fn contents(report: &Report<'_>) -> Markup {
     let drawings = |drawings: &[Drawing]| {
         html! {

@@ -1,4 +1,4 @@
-//! How charts show plans and devices: the shape of a marker tells the plan, its colour the device.
+//! How charts show plans and devices: a marker's shape identifies the plan, its colour the device.
 
 use bp_charts::{BLACK, Key, Line, Style};
 
@@ -9,12 +9,12 @@ pub(super) fn style(results: &Results<'_>, plan: &Named, device: usize) -> Style
     Style::marked(if has_one_device(results) { plan.look } else { device }, plan.look)
 }
 
-/// The look of a plan where no device matters, as in a legend.
+/// The look of a plan regardless of the device, as in a legend.
 pub(super) fn any_device(results: &Results<'_>, plan: &Named) -> Style {
     style(results, plan, BLACK)
 }
 
-/// The colours of the devices. A single device needs none, unless it only imitates a GPU.
+/// The legend's entries for devices. A single device needs none unless it is a software rasteriser.
 pub(super) fn devices(results: &Results<'_>) -> Vec<Key> {
     let devices = results.devices();
     let is_plain = results.backends().count() == 1 && devices.iter().all(|(_, device)| !device.software_rasteriser);

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::escape;
 
-/// The heading of the diagrams that the thesis does not have.
+/// The heading of the diagrams that are not in the thesis.
 pub(super) const TRADEOFFS: &str = "More diagrams: error, memory and energy against time";
 
 /// The whole page.
@@ -32,7 +32,7 @@ pub(super) fn page(report: &Report<'_>) -> String {
     text
 }
 
-/// The text under a table's heading: its data, and what a reader must know.
+/// The text under a table's heading: its data and its note.
 pub(super) fn notes(report: &Report<'_>, table: &Table) -> String {
     let data = table.data.clone().unwrap_or_else(|| report.results.setting());
     format!("Data: {data}. {}", table.note).trim_end().to_owned()

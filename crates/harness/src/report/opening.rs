@@ -1,4 +1,4 @@
-//! How the report opens: what came out, what ran and where, why printed and measured numbers differ, and the names.
+//! The summary of the report: results, experiment, devices, why printed and measured numbers differ, and the plans.
 
 use super::{
     Report,
@@ -37,9 +37,9 @@ pub(super) fn passages(report: &Report<'_>) -> Vec<Passage> {
         format!("The experiment follows this PhD thesis: {AUTHOR}, \"{TITLE}\" ({ENGLISH}), {INSTITUTION}, {YEAR}.");
     let abbreviations = "In every chart a plan keeps its name and the shape of its marker. BP is belief propagation.";
     vec![
-        Passage { title: "What came out", lines: outcomes(results), table: Some(means::table(results)) },
-        Passage { title: "What ran", lines: [vec![thesis], what_ran(results)].concat(), table: None },
-        Passage { title: "Where it ran", lines: where_it_ran(results), table: None },
+        Passage { title: "Results", lines: outcomes(results), table: Some(means::table(results)) },
+        Passage { title: "The experiment", lines: [vec![thesis], what_ran(results)].concat(), table: None },
+        Passage { title: "Machine and devices", lines: where_it_ran(results), table: None },
         Passage { title: "Why printed and measured numbers differ", lines: WHY.map(str::to_owned).into(), table: None },
         Passage { title: "The plans", lines: vec![abbreviations.to_owned()], table: Some(names(results)) },
     ]
@@ -51,8 +51,8 @@ pub(super) fn title(report: &Report<'_>) -> String {
     format!("Belief propagation for stereo matching, on {}{quick}", report.results.record.machine.cpu)
 }
 
-/// What came out of a run, in one line: the thesis's fastest algorithm beside BP, on the fastest backend. `None` if no
-/// algorithm has numbers for every scene.
+/// The result of a run in one line: the thesis's fastest algorithm compared with BP, on the fastest backend. `None` if
+/// no algorithm has numbers for every scene.
 #[must_use]
 pub fn headline(record: &Record) -> Option<String> {
     outcome(&Results::new(record).ok()?, &thesis_plans())
@@ -70,7 +70,7 @@ fn outcomes(results: &Results<'_>) -> Vec<String> {
     lines.into_iter().map(|line| line + ".").chain([table.to_owned()]).collect()
 }
 
-/// The fastest of some plans on the fastest backend, beside BP. Software rasterisers count only if there is nothing else.
+/// Compares the fastest of some plans with BP on its backend. Software rasterisers count only if nothing else was used.
 fn outcome(results: &Results<'_>, plans: &[Named]) -> Option<String> {
     let devices = results.devices();
     let only_software = devices.iter().all(|(_, device)| device.software_rasteriser);
@@ -82,7 +82,7 @@ fn outcome(results: &Results<'_>, plans: &[Named]) -> Option<String> {
     let (_, plan, backend) = timed.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
     let ratio = results.mean(backend, |row| Some(row.speed_up(plan.plan, Part::Total)?.median))?;
     let printed = results.mean(backend, |row| results.thesis.speed_up_percent(plan.printed?, row.index));
-    // Images of a quick run are smaller than the printed ones.
+    // A quick run uses smaller images than the thesis.
     let printed = printed.filter(|_| !results.record.run.quick).map(|percent| 1.0 + percent / 100.0);
     let printed = printed.map_or(String::new(), |ratio| format!(" (printed: {} times)", number(ratio, 1)));
     let bad = |plan: &Named| results.mean(backend, |row| Some(row.measured(plan.plan)?.visible.bad[1]));

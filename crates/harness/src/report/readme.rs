@@ -1,4 +1,4 @@
-//! The part of a page, such as docs/thesis.md, that comes from a recorded run.
+//! The part of a page, such as docs/thesis.md, that is generated from a recorded run.
 
 use std::path::{Component, Path};
 
@@ -15,14 +15,14 @@ pub(super) const BEGIN: &str = "<!-- results: begin -->";
 /// Marks where it ends.
 pub(super) const END: &str = "<!-- results: end -->";
 
-/// Replaces what stands between the markers; `None` where they are not there.
+/// Replaces the text between the markers; `None` if they are missing.
 pub(super) fn splice(text: &str, part: &str) -> Option<String> {
     let (before, rest) = text.split_once(BEGIN)?;
     let (_, after) = rest.split_once(END)?;
     Some(format!("{before}{BEGIN}\n{part}{END}{after}"))
 }
 
-/// A chart and a table of means over the scenes, for a page whose path starts where that of the run does.
+/// A chart and a table of means over the scenes. The paths of page and run start at the same folder.
 pub(super) fn part(page: &Path, run: &Path, results: &Results<'_>) -> String {
     let record = results.record;
     let link = link(page, run);
@@ -51,14 +51,14 @@ pub(super) fn part(page: &Path, run: &Path, results: &Results<'_>) -> String {
     format!("{chart}\n\n{}\n{note}\n", grid(&means::table(results)))
 }
 
-/// What our plans are, in a sentence.
+/// Our plans in a sentence.
 fn own_plans(results: &Results<'_>) -> String {
     let own = all_plans(results).into_iter().filter(|plan| plan.printed.is_none());
     let plans: Vec<_> = own.map(|plan| format!("{}: {}", plan.title, plan.meaning)).collect();
     if plans.is_empty() { String::new() } else { format!("Our plans are {}. ", plans.join("; ")) }
 }
 
-/// The way from the page's folder to the run's. Both paths start in the same folder; an absolute run needs no way.
+/// The run's path from the page's folder, unchanged if either is absolute. Both paths start in the same folder.
 fn link(page: &Path, run: &Path) -> String {
     let folders = page.parent().into_iter().flat_map(Path::components);
     let depth = folders.filter(|component| matches!(component, Component::Normal(_))).count();
@@ -66,7 +66,7 @@ fn link(page: &Path, run: &Path) -> String {
     format!("{up}{}", run.display()).replace('\\', "/").trim_end_matches('/').to_owned()
 }
 
-/// How many threads share the work, where a device is not asked as one.
+/// The number of workers of a CPU backend; empty for a GPU.
 fn workers(device: &Device) -> String {
     if device.api.is_some() { String::new() } else { format!(" (workers: {})", device.workers) }
 }

@@ -1,4 +1,4 @@
-//! A record, with the questions that tables and charts ask about it.
+//! A record, with the queries that tables and charts need.
 
 use super::{format::Spread, thesis::Thesis};
 use crate::{
@@ -163,8 +163,8 @@ impl<'a> Row<'a> {
         Spread::of(self.measured(plan)?.samples.iter().map(|sample| part.ms(sample)))
     }
 
-    /// How many times faster than BP a plan is. The value is the ratio of medians; its range is that of the ratios of
-    /// samples taken in the same round, where there are at least three such rounds.
+    /// The speed-up of a plan over BP: the ratio of medians. Its range covers the ratios of samples from the same
+    /// round, if there are at least three such rounds.
     pub(super) fn speed_up(&self, plan: &str, part: Part) -> Option<Spread> {
         let (bp, other) = (self.measured("bp")?, self.measured(plan)?);
         let same_round = |a: &Sample| {

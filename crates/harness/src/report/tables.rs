@@ -15,9 +15,9 @@ pub(super) struct Table {
     pub(super) number: String,
     /// Its heading.
     pub(super) title: String,
-    /// What it was measured on, where that is not the run's six scenes.
+    /// The data that it was measured on, if not the run's six scenes.
     pub(super) data: Option<String>,
-    /// What a reader must know to read it.
+    /// How to read it.
     pub(super) note: String,
     pub(super) columns: Vec<String>,
     pub(super) rows: Vec<Vec<String>>,
@@ -72,14 +72,17 @@ pub(super) const BP: Named =
 pub(super) const CFBP: Named = named(1, "cfbp", "CFBP", "coarse-to-fine BP");
 pub(super) const CFCSBP: Named = named(2, "cfcsbp", "CFCSBP, Z''=2", "coarse-to-fine constant-space BP");
 pub(super) const CTBP: Named = named(3, "ctbp", "CTBP", "census-transform BP, which cuts the image into four parts");
-/// The digit of Z'''' is missing in the thesis's text. Its printed numbers stand beside each of the three.
+/// The thesis's text lacks the digit of Z'''', so its printed numbers appear beside each of the three.
 pub(super) const CTCSBP: [Named; 3] = [
     named(4, "ctcsbp", "CTCSBP, Z''''=2", "census-transform constant-space BP, with half of CTBP's loops"),
     Named {
         printed: Some("ctcsbp"),
         ..named(5, "ctcsbp-z3", "CTCSBP, Z''''=3", "the same with a third of CTBP's loops")
     },
-    Named { printed: Some("ctcsbp"), ..named(6, "ctcsbp-z4", "CTCSBP, Z''''=4", "the same with a quarter of them") },
+    Named {
+        printed: Some("ctcsbp"),
+        ..named(6, "ctcsbp-z4", "CTCSBP, Z''''=4", "the same with a quarter of CTBP's loops")
+    },
 ];
 
 /// The tables of one algorithm: its plans, and the numbers of its speed, memory and reliability.
@@ -91,7 +94,7 @@ const SINGLE: [(&[Named], [&str; 3]); 5] = [
     (&CTCSBP, ["3.15", "3.16", "3.17"]),
 ];
 
-/// The table that the times of a plan stand in: its number, and what is measured there.
+/// The table with a plan's times: its number, and the algorithm it is about.
 pub fn of_times(plan: &str) -> (&'static str, &'static str) {
     let single = SINGLE.iter().find(|(plans, _)| plans.iter().any(|named| named.plan == plan));
     single.map_or((ours::PROFILES, "ours"), |&(plans, [speed, ..])| (speed, family(plans)))

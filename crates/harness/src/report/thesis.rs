@@ -1,4 +1,4 @@
-//! What the thesis prints: `data/thesis.json`.
+//! The numbers that the thesis prints, from `data/thesis.json`.
 
 use std::collections::BTreeMap;
 
@@ -12,13 +12,13 @@ use crate::failure::Failure;
 pub(super) struct Thesis {
     #[expect(dead_code, reason = "for readers of the file")]
     about: String,
-    /// Table 3.1: what and which.
+    /// Table 3.1: parts of the computer and their descriptions.
     pub(super) computer: Vec<(String, String)>,
     /// Table 3.2.
     pub(super) images: Vec<PrintedImage>,
-    /// Milliseconds by algorithm, an entry an image.
+    /// Milliseconds by algorithm, one entry per image.
     times_ms: BTreeMap<String, [f64; 6]>,
-    /// Speed-ups over BP in percent by algorithm, an entry an image.
+    /// Speed-ups over BP in percent by algorithm, one entry per image.
     speed_up_percent: BTreeMap<String, [f64; 6]>,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct PrintedImage {
 }
 
 impl Thesis {
-    /// The numbers of this build.
+    /// Parses the numbers, which are built into the program.
     pub(super) fn read() -> Result<Self, Failure> {
         let text = include_str!("../../data/thesis.json");
         serde_json::from_str(text).map_err(|error| Failure::other(format!("crates/harness/data/thesis.json: {error}")))
@@ -56,8 +56,8 @@ impl Thesis {
 mod tests {
     use super::*;
 
-    /// The printed speed-ups are `(T_BP / T - 1) * 100` of the printed times, all 24 to both decimals: a slip of ours in
-    /// copying would show.
+    /// The printed speed-ups are `(T_BP / T - 1) * 100` of the printed times, all 24 to both decimals. A mistake in our
+    /// copy would break that.
     #[test]
     fn printed_speed_ups_follow_from_printed_times() {
         let thesis = Thesis::read().unwrap();

@@ -1,4 +1,4 @@
-//! Diagrams that the thesis does not have: error, memory and energy against time, of every plan on every backend.
+//! Diagrams that are not in the thesis: error, memory and energy against time, for every plan on every backend.
 
 use bp_charts::{Axis, Key, Line, Plot, Point, Series, Style, Value, number};
 
@@ -20,7 +20,7 @@ struct Entrant<'a> {
     plan: Named,
     /// Its backend's place among the devices.
     backend: usize,
-    /// From images to labels, in milliseconds, with a 95 % interval where there are samples enough.
+    /// Milliseconds from images to labels, with a 95 % interval if there are enough samples.
     ms: Value,
     settings: &'a Settings,
     measured: Vec<&'a Measurement>,
@@ -31,7 +31,7 @@ struct Quantity {
     title: String,
     axis: Axis,
     value: fn(&Measurement) -> f64,
-    /// What a reader must know about it.
+    /// How to read it.
     note: &'static str,
     /// Whether a plan with these settings belongs in the diagram.
     compares: Box<dyn Fn(&Settings) -> bool>,
@@ -55,7 +55,7 @@ fn error() -> Quantity {
         title: "Error against time".to_owned(),
         axis: Axis::linear("non-occluded pixels wrong by more than 1 px, %"),
         value: |measured| measured.visible.bad[1],
-        note: "All backends give the same labels, so the markers of a plan lie on one height.",
+        note: "All backends give the same labels, so all markers of a plan are at the same height.",
         compares: Box::new(|_| true),
     }
 }

@@ -1,4 +1,4 @@
-//! Labellings by other programs and ours under one energy: profile `mrf`, 16 labels.
+//! Compares labellings by other programs with ours under one energy: profile `mrf`, 16 labels.
 
 use std::path::Path;
 
@@ -18,10 +18,10 @@ const SCENES: [&str; 3] = ["tsukuba", "venus", "teddy"];
 const LABELS: usize = 16;
 const METHODS: [&str; 6] = ["ICM", "BP-S", "BP-M", "Swap", "Expansion", "TRW-S"];
 
-/// Our own: plain BP, that many checkerboard loops.
+/// Checkerboard iterations of our own method, plain BP.
 const LOOPS: u32 = 75;
 
-/// All labellings of all three scenes; none where the data folder does not hold them.
+/// All labellings of all three scenes; none if the data folder lacks them.
 pub(super) fn compare(folder: &Path, observer: &mut Observer<'_>) -> Result<Vec<Labelling>, Failure> {
     let mut labellings = Vec::new();
     if !folder.join("mrf-benchmark").is_dir() {
@@ -55,7 +55,7 @@ fn load_pair(folder: &Path, scene: &str) -> Result<StereoPair, Failure> {
     Ok(StereoPair::new(image("imL.png")?, image("imR.png")?)?)
 }
 
-/// Labels stored as 17 times their number.
+/// Reads labels, which are stored as 17 times their value.
 fn load_labels(folder: &Path, scene: &str, method: &str, size: Size) -> Result<Vec<u16>, Failure> {
     let path = folder.join(format!("mrf-benchmark/{scene}/{scene}-{method}.png"));
     Manifest::read()?.checked(folder, &path)?;

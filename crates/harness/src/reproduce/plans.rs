@@ -1,8 +1,8 @@
-//! What is run on every scene.
+//! The plans that run on every scene.
 
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
 
-/// Z'' and Z'''' where nothing else is said: the digit that the thesis lost is most likely this one.
+/// The default of Z'' and Z''''. The digit is missing in the thesis; this is the most likely one.
 const Z: u32 = 2;
 
 /// A plan of the tables.
@@ -13,15 +13,15 @@ pub struct Planned {
     /// Its algorithm.
     pub algorithm: Algorithm,
     profile: Profile,
-    /// What loops are divided by.
+    /// Divisor of the number of iterations.
     pub z: Option<u32>,
     schedule: Schedule,
-    /// Grids and steps on each, in place of the algorithm's own.
+    /// Number of grids and of steps on each, instead of the algorithm's own.
     fixed: Option<(u32, u32)>,
 }
 
-/// The thesis's five algorithms; CTCSBP with other digits too, since its times fit those better; and three of
-/// ours, with the census transform as data cost on few grids: few loops, many half-steps, and one sweep a grid.
+/// The thesis's five algorithms, CTCSBP also with other digits, which fit its times better; and three plans of ours.
+/// Ours use the census transform as data cost on few grids, with few iterations, many half-steps or one sweep per grid.
 pub fn all() -> Vec<Planned> {
     let thesis = |name, algorithm: Algorithm, z: u32| Planned {
         name,
@@ -42,12 +42,11 @@ pub fn all() -> Vec<Planned> {
     plans
 }
 
-/// Name of our plan with census costs and few loops.
+/// Name of our plan with census costs and few iterations.
 pub const CENSUS: &str = "census";
 
 impl Planned {
-    /// The plan for images of `size`, with so many labels; `k` loops are what its own are derived from, unless those are
-    /// fixed.
+    /// The plan for images of `size`. Its number of iterations is derived from `k`, unless it is fixed.
     pub fn plan(&self, size: Size, labels: usize, k: u32) -> Result<Plan, Error> {
         let model = Model::new(self.profile, labels)?;
         let settings = self.algorithm.settings(size, k, self.z.unwrap_or(1), self.schedule);
@@ -58,7 +57,7 @@ impl Planned {
         Plan::new(size, model, settings)
     }
 
-    /// The loops that its own are derived from.
+    /// The iterations that its own are derived from; `None` if those are fixed.
     pub fn k(&self, k: u32) -> Option<u32> {
         self.fixed.is_none().then_some(k)
     }

@@ -1,4 +1,4 @@
-//! Takes the samples: every plan on every scene and device in turns, saving each sample.
+//! Takes the samples: every plan on every scene and device, in turns. Saves each sample.
 
 use std::{cell::RefCell, path::Path};
 
@@ -20,11 +20,11 @@ use crate::{
     scenes::{Scene, Source},
 };
 
-/// A cell whose first sample takes more milliseconds gets no other.
+/// A cell whose first sample takes more milliseconds than this gets no other.
 pub const ONE_SAMPLE_ABOVE_MS: f64 = SLOW_MS;
 
-/// Runs all cells that the record does not hold yet, on these devices and on the scenes that are asked for. Returns the
-/// failures of cells that keep their earlier samples: their outcomes do not show them.
+/// Runs all cells that are missing in the record, on these devices and the requested scenes. Returns the failures of
+/// cells that keep earlier samples, because their outcomes do not show these failures.
 pub fn run(
     source: &Source,
     devices: &[Asked],
@@ -48,7 +48,7 @@ pub fn run(
     Ok(late)
 }
 
-/// Takes all samples. A round takes in all scenes, so that the samples of each cell spread over the whole run.
+/// Takes all samples. Each round covers all scenes, so that the samples of a cell spread over the whole run.
 fn measure(
     scenes: &[Scene],
     devices: &[Asked],
@@ -77,7 +77,7 @@ fn measure(
     Ok(entrants.into_iter().filter_map(late).collect())
 }
 
-/// Adds a scene and its cells to the record, or checks that the record's scene is this one and goes on with its cells.
+/// Adds a scene and its cells to the record. If the record has the scene, checks that it is the same and resumes it.
 fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Asked]) -> Result<(), Failure> {
     let (folder, run) = (storage.folder().display().to_string(), storage.record().run.clone());
     let other = |what: &str| Failure::input(format!("{folder} was begun with another {what}; begin anew elsewhere"));
@@ -123,22 +123,22 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
     Ok(cells)
 }
 
-/// A cell that takes turns. Each turn prepares the plan anew, and each sample is saved when it is there.
+/// A cell that takes turns. Each turn prepares the plan again, and each sample is saved at once.
 struct InCell<'a> {
     scene: &'a Scene,
     planned: &'a Planned,
     plan: Plan,
     runner: &'a Runner,
     storage: &'a RefCell<&'a mut Storage>,
-    /// Its place in the record.
+    /// Its index in the record.
     index: usize,
-    /// What the last turn left, until it is kept.
+    /// The last turn's result, until it is saved.
     solved: Option<Solved>,
     /// Whether the labels differed from those of another run of the same plan.
     disagrees: bool,
 }
 
-/// The answer of a turn.
+/// The result of a turn.
 struct Solved {
     driver: Driver,
     labels_sha256: String,
@@ -197,7 +197,7 @@ impl Contestant for InCell<'_> {
 }
 
 impl InCell<'_> {
-    /// All samples on all devices must give the same labels.
+    /// Fails unless all samples on all devices give the same labels.
     fn check_labels(&mut self, labels_sha256: &str) -> Result<(), Failure> {
         let storage = self.storage.borrow();
         let cells = &storage.record().cells;
@@ -209,7 +209,7 @@ impl InCell<'_> {
         Err(Failure::other(format!("other labels than an earlier run on {}", other.backend)))
     }
 
-    /// The cell's measurement with one more sample. The first sample brings the answer's quality and map.
+    /// The cell's measurement with one more sample. The first sample also provides energy, errors and disparity map.
     fn measured(&self, cell: &Cell, sample: &Sample, solved: Solved, folder: &Path) -> Result<Outcome, Failure> {
         let mut measurement = match cell.measured() {
             Some(measurement) => measurement.clone(),
@@ -220,7 +220,7 @@ impl InCell<'_> {
     }
 }
 
-/// What is the same for every sample. Writes the disparity map.
+/// The part of a measurement that is the same for every sample. Writes the disparity map.
 fn first_measurement(
     cell: &Cell,
     scene: &Scene,

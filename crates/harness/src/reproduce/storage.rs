@@ -1,4 +1,4 @@
-//! The folder of a run: begun once, gone on with after an interruption, never overwritten.
+//! The folder of a run: created once, resumed after an interruption, never overwritten.
 
 use std::{
     fs::{self, File, TryLockError},
@@ -17,19 +17,19 @@ use crate::{
     report::PAGE_FILE,
 };
 
-/// Name of the file whose lock says that a run is at work.
+/// Name of the file that is locked while a run is active.
 const LOCK_FILE: &str = ".lock";
 
 /// A run being recorded.
 pub struct Storage {
     folder: PathBuf,
     record: Record,
-    /// Held as long as the run is at work; the system lets go of it however the program ends.
+    /// Held while the run is active; the system releases it however the program ends.
     _lock: File,
 }
 
-/// Goes on with an interrupted run of the same program, machine and settings, or begins a new one. A run that another
-/// process is at work on is left to it.
+/// Resumes an interrupted run of the same program, machine and settings, or begins a new one. Skips runs that another
+/// process is working on.
 pub(super) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>) -> Result<Storage, Failure> {
     let program = machine::program()?;
     let interrupted = |folder: &Path| {
@@ -38,7 +38,7 @@ pub(super) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>
     };
     for folder in runs(results).into_iter().filter(|folder| interrupted(folder).is_some()) {
         let Some(lock) = lock(&folder)? else { continue };
-        // Judged again under the lock: until then another process may have been at work on it.
+        // Checked again under the lock: until then, another process may have been working on it.
         let Some(record) = interrupted(&folder) else { continue };
         watch.note(&format!("going on with the interrupted run in {}", folder.display()));
         return Ok(Storage { folder, record, _lock: lock });
@@ -46,7 +46,7 @@ pub(super) fn open(results: &Path, machine: Machine, run: Run, watch: &Watch<'_>
     begin(results, program, machine, run)
 }
 
-/// Whether cells or the report, whose page is written last, are still to come.
+/// Whether cells or the report are missing. The report's page is written last.
 fn is_unfinished(folder: &Path, record: &Record) -> bool {
     !record.complete || !folder.join(PAGE_FILE).exists()
 }
@@ -73,7 +73,7 @@ pub fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Re
     Ok(storage)
 }
 
-/// The lock of a run's folder; `None` where another process holds it.
+/// The lock of a run's folder; `None` if another process holds it.
 fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     let path = folder.join(LOCK_FILE);
     let file = File::create(&path).map_err(|error| Failure::writing(&path, &error))?;
@@ -84,7 +84,7 @@ fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     }
 }
 
-/// Folders of recorded runs, in order of their names.
+/// Folders of recorded runs, sorted by name.
 fn runs(results: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(results).into_iter().flatten().flatten();
     let mut folders: Vec<_> =
@@ -93,7 +93,7 @@ fn runs(results: &Path) -> Vec<PathBuf> {
     folders
 }
 
-/// A folder that is not there yet: date, machine, data, and a number from the second run of a day on.
+/// Creates a folder named after date, machine and data, with a number from the second such run of a day on.
 fn new_folder(results: &Path, machine: &Machine, run: &Run) -> Result<PathBuf, Failure> {
     let name = format!("{}-{}-{}", Zoned::now().date(), machine.name, run.data);
     let numbered = (2..).map(|number| format!("{name}-{number}"));

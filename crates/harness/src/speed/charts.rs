@@ -1,4 +1,4 @@
-//! What `bp speed` found as charts, made from the record alone.
+//! The results of `bp speed` as charts, drawn from its record alone.
 
 use bp_charts::{Axis, BLACK, Key, Level, Line, Plot, Point, Series, Style, Value};
 use bp_core::Stage;
@@ -11,16 +11,16 @@ use crate::{
     statistics::Spread,
 };
 
-/// A chart and the words around it.
+/// A chart with its file name and caption.
 pub(super) struct Chart {
-    /// File name without ending.
+    /// File name without extension.
     pub name: &'static str,
     pub plot: Plot,
-    /// What a reader must know.
+    /// How to read the chart.
     pub caption: String,
 }
 
-/// File names, without ending, of all charts that there may be.
+/// The file names, without extension, of all charts that a run can have.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
     Family::ALL.into_iter().map(Family::name).chain(["roofline"])
 }
@@ -30,7 +30,7 @@ pub(super) fn charts(speed: &Speed) -> Vec<Chart> {
     Family::ALL.into_iter().filter_map(|family| growth(speed, family)).chain(roofline(speed)).collect()
 }
 
-/// Time against the number that grows in a family.
+/// A chart of time against the number that varies within a family.
 pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
     let series: Vec<_> = contests.first()?.entries.iter().map(|entry| grown(speed, family, entry)).collect();
@@ -55,7 +55,7 @@ pub(super) fn growth(speed: &Speed, family: Family) -> Option<Chart> {
     Some(Chart { name: family.name(), plot, caption })
 }
 
-/// The times of the contestant of `first` in a family.
+/// The times, over a family, of the contestant that `first` belongs to.
 fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
     let point = |contest: &Contest| {
         let own = contest.entries.iter().find(|entry| entry.contestant == first.contestant)?;
@@ -65,13 +65,13 @@ fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
     let place = speed.place(&first.contestant);
     Series {
         name: speed.label(first),
-        // A dashed line shows the one it coincides with.
+        // Every second line is dashed, so that both show where two coincide.
         style: Style::numbered(place).with_line(if place.is_multiple_of(2) { Line::Solid } else { Line::Dashes }),
         points: speed.contests_of(Some(family)).filter_map(point).collect(),
     }
 }
 
-/// What the stages of each device move a second, beside what it copies.
+/// A chart of the memory throughput of each device's stages, beside its copy rate.
 pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
     let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
@@ -101,7 +101,7 @@ pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     (!devices.is_empty()).then_some(Chart { name: "roofline", plot, caption })
 }
 
-/// A series a point: colours tell devices, shapes stages.
+/// One series per point: the colour identifies the device, the shape identifies the stage.
 fn stages(speed: &Speed, device: &Contestant, rates: &[(Stage, Point)]) -> Vec<Series<Point>> {
     let series = |&(stage, point): &(Stage, Point)| Series {
         name: format!("{}: {}", device.label(), stage.name()),
@@ -111,7 +111,7 @@ fn stages(speed: &Speed, device: &Contestant, rates: &[(Stage, Point)]) -> Vec<S
     rates.iter().map(series).collect()
 }
 
-/// The bytes and rates of a device's stages in all problems; none of a device whose copy rate is not known.
+/// The bytes and throughput of a device's stages in all problems; empty if its copy rate is unknown.
 fn rates(speed: &Speed, device: &Contestant) -> Vec<(Stage, Point)> {
     let own = |entry: &&Entry| entry.contestant == device.name && device.copy_gb_per_s.is_some();
     let measured = speed.contests.iter().flat_map(|contest| contest.entries.iter().filter(own));
@@ -125,7 +125,7 @@ fn rates(speed: &Speed, device: &Contestant) -> Vec<(Stage, Point)> {
         .collect()
 }
 
-/// A median, and its range from three numbers on.
+/// The median, with its range if there are three samples or more.
 fn with_range(Spread { median, low, high, count }: Spread) -> Value {
     if count >= 3 { Value { value: median, low, high } } else { median.into() }
 }

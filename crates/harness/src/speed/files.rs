@@ -14,7 +14,7 @@ use crate::{
     record::{RECORD_FILE, SPEED_FILE, load_speed, speed::Speed},
 };
 
-/// The files of a folder that holds none of them yet.
+/// The files of a run, in a folder that does not hold any of them yet.
 #[derive(Debug)]
 pub struct Files {
     folder: PathBuf,
@@ -30,7 +30,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Makes the folder, and fails if nothing can be written to it. Called before the work is done.
+    /// Creates the folder, and fails if it is not writable. Called before the measurement starts.
     pub fn check(&self) -> Result<(), Failure> {
         create_folder(&self.folder)?;
         check_writable(&self.folder.join(SPEED_FILE))
@@ -45,12 +45,12 @@ impl Files {
     }
 }
 
-/// Whether a path is a speed.json, or a folder with one and no record of `bp reproduce`.
+/// Whether a path is a speed.json, or a folder that holds one but no record of `bp reproduce`.
 pub fn is_record(path: &Path) -> bool {
     path.ends_with(SPEED_FILE) || (path.join(SPEED_FILE).exists() && !path.join(RECORD_FILE).exists())
 }
 
-/// Makes the page and the charts again from a speed.json, or from the one in a folder. Returns the page's name.
+/// Writes the page and the charts again from a speed.json, or from the one in a folder. Returns the page's path.
 pub fn renew(path: &Path) -> Result<PathBuf, Failure> {
     let folder = if path.ends_with(SPEED_FILE) { path.parent().unwrap_or(path) } else { path };
     write_page(folder, &load_speed(path)?)

@@ -1,5 +1,4 @@
-//! What is solved: problems that need no file and never change, so that numbers of one machine can stand beside
-//! another's.
+//! The problems to solve. They need no files and never change, so results of different machines can be compared.
 
 use bp_core::{Algorithm, Error, Image, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
@@ -13,9 +12,9 @@ const BABY1: [usize; 2] = [620, 555];
 pub struct Problem {
     /// Its name in records.
     pub name: String,
-    /// The name that `--problem` asks for it by: its own, or that of all problems like it.
+    /// The name that selects it with `--problem`: its own, or that of several similar problems.
     group: &'static str,
-    /// The problems beside it that are alike but for one number.
+    /// Its family, if any: problems that differ in one number only.
     pub(super) family: Option<Family>,
     /// Width and height in pixels.
     size: [usize; 2],
@@ -27,19 +26,19 @@ pub struct Problem {
 /// How messages are passed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Passing {
-    /// So many synchronous loops on one grid.
+    /// This many synchronous loops on one grid.
     Loops(u32),
-    /// The thesis's CFCSBP with so many loops asked for and Z'' = 2.
+    /// The thesis's CFCSBP for this many requested loops, with Z'' = 2.
     Cfcsbp(u32),
-    /// So many half-steps in checkerboard order on each grid.
+    /// This many half-steps in checkerboard order on each grid.
     HalfSteps { grids: u32, steps: u32 },
-    /// As [`Algorithm::Sweep`] says.
+    /// As defined by [`Algorithm::Sweep`].
     Sweep,
 }
 
 impl Problem {
-    /// The groups that `--problem` can ask for. The last of them take long, or say something of fast devices only: they
-    /// run if they are named.
+    /// The groups that `--problem` accepts. Those after the first `BY_DEFAULT` take long, or are informative on fast
+    /// devices only. They run only if named.
     pub const ASKED: [&str; 14] = [
         "update",
         "hierarchy",
@@ -57,13 +56,13 @@ impl Problem {
         "half-step-labels",
     ];
 
-    /// How many groups run without being named.
+    /// How many groups run by default.
     const BY_DEFAULT: usize = 8;
 
-    /// The groups, of one problem each, by which kernels are compared.
+    /// The groups that compare kernels. Each has one problem.
     pub const KERNELS: [&str; 3] = ["update", "hierarchy", "sweep"];
 
-    /// The problems of some groups; of no names, those that run by default.
+    /// The problems of the named groups, or those that run by default if `names` is empty.
     pub fn asked(names: &[String]) -> Vec<Self> {
         let by_default = Self::ASKED[..Self::BY_DEFAULT].iter().map(|&name| name.to_owned()).collect();
         let names = if names.is_empty() { by_default } else { names.to_vec() };
@@ -80,7 +79,7 @@ impl Problem {
             "hierarchy" => census(BABY1, 128, half_steps(5, 10)),
             "sweep" => census(BABY1, 128, Passing::Sweep),
             "thesis" => thesis(112, Passing::Loops(112)),
-            // The size and the number of labels that others publish times of.
+            // The size and the number of labels for which others publish times.
             "published" => census([900, 750], 128, half_steps(5, 7)),
             "half-steps" => census(BABY1, 128, half_steps(1, 10)),
             "cfcsbp" => thesis(112, Passing::Cfcsbp(112)),
@@ -94,7 +93,7 @@ impl Problem {
         }
     }
 
-    /// The problems of a family. The first three are small enough that a slow device is soon done with them.
+    /// The problems of a family. Even a slow device solves each of the first three families in seconds.
     fn family(family: Family) -> Vec<Self> {
         let of = |name: String, size, labels, passing| Self {
             family: Some(family),
@@ -132,7 +131,7 @@ impl Problem {
         Self { name: group.to_owned(), group, family: None, size, labels, profile, passing }
     }
 
-    /// One of several problems of its group.
+    /// The problem under a name that tells it from the others of its group.
     fn named(self, name: &str) -> Self {
         Self { name: format!("{}-{name}", self.group), ..self }
     }
@@ -162,8 +161,8 @@ impl Problem {
     }
 }
 
-/// A pair of this size: the scene, repeated to the right and below where that is larger. Times hardly depend on what
-/// images show.
+/// A pair of this size. Where it is larger than the scene, the scene repeats to the right and below. Times hardly
+/// depend on the content of images.
 pub(super) fn pair(scene: &StereoPair, Size { width, height }: Size) -> Result<StereoPair, Error> {
     let repeated = |image: &Image| {
         let from = image.size();
@@ -194,7 +193,7 @@ mod tests {
         assert_eq!((names.len(), Problem::asked(&[]).len()), (count, 23));
     }
 
-    /// Times of a slow device: 2.5 ns a message entry.
+    /// A slow device takes 2.5 ns per message entry.
     #[test]
     fn a_slow_device_solves_a_family_that_runs_by_default_in_seconds() {
         for family in [Family::Pixels, Family::Labels, Family::Loops] {

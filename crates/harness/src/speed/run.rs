@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// Rounds of a run that is not quick.
+/// Default number of rounds of a full run.
 const ROUNDS: u32 = 9;
 
 /// Rounds of a contestant whose first solve is slow.
@@ -29,20 +29,20 @@ const SLOW_ROUNDS: u32 = 3;
 /// A quick run divides the sides of images by this.
 const QUICK_DIVISOR: usize = 3;
 
-/// What is measured.
+/// The options of a run.
 #[derive(Debug, Default)]
 pub struct SpeedOptions {
-    /// The problems, by the names in [`Problem::ASKED`]; none means all but those that take long.
+    /// The groups of problems, named as in [`Problem::ASKED`]. If empty, those that run by default.
     pub problems: Vec<String>,
     /// Rounds, by default nine, or one in a quick run.
     pub rounds: Option<u32>,
-    /// Images of a third of the width and height.
+    /// Whether to use images of a third of the width and height.
     pub quick: bool,
     /// The folder of the record, the page and the charts.
     pub output: Option<PathBuf>,
 }
 
-/// Measures what is asked for on these devices, at least one of which is open.
+/// Measures the selected problems on these devices, at least one of which is open.
 pub fn measure(options: &SpeedOptions, asked: &[Asked], watch: &Watch<'_>) -> Result<Speed, Failure> {
     let mut speed = Speed {
         schema_version: SCHEMA_VERSION,
@@ -71,7 +71,7 @@ pub fn measure(options: &SpeedOptions, asked: &[Asked], watch: &Watch<'_>) -> Re
     Ok(speed)
 }
 
-/// What is known of a contestant before the first problem.
+/// Describes a contestant: its device, the time to open it, and its copy rate.
 fn contestant(asked: &Asked, watch: &Watch<'_>) -> Result<speed::Contestant, Failure> {
     watch.check()?;
     let runner = asked.runner.as_ref();
@@ -84,7 +84,7 @@ fn contestant(asked: &Asked, watch: &Watch<'_>) -> Result<speed::Contestant, Fai
     })
 }
 
-/// How fast a device copies. A device that cannot tell may still solve problems.
+/// The copy rate of a device. A device that fails to measure it may still solve problems.
 fn copy_gb_per_s(runner: &Runner, watch: &Watch<'_>) -> Option<f64> {
     let rate = runner.on_device(|device| Ok(device.copy_rate()?));
     let unknown = |failure: &Failure| watch.note(&format!("{}: its copy rate is not known: {failure}", runner.name));
@@ -127,7 +127,7 @@ fn sha256(labels: &[u16]) -> String {
 /// The first answer to a problem. All others must be equal.
 struct Answer {
     labels: Vec<u16>,
-    /// Whose it is.
+    /// The name of the runner that gave it.
     whose: String,
 }
 
@@ -182,7 +182,7 @@ impl Contestant for OnDevice<'_> {
     }
 }
 
-/// What came of a contestant.
+/// The result of a contestant.
 fn entry(entrant: Entrant<OnDevice<'_>>, rules: &Rules) -> Entry {
     let Entrant { contestant: OnDevice { runner, ready, .. }, first_ms, samples, failure, .. } = entrant;
     let outcome = match (failure, ready, first_ms) {

@@ -1,4 +1,4 @@
-//! What `bp speed` found as Markdown, made from the record alone.
+//! The results of `bp speed` as Markdown, written from its record alone.
 
 use std::fmt::Write as _;
 
@@ -18,7 +18,7 @@ use crate::{
     },
 };
 
-/// Beneath the heading: how to read the numbers.
+/// How to read the numbers, shown before the first table.
 const READING: &str = "Times are medians, with their range from three rounds on. In a round every device solves the \
                        problem once, one after another, after a first solve that does not count. By the wall clock a \
                        solve goes from the images to the labels in main memory; by the device's own clock it is the \
@@ -52,7 +52,7 @@ fn shown(Chart { name, plot, caption }: &Chart) -> String {
     format!("## {0}\n\n{caption}\n\n![{0}]({name}.svg)\n\n", plot.title)
 }
 
-/// What a reader must know before the numbers.
+/// The machine, the program, the run and the contestants, one line each.
 fn facts(speed: &Speed) -> Vec<String> {
     let mut facts = vec![machine_fact(&speed.machine), program_fact(&speed.program)];
     let images = if speed.quick { "a quick run on images of a third of the width and height" } else { "a full run" };
@@ -66,7 +66,7 @@ fn contestant(contestant: &Contestant) -> String {
     let Some(device) = &contestant.device else {
         return format!("Backend {name}: unavailable: {}.", or(contestant.unavailable.clone(), "no reason is known"));
     };
-    // Opening a processor is nothing.
+    // Opening a CPU takes no time worth showing.
     let opened = contestant.open_ms.filter(|_| device.api.is_some());
     let opened = opened.map(|ms| format!(" Opened and tested in {} ms.", figures(ms)));
     let copies = contestant.copy_gb_per_s;
@@ -74,7 +74,7 @@ fn contestant(contestant: &Contestant) -> String {
     format!("{}{}{}", device_fact(name, device), or(opened, ""), or(copies, ""))
 }
 
-/// A problem in a line.
+/// A one-line description of a problem.
 fn described(contest: &Contest) -> String {
     let Contest { width, height, settings, .. } = contest;
     let problem = printable(&contest.problem).replace('`', "'");
@@ -89,7 +89,7 @@ fn described(contest: &Contest) -> String {
     )
 }
 
-/// Time against the number that grows in a family, as a chart and as a table.
+/// Time against the number that varies within a family, as a chart and as a table.
 fn family_section(speed: &Speed, family: Family) -> String {
     let contests: Vec<_> = speed.contests_of(Some(family)).collect();
     let (Some(chart), Some(first)) = (growth(speed, family), contests.first()) else { return String::new() };
@@ -107,7 +107,7 @@ fn family_section(speed: &Speed, family: Family) -> String {
     format!("{}The first: {}\n\n{}\n", shown(&chart), described(first), lines(&columns, &rows))
 }
 
-/// All problems of no family with all contestants that took part.
+/// Every problem without a family, with each of its contestants.
 fn rows(speed: &Speed) -> impl Iterator<Item = (&Contest, &Entry)> {
     speed.contests_of(None).flat_map(entries)
 }
@@ -116,7 +116,7 @@ fn entries(contest: &Contest) -> impl Iterator<Item = (&Contest, &Entry)> {
     contest.entries.iter().map(move |entry| (contest, entry))
 }
 
-/// What stands in place of numbers.
+/// The word shown instead of missing numbers.
 fn missing(outcome: &Outcome<Measurement>) -> &'static str {
     match outcome {
         Outcome::Pending | Outcome::Measured(_) => "",
@@ -168,7 +168,7 @@ fn times_of(contest: &Contest, measurement: &Measurement) -> [String; 7] {
     ]
 }
 
-/// Why numbers are missing, or are fewer than others.
+/// Why results are missing, or have fewer rounds than requested.
 fn beneath(speed: &Speed) -> Vec<String> {
     let line = |(contest, entry): (&Contest, &Entry)| {
         let what = match &entry.outcome {
@@ -186,7 +186,7 @@ fn beneath(speed: &Speed) -> Vec<String> {
     speed.contests.iter().flat_map(entries).filter_map(line).collect()
 }
 
-/// How many times as long as the first contestant that is there the others take.
+/// The time of each contestant over that of the first one that could be opened.
 fn ratios(speed: &Speed) -> String {
     let mut rows = Vec::new();
     for contest in speed.contests_of(None) {
@@ -249,12 +249,12 @@ fn table(columns: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     lines(&columns, &rows.collect::<Vec<_>>())
 }
 
-/// A number with three significant digits, or as many as it has before the point.
+/// A number with three significant digits, or with all its integer digits if those are more.
 fn figures(value: f64) -> String {
     number(value, decimals(value))
 }
 
-/// A median and, from three numbers on, their range, with three significant digits of the median; nothing of nothing.
+/// The median with three significant digits, and the range if there are three samples or more; empty for `None`.
 fn spread(spread: Option<Spread>) -> String {
     let Some(Spread { median, low, high, count }) = spread else { return String::new() };
     let number = |value| number(value, decimals(median));
@@ -262,7 +262,7 @@ fn spread(spread: Option<Spread>) -> String {
     format!("{}{range}", number(median))
 }
 
-/// Decimals of three significant digits.
+/// The number of decimals that gives three significant digits.
 fn decimals(value: f64) -> usize {
     if value > 0.0 { (2.0 - value.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 }
 }

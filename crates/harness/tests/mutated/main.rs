@@ -1,7 +1,7 @@
-//! Broken files and tiny pairs: whatever bytes come, readers refuse them or read them, in bounded time and memory.
+//! Broken files and tiny pairs: readers must read or refuse any bytes, in bounded time and memory.
 //!
-//! The same functions as in `fuzz/`, without a fuzzer: the seeds there, and the same thousands of mutations of them on
-//! every run.
+//! Calls the functions of `fuzz/` without a fuzzer, on the seeds there and on thousands of mutations of them. The
+//! mutations are the same in every run.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 mod mutations;
@@ -17,19 +17,20 @@ use fastrand::Rng;
 use harness::fuzzing::{TARGETS, Target};
 use mutations::mutated;
 
-/// Mutations of each target's seeds; of those that take milliseconds, fewer.
+/// Mutations of each target's seeds; fewer for targets that take milliseconds.
 const MUTATIONS: usize = 10_000;
 const FEWER: (usize, [&str; 2]) = (1500, ["record", "tiny_match"]);
 
-/// Longest that bytes may take. They take milliseconds: only what takes longer again when the machine did something
-/// else the first time counts.
+/// Maximum time for one input. Inputs take milliseconds. One only fails if it is too slow twice, because the machine
+/// may have been busy the first time.
 const LONGEST: Duration = Duration::from_secs(2);
 
-/// Most memory that the test may ever hold, where the system tells: a file is allowed 65536 pixels here. Address space
-/// is not counted: the decoder of TIFFs reserves up to 256 MiB on a directory's word, and finds the file too short.
+/// Maximum memory that the test may ever hold, if the system reports it. Files may have 65536 pixels here. Address
+/// space does not count: the TIFF decoder reserves up to 256 MiB if a directory says so, and then finds the file too
+/// short.
 const MOST_KIB: u64 = 128 << 10;
 
-/// The seeds of a target, in the order of their names.
+/// The seeds of a target, sorted by name.
 fn seeds(target: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
     let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -37,21 +38,21 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
     paths.iter().map(|path| fs::read(path).unwrap()).collect()
 }
 
-/// Whether a target takes the bytes for what it reads, and how long that takes.
+/// Whether the bytes are valid input of a target, and how long it takes.
 fn run(target: Target, bytes: &[u8]) -> (bool, Duration) {
     let start = Instant::now();
     let taken = target(bytes);
     (taken, start.elapsed())
 }
 
-/// The most KiB that this process ever held.
+/// The maximum memory that this process ever held, in KiB.
 fn most_kib() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().trim_end_matches(" kB").parse().ok()
 }
 
-/// What is wrong with how a target takes some bytes.
+/// Describes how a target fails on some bytes; `None` if it does not.
 fn wrong(target: Target, bytes: &[u8]) -> Option<String> {
     let Ok((_, took)) = catch_unwind(AssertUnwindSafe(|| run(target, bytes))) else { return Some("panicked".into()) };
     if took > LONGEST && run(target, bytes).1 > LONGEST {
@@ -60,7 +61,7 @@ fn wrong(target: Target, bytes: &[u8]) -> Option<String> {
     most_kib().filter(|&most| most > MOST_KIB).map(|most| format!("took {most} KiB"))
 }
 
-/// One test, since memory is that of the whole process.
+/// A single test, because memory is measured for the whole process.
 #[test]
 fn any_bytes_are_read_or_refused() {
     for (name, target) in TARGETS {

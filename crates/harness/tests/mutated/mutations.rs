@@ -1,14 +1,14 @@
-//! What goes wrong with files: flipped bits, huge numbers, cuts, what is doubled or of another file.
+//! Mutations of files: flipped bits, huge numbers, cuts, and parts that are duplicated or come from another file.
 
 use std::ops::Range;
 
 use fastrand::Rng;
 
-/// Numbers at which sizes and offsets go wrong.
+/// Numbers that tend to break sizes and offsets.
 const NUMBERS: [u64; 10] =
     [0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x7fff_ffff, 0xffff_ffff, 0x7fff_ffff_ffff_ffff, u64::MAX];
 
-/// The same in text, and what is none.
+/// The same as text, and texts that are not numbers.
 const WORDS: [&[u8]; 10] =
     [b"0", b"-1", b"65537", b"2147483648", b"4294967296", b"18446744073709551616", b"1e308", b"-1e-308", b"nan", b""];
 
@@ -33,7 +33,7 @@ fn mutate(bytes: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Rng) {
     }
 }
 
-/// Somewhere; half of the time near the begin, where headers are.
+/// A random position; half of the time near the start, where headers are.
 fn place(bytes: &[u8], random: &mut Rng) -> usize {
     let most = if random.bool() { bytes.len() } else { bytes.len().min(64) };
     random.usize(..=most)
@@ -61,7 +61,7 @@ fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut Rng) {
     bytes.splice(start..start + len, WORDS[random.usize(..WORDS.len())].iter().copied());
 }
 
-/// Doubles a part, or inserts one of another seed.
+/// Duplicates a part, or inserts one of another seed.
 fn insert(bytes: &mut Vec<u8>, at: usize, seeds: &[Vec<u8>], random: &mut Rng) {
     let other = if random.bool() { bytes.clone() } else { random.choice(seeds).cloned().unwrap_or_default() };
     let from = place(&other, random);

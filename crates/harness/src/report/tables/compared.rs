@@ -61,7 +61,7 @@ fn printed(results: &Results<'_>, row: &Row<'_>, plan: &Named) -> [String; 2] {
     [or(ms, "not printed"), or(percent, if plan.plan == "bp" { "" } else { "not printed" })]
 }
 
-/// Message entries of BP over those of a plan, as predicted.
+/// Predicted message entries of BP over those of a plan.
 fn fewer_updates(row: &Row<'_>, plan: &Named) -> Option<f64> {
     Some(row.cell("bp")?.settings.message_updates as f64 / row.cell(plan.plan)?.settings.message_updates as f64)
 }
@@ -86,8 +86,8 @@ pub(super) fn reliability(results: &Results<'_>, number_of: &str, plans: &[Named
     let columns =
         "printed | ours: R all, BP | plan | B>1 all, BP | plan | B>1 non-occluded, BP | plan | energy, BP | plan";
     let title = format!("{} against BP: reliability", family(plans));
-    let note = "R is in pixels, B in percent. Under the schedule sync, plain BP's energy stays well above that of as many \
-                checkerboard loops.";
+    let note = "R is in pixels, B in percent. After the same number of loops, plain BP's energy is much higher under \
+                the schedule sync than under checkerboard.";
     table(results, number_of, title, plans, columns, |row, plan| {
         let mut cells = vec![NOT_PRINTED.to_owned()];
         let Some((bp, other)) = row.measured("bp").zip(row.measured(plan.plan)) else {

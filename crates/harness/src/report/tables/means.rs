@@ -10,7 +10,7 @@ use crate::{
     statistics::Spread,
 };
 
-/// A row for each plan: printed and measured speed-ups over BP, times, and what no backend changes.
+/// A row for each plan: printed and measured speed-ups over BP, times, memory and errors.
 pub(in crate::report) fn table(results: &Results<'_>) -> Table {
     let backends: Vec<&str> = results.devices().into_iter().map(|(backend, _)| backend).collect();
     let each = |what: &str| backends.iter().map(|backend| format!("{what} {}", results.label(backend))).collect();
@@ -58,7 +58,7 @@ fn row(results: &Results<'_>, backends: &[&str], plan: &Named) -> Vec<String> {
     .concat()
 }
 
-/// The least and the largest number, or the one where both are shown alike.
+/// The least and the largest number, or a single number if both look the same.
 fn range(spread: Spread) -> String {
     let [low, high] = [spread.low, spread.high].map(|value| number(value, 0));
     if low == high { low } else { format!("{low} to {high}") }

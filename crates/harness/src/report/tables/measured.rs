@@ -11,7 +11,7 @@ use crate::{
 
 pub(super) const NOT_PRINTED: &str = "not printed";
 
-/// A table with a row for every scene, backend and plan. Its columns follow those that name the measurement.
+/// A table with a row for every scene, backend and plan. `columns` follow those that identify the row.
 pub(super) fn table<'a>(
     results: &'a Results<'a>,
     number: &str,
@@ -92,8 +92,8 @@ pub(super) fn reliability(results: &Results<'_>, number: &str, plans: &[Named]) 
     let title = format!("{}: reliability", family(plans));
     let note = "R is the root mean squared error in pixels (equation 2.82). B>1 is the percentage of pixels wrong by more \
                 than 1 px (2.83). Both are over all pixels of known truth and over the non-occluded ones, which both \
-                cameras see. The energy depends on the schedule: under sync, plain BP's stays well above that of as many \
-                checkerboard loops. The thesis prints no reliability figure.";
+                cameras see. The energy depends on the schedule: after the same number of loops, plain BP's is much \
+                higher under sync than under checkerboard. The thesis prints no reliability figure.";
     table(results, number, title, plans, columns, |row, plan| {
         let Some(measured) = row.measured(plan.plan) else {
             return vec![NOT_PRINTED.to_owned(), row.missing(plan.plan).to_owned()];

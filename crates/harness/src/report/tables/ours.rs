@@ -12,7 +12,7 @@ use crate::{
 /// Number of the table of means, the only one with times of our plans.
 pub(super) const PROFILES: &str = "A.1";
 
-/// A plan of ours: the census transform gives the data costs of all pixels.
+/// A plan of ours. The census transform gives the data costs of all pixels.
 const fn own(look: usize, plan: &'static str, title: &'static str, meaning: &'static str) -> Named {
     Named { plan, title, printed: None, look, meaning }
 }
@@ -62,7 +62,7 @@ pub(super) fn profiles(results: &Results<'_>) -> Table {
     Table::new(PROFILES, "Accuracy and time, means (not in the thesis)", &columns).note(note).rows(rows)
 }
 
-/// Labellings by others and by this program under one energy; `None` if the data held none.
+/// Labellings by others and by this program under one energy; `None` if the record holds none.
 pub(super) fn energies(results: &Results<'_>) -> Option<Table> {
     let labellings = &results.record.labellings;
     if labellings.is_empty() {
