@@ -6,7 +6,7 @@
 use std::{env, thread, time::Duration};
 
 use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule};
-use bp_testkit::{Case, Difference, compare, compare_at_random, conform, noise_pair};
+use bp_testkit::{Case, Difference, compare, compare_at_random, conform_every, noise_pair};
 
 use crate::Limits;
 
@@ -26,32 +26,35 @@ pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>>
     }
 }
 
-/// Runs the whole suite, and random cases.
+/// Runs every `n`-th case of the suite, and of 100 random ones.
 ///
 /// # Errors
 /// The first difference from the reference.
 ///
 /// # Panics
-/// If the device refuses a plan.
+/// If the device refuses a plan, or `n` is 0.
 pub fn conforms(
+    n: usize,
     reference: &dyn Device,
     open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
 ) -> Result<(), Difference> {
     let Some(device) = open(&|_| ()) else { return Ok(()) };
-    conform(reference, device.as_ref())?;
-    assert_eq!(compare_at_random(reference, &[device.as_ref()], 0..100)?, 0, "plans refused");
+    conform_every(n, reference, device.as_ref())?;
+    assert_eq!(compare_at_random(reference, &[device.as_ref()], (0..100).step_by(n))?, 0, "plans refused");
     Ok(())
 }
 
 /// Runs every algorithm under every schedule on an image of several bands, with several strips, dispatches of a few rows and
-/// submissions of a few dispatches. Then runs random cases, each with the smallest buffers that suffice.
+/// submissions of a few dispatches. Then runs random cases, each with the smallest buffers that suffice. Of both, only every
+/// `n`-th case.
 ///
 /// # Errors
 /// The first difference from the reference.
 ///
 /// # Panics
-/// If the device refuses many plans.
+/// If the device refuses many plans, or `n` is 0.
 pub fn conforms_cut_up(
+    n: usize,
     reference: &dyn Device,
     open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
 ) -> Result<(), Difference> {
@@ -63,11 +66,11 @@ pub fn conforms_cut_up(
         })
     });
     let Some(devices) = lowered.into_iter().collect::<Option<Vec<_>>>() else { return Ok(()) };
-    for (case, device) in banded_cases().iter().flat_map(|case| [(case, &devices[1]), (case, &devices[2])]) {
+    for (case, device) in banded_cases().iter().step_by(n).flat_map(|case| [(case, &devices[1]), (case, &devices[2])]) {
         compare(reference, device.as_ref(), case)?;
     }
     let devices: Vec<_> = devices.iter().map(Box::as_ref).collect();
-    let refused = compare_at_random(reference, &devices, 1000..1100)?;
+    let refused = compare_at_random(reference, &devices, (1000..1100).step_by(n))?;
     assert!(refused <= 5, "{refused} plans refused");
     Ok(())
 }

@@ -30,4 +30,4 @@ pub use difference::{Difference, Fault};
 pub use noise::noise_pair;
 pub use oracle::Oracle;
 pub use random::random_case;
-pub use suite::{compare, compare_at_random, conform};
+pub use suite::{compare, compare_at_random, conform, conform_every};

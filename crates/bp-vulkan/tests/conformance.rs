@@ -15,12 +15,12 @@ fn open(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
 
 #[test]
 fn the_first_device_conforms() -> Result<(), Difference> {
-    conforms(&Scalar, open)
+    conforms(1, &Scalar, open)
 }
 
 #[test]
 fn the_first_device_conforms_cut_up() -> Result<(), Difference> {
-    conforms_cut_up(&Scalar, open)
+    conforms_cut_up(1, &Scalar, open)
 }
 
 #[test]
