@@ -1,4 +1,4 @@
-// First messages of a grid: those from the nodes of one colour to one side, copied from the next coarser grid.
+// First messages of a grid: those from the nodes of one colour to one side, made from the next coarser grid's.
 //
 // A node starts with the messages that its parent received last (RECEIVER), or with those that its sender's parent sent
 // last (SENDER). Buffers keep messages with their senders, so this kernel looks for the coarse sender. Under RECEIVER
@@ -12,7 +12,10 @@
 const RECEIVER: u32 = 0;
 const SENDER: u32 = 1;
 // Under the schedule `sweep`, coarse messages to the left and right are valid only if the sender is odd.
+// Messages are interpolated between the receiver's parent and the coarse nodes beside it.
 const SWEEP: u32 = 2;
+// Zeros, on the coarsest grid.
+const ZERO: u32 = 3;
 override START: u32 = RECEIVER;
 
 // Row of the coarse sender.
@@ -65,6 +68,64 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     return odd[index];
 }
 
+// The same for columns x, x + 2, x + 4 and x + 6 of coarse row y.
+fn coarse_messages(x: i32, y: i32, quad: u32) -> vec4<u32> {
+    return coarse_nodes((x + y) & 1, u32(y + 1 - i32(parameters.other_first_row)), x >> 1, quad);
+}
+
+// Under SWEEP: the row of the coarse sender for the other coarse row that the receiver lies between; the same row if there
+// is no such row, or it receives nothing from that side.
+fn far_y(y: u32, near: i32) -> i32 {
+    let up = i32(parameters.side == UP);
+    let far = near + select(-1, 1, ((i32(y) - up) & 1) == 1);
+    return select(near, far, far - up >= 0 && far < i32(parameters.other_height));
+}
+
+// The mean of two bytes, rounded up, for all 16.
+fn mean(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
+    return (a | b) - (((a ^ b) >> vec4(1u)) & ~HIGH);
+}
+
+// Three quarters of `near` and one of `far`.
+fn nearer(near: vec4<u32>, far: vec4<u32>) -> vec4<u32> {
+    return mean(mean(near, far), near);
+}
+
+// Messages between two coarse rows: from column x.x of row y.x and from column x.y of row y.y, and so on as in
+// coarse_messages.
+fn between_rows(x: vec2<i32>, y: vec2<i32>, quad: u32) -> vec4<u32> {
+    return nearer(coarse_messages(x.x, y.x, quad), coarse_messages(x.y, y.y, quad));
+}
+
+// Whole bytes where columns x, x + 2, x + 4 and x + 6 exist on the coarser grid.
+fn coarse_columns(x: i32) -> vec4<u32> {
+    let columns = vec4(x) + vec4(0, 2, 4, 6);
+    return vec4(bytes_where((columns >= vec4(0)) & (columns < vec4(i32(parameters.other_width)))));
+}
+
+// The first messages of every second node of two words, and of those between them.
+struct Alternate {
+    even: vec4<u32>,
+    odd: vec4<u32>,
+}
+
+// Interpolates also between columns: a receiver in an even column lies nearer to its parent's left neighbour, one in an odd
+// column to the right one.
+fn between_columns(parents: Alternate, parity: u32, even: i32, odd: i32, y: vec2<i32>, quad: u32) -> Alternate {
+    var beside = Alternate(parents.odd, parents.even);
+    if parity == 0 {
+        beside.even = between_rows(vec2(even - 1), y, quad);
+    } else {
+        beside.odd = between_rows(vec2(odd + 1), y, quad);
+    }
+    let aside = select(-1, 1, parity == 1);
+    let at_even = coarse_columns(even + aside);
+    let at_odd = coarse_columns(odd + aside);
+    beside.even = (beside.even & at_even) | (parents.even & ~at_even);
+    beside.odd = (beside.odd & at_odd) | (parents.odd & ~at_odd);
+    return Alternate(nearer(parents.even, beside.even), nearer(parents.odd, beside.odd));
+}
+
 // A mask of the nodes that have a neighbour on this side and so a first message.
 fn starting(nodes: Nodes) -> u32 {
     let x = columns(nodes);
@@ -97,22 +158,31 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let first = plane_index(nodes.row, nodes.word);
     let is_pair = nodes.word + 1 < parameters.words;
-    let y = coarse_y(nodes.y);
-    let row = u32(y + 1 - i32(parameters.other_first_row));
+    let near = coarse_y(nodes.y);
+    let y = vec2(near, far_y(nodes.y, near));
     // The senders of every second node are consecutive in their row and colour.
     let x = columns(nodes);
-    let a = coarse_x(x[0], y);
-    let b = coarse_x(x[1], y);
-    let mask = vec4(starting(nodes));
-    let next_mask = vec4(starting(nodes_at(line, nodes.word + 1)));
+    let even = vec2(coarse_x(x[0], y.x), coarse_x(x[0], y.y));
+    let odd = vec2(coarse_x(x[1], y.x), coarse_x(x[1], y.y));
+    // A sender below the coarsest row does not exist, whatever lies beside it.
+    let exists = select(0u, 0xffffffffu, START != SWEEP || near < i32(parameters.other_height));
+    let mask = vec4(starting(nodes) & exists);
+    let next_mask = vec4(starting(nodes_at(line, nodes.word + 1)) & exists);
     for (var quad = 0u; quad < parameters.quads; quad++) {
-        let even_nodes = coarse_nodes((a + y) & 1, row, a >> 1, quad);
-        let odd_nodes = coarse_nodes((b + y) & 1, row, b >> 1, quad);
+        var messages: Alternate;
+        if START == SWEEP {
+            messages = Alternate(between_rows(even, y, quad), between_rows(odd, y, quad));
+            if parameters.side == UP {
+                messages = between_columns(messages, nodes.parity, even.x, odd.x, y, quad);
+            }
+        } else if START != ZERO {
+            messages = Alternate(coarse_messages(even.x, y.x, quad), coarse_messages(odd.x, y.x, quad));
+        }
         let index = first + quad * parameters.words;
-        fine[index] = (apart(even_nodes) | (apart(odd_nodes) << vec4(8u))) & mask;
+        fine[index] = (apart(messages.even) | (apart(messages.odd) << vec4(8u))) & mask;
         if is_pair {
             let half = vec4(16u);
-            fine[index + 1] = (apart(even_nodes >> half) | (apart(odd_nodes >> half) << vec4(8u))) & next_mask;
+            fine[index + 1] = (apart(messages.even >> half) | (apart(messages.odd >> half) << vec4(8u))) & next_mask;
         }
     }
 }

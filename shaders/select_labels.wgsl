@@ -9,7 +9,6 @@
 const LABEL_BITS: u32 = 11;
 
 override SWEEP: bool = false;
-override BAND_ROWS: u32 = 32;
 
 // Data cost plus the messages that count, for a quad of labels.
 fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
@@ -63,7 +62,7 @@ fn decided_neighbours(nodes: Nodes) -> Decided {
     let other = 1 - parameters.colour;
     var known: Decided;
     let weak = weak_edges(nodes);
-    known.up.exist = vec4(nodes.y % BAND_ROWS != 0 && nodes.y != parameters.cut_y);
+    known.up.exist = vec4(parameters.labels_above != 0 && nodes.y != 0 && nodes.y != parameters.cut_y);
     known.up.labels = decided(other, max(nodes.y, 1) - 1, nodes.word, 0);
     known.up.weak = unpack(weak[UP]) != vec4(0u);
     if parameters.colour == 1 {

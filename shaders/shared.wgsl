@@ -41,6 +41,8 @@ struct Parameters {
     cut_y: u32,
     // update_messages under the schedule `sweep`: the sides to send to; bit 0 left, 1 right, 2 up, 3 down.
     sends: u32,
+    // select_labels under the schedule `sweep`: 1 if the rows above have labels.
+    labels_above: u32,
     // refine: the side that the messages are sent to, with the same numbering.
     side: u32,
     // coarsen, coarsen_greys and refine: size, words and strip of the grid that is read.

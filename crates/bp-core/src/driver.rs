@@ -197,13 +197,18 @@ fn pass_messages(
     observer: &mut Observer<'_>,
 ) -> Result<(), Error> {
     let grids = from.grids(plan);
-    let total = (0..grids).map(|grid| u64::from(plan.settings().steps).saturating_mul(plan.updates_per_step(grid)));
-    let mut progress = Progress { done: 0, total: total.fold(0, u64::saturating_add) };
+    let of_grid = |grid| {
+        u64::from(plan.settings().steps)
+            .saturating_mul(plan.updates_per_step(grid))
+            .saturating_add(plan.seam_updates(grid))
+    };
+    let mut progress = Progress { done: 0, total: (0..grids).map(of_grid).fold(0, u64::saturating_add) };
     for grid in (0..grids).rev() {
         timed(times, Stage::Refine, || match from {
             Start::Cold => solver.refine(grid),
             Start::Warm => solver.keep_messages(),
         })?;
+        progress.done += plan.seam_updates(grid);
         let mut steps = 0..plan.settings().steps;
         while !steps.is_empty() {
             let end = steps.start.saturating_add(solver.fused_steps()).min(steps.end);

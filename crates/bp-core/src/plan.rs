@@ -2,7 +2,9 @@
 
 mod traffic;
 
-use crate::{BAND_ROWS, Error, MessageStart, Model, Node, Schedule, Settings, Side, Size};
+use std::ops::Range;
+
+use crate::{Error, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
 
 /// The most grids of a plan. This many reduce the longest side, [`crate::MAX_SIDE`], to 1.
 pub const MAX_GRIDS: u32 = 25;
@@ -129,25 +131,50 @@ impl Plan {
         let messages = match self.settings.schedule {
             Schedule::Sync => 2 * edges,
             Schedule::Checkerboard => edges,
-            Schedule::Sweep => 2 * (edges - self.seam_edges(grid)),
+            Schedule::Sweep => {
+                let seams = Seam::all(self.sizes[grid].height);
+                2 * (edges - seams.map(|seam| self.edges_above(grid, seam.below)).sum::<u64>())
+            }
         };
         messages.saturating_mul(self.model.labels() as u64)
     }
 
-    /// The number of edges between bands of [`Schedule::Sweep`]. A cut on a seam removes its edges.
-    fn seam_edges(&self, grid: usize) -> u64 {
-        let Size { width, height } = self.sizes[grid];
-        let seams = (BAND_ROWS..height)
-            .step_by(BAND_ROWS)
-            .filter(|&y| self.neighbour(grid, Node { x: 0, y }, Side::Up).is_some());
-        width as u64 * seams.count() as u64
+    /// The message entries that are computed before the first step on a grid: those that prepare the seams of
+    /// [`Schedule::Sweep`], see [`Seam`].
+    ///
+    /// # Panics
+    /// If there is no such grid.
+    #[must_use]
+    pub fn seam_updates(&self, grid: usize) -> u64 {
+        if self.settings.schedule != Schedule::Sweep {
+            return 0;
+        }
+        let cut = u64::from(self.settings.cut.is_some_and(|cut| cut.x > 0));
+        let beside = self.sizes[grid].width as u64 - 1 - cut;
+        let up = |rows: Range<usize>| rows.map(|y| self.edges_above(grid, y)).sum::<u64>();
+        let prepare = |seam: Seam| {
+            let back = if grid == 0 { seam.label_rows().start } else { seam.below }..seam.rows_below().end;
+            let rows = (seam.rows().len() + back.len()) as u64;
+            rows * beside + up(seam.rows().start + 1..seam.rows().end) + up(back)
+        };
+        let messages = Seam::all(self.sizes[grid].height).map(prepare).sum::<u64>();
+        messages.saturating_mul(self.model.labels() as u64)
+    }
+
+    /// The number of edges between row `y` and the row above that exchange messages.
+    fn edges_above(&self, grid: usize, y: usize) -> u64 {
+        let joined = self.neighbour(grid, Node { x: 0, y }, Side::Up).is_some();
+        if joined { self.sizes[grid].width as u64 } else { 0 }
     }
 
     /// The message entries that the whole plan computes.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
-        let per_step = (0..self.grids()).map(|grid| self.updates_per_step(grid));
-        per_step.fold(0, |sum: u64, updates| sum.saturating_add(updates.saturating_mul(self.settings.steps.into())))
+        let of_grid = |grid: usize| {
+            let steps = self.updates_per_step(grid).saturating_mul(self.settings.steps.into());
+            steps.saturating_add(self.seam_updates(grid))
+        };
+        (0..self.grids()).map(of_grid).fold(0, u64::saturating_add)
     }
 
     /// The value at which stored data costs of a grid are clipped: [`Model::clip`], which never changes a result, or the
@@ -179,7 +206,8 @@ impl Plan {
     /// [`crate::Device::planned_bytes`].
     ///
     /// It keeps the messages of two grids at a time: two messages per edge, and two edges per node. Messages are double
-    /// buffered under [`Schedule::Sync`]. Under [`Schedule::Sweep`] it keeps one message per edge.
+    /// buffered under [`Schedule::Sync`]. Under [`Schedule::Sweep`] it keeps one message per edge, and two per edge of a seam
+    /// with the labels of the rows above it.
     #[must_use]
     pub fn buffers(&self) -> Vec<Buffer> {
         let pixels = self.image_size().pixels() as u64;
@@ -206,6 +234,13 @@ impl Plan {
                 };
                 buffers.push(Buffer { name: "messages", grid, bytes: volume.saturating_mul(messages_per_node) });
             }
+        }
+        let seams =
+            if self.settings.schedule == Schedule::Sweep { Seam::all(self.image_size().height).len() } else { 0 };
+        if seams > 0 {
+            let node_bytes = 2 * (self.model.labels() + Seam::LABEL_ROWS);
+            let bytes = (seams * self.image_size().width) as u64 * node_bytes as u64;
+            buffers.push(Buffer { name: "seams", grid: 0, bytes });
         }
         buffers
     }
@@ -273,9 +308,14 @@ mod tests {
         };
         let cut_at = |y| Some(Cut { x: 0, y, seed_start: false });
         let all = 2 * (619 * 555 + 620 * 554);
-        assert_eq!(one_grid(None).message_updates(), all - 17 * 2 * 620);
-        assert_eq!(one_grid(cut_at(31)).message_updates(), all - 18 * 2 * 620);
-        assert_eq!(one_grid(cut_at(32)).message_updates(), all - 17 * 2 * 620);
+        let seam = 16 * 619 + 15 * 620 + 10 * (619 + 620);
+        assert_eq!(one_grid(None).message_updates(), all - 17 * 2 * 620 + 17 * seam);
+        assert_eq!(one_grid(cut_at(100)).message_updates(), all - 18 * 2 * 620 + 17 * seam);
+        assert_eq!(one_grid(cut_at(31)).message_updates(), all - 18 * 2 * 620 + 17 * seam - 2 * 620);
+        assert_eq!(one_grid(cut_at(32)).message_updates(), all - 17 * 2 * 620 + 17 * seam - 2 * 620);
+        let coarse = plan(Algorithm::Sweep, Schedule::Sweep);
+        assert_eq!(coarse.size(3), Size { width: 78, height: 70 });
+        assert_eq!(coarse.seam_updates(3), 2 * 112 * (16 * 77 + 15 * 78 + 4 * (77 + 78)));
         let messages =
             |plan: &Plan| plan.buffers().iter().filter(|b| b.name == "messages").map(|b| b.bytes).sum::<u64>();
         assert_eq!(messages(&one_grid(None)), 2 * 620 * 555);

@@ -92,8 +92,8 @@ impl Algorithm {
 /// fewer.
 pub const BAND_ROWS: usize = 32;
 
-/// The order in which messages are updated. A loop updates every directed message once; [`Schedule::Sweep`] skips
-/// those across a seam.
+/// The order in which messages are updated. A loop updates every directed message once; [`Schedule::Sweep`] updates those
+/// across a seam only once for all loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Schedule {
@@ -106,28 +106,35 @@ pub enum Schedule {
     /// either direction. Sending over an edge consumes the opposite message, which counts as zeros from then on. A node
     /// is even if x + y is even on its own grid. Nothing is sent to missing neighbours.
     ///
-    /// Rows are cut into bands of [`BAND_ROWS`]. The edges between two bands are a seam. Nothing is sent across a seam, so
-    /// bands do not depend on each other: in all loops the last row of a band holds its first messages from below, and
-    /// its first row holds nothing from above. A loop runs over each band in two passes:
+    /// Rows are cut into bands of [`BAND_ROWS`]. The edges between two bands are a seam, which holds a message in each
+    /// direction. Both are prepared before the first loop; see [`crate::Seam`]. Loops leave them as they are, so bands do
+    /// not depend on each other. A loop runs over each band in two passes:
     ///
     /// 1. Forward, rows from top to bottom. In a row all even nodes send left, right and down, each message computed
-    ///    from the messages that the node holds before it sends any; then all odd nodes send down. The last row of the
-    ///    band sends nothing down.
+    ///    from the messages that the node holds before it sends any; then all odd nodes send down. The last row sends
+    ///    nothing down.
     /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up in the same way; then all
-    ///    even nodes send up. The first row of the band sends nothing up.
+    ///    even nodes send up. The first row sends nothing up.
     ///
-    /// So after a loop every vertical edge holds an upward message (at a seam, the first one), and every horizontal
-    /// edge holds the message from its odd to its even end.
+    /// So after a loop every vertical edge holds an upward message, and every horizontal edge holds the message from its
+    /// odd to its even end. The downward messages of seams count no longer.
     ///
-    /// **First messages** of a finer grid come from these edges of the coarser grid. The parent P of (x, y) is
-    /// (x div 2, y div 2). If a node has a neighbour on that side, its first message is
+    /// **First messages** of a finer grid come from these edges of the coarser grid. Let M(Q) be, for a coarse node Q,
     ///
-    /// - from below: the message that P received from below;
-    /// - from above: zeros;
-    /// - from the left, for an odd node: zeros;
-    /// - from the left, for an even node: the message that P received from its left if P is even, else the one that the
-    ///   left neighbour of P received from its left, or zeros if P has no left neighbour;
+    /// - from below: the message that Q received from below;
+    /// - from the left: the message that Q received from its left if Q is even, else the one that the left neighbour of Q
+    ///   received from its left, or zeros if Q has no left neighbour;
     /// - from the right: the same with left and right swapped.
+    ///
+    /// A fine node (x, y) lies between four coarse nodes: its parent P = (x div 2, y div 2) and those beside it, one column to
+    /// the left (x even) or right (x odd), one row above (y even) or below (y odd). If the node has a neighbour on that side,
+    /// its first message is, with w(a, b) = (((a + b + 1) div 2) + a + 1) div 2, three quarters of a and one of b,
+    ///
+    /// - from the left or right, of an even node: w of M at P and at the node in the other row;
+    /// - from below: the same in P's column and in the other one, then w of both;
+    /// - zeros otherwise.
+    ///
+    /// Where the other row or column does not exist, or its row receives nothing from that side, P's takes its place.
     ///
     /// **Labels** of each band are decided one after another, from its top row to its bottom row, in each row first for the
     /// even nodes, then for the odd ones. Let f be the labels already decided and V the smoothness cost. A label is the
@@ -136,7 +143,8 @@ pub enum Schedule {
     /// - of an even node: `V(d, f_up)` and the messages from the left, the right and below;
     /// - of an odd node: `V(d, f_up) + V(d, f_left) + V(d, f_right)` and the message from below.
     ///
-    /// The first row of every band leaves out `V(d, f_up)`. Missing neighbours add nothing.
+    /// For the first row of a band, f_up are labels that were decided when the seam was prepared. Missing neighbours add
+    /// nothing.
     Sweep,
 }
 

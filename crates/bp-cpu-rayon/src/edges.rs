@@ -38,7 +38,7 @@ impl Edges {
     /// For every band of `rows` rows, the edges inside and down from its rows, ordered as in [`inside_and_down`].
     pub(crate) fn bands_mut(&mut self, layout: &Layout, rows: usize) -> ChunksMut<'_, u8> {
         let all = layout.size.height * row_bytes(layout);
-        self.rows_mut(layout)[2 * plane(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
+        self.rows_mut(layout)[up_bytes(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
     }
 
     /// The rows of a grid, which threads can split by [`row_bytes`].
@@ -54,7 +54,17 @@ impl Edges {
 
 /// All edges of these rows except those up from the first row.
 pub(crate) fn inside_and_down<'a>(shape: &Shape, rows: &'a [u8]) -> &'a [u8] {
-    &rows[2 * plane(shape)..]
+    &rows[up_bytes(shape)..]
+}
+
+/// The edges up from the first row.
+pub(crate) fn up<'a>(shape: &Shape, rows: &'a mut [u8]) -> &'a mut [u8] {
+    &mut rows[..up_bytes(shape)]
+}
+
+/// Bytes of the edges up from a row.
+pub(crate) fn up_bytes(shape: &Shape) -> usize {
+    2 * plane(shape)
 }
 
 /// Bytes that the edges of a grid need.
@@ -91,6 +101,11 @@ impl<'a> Rows<'a> {
     /// The messages that the nodes of `plane` in row `y` received from `side`, `[label][lane]`. `None` if the row has no
     /// neighbours on that side. Lanes without a neighbour hold arbitrary values.
     pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<&'a [u8]> {
+        self.towards_moved(side, plane, y, 0)
+    }
+
+    /// The same from so many lanes further on. Before the first lane lie arbitrary values.
+    pub(crate) fn towards_moved(&self, side: Side, plane: usize, y: usize, moved: isize) -> Option<&'a [u8]> {
         let (row, index, shift) = match (side, plane) {
             (Side::Up, _) => (y, plane, 0),
             (Side::Down, _) => (y + 1, plane, 0),
@@ -100,7 +115,9 @@ impl<'a> Rows<'a> {
         };
         let bytes = self::plane(self.layout);
         let joined = matches!(side, Side::Left | Side::Right) || self.layout.joined_above(row);
-        joined.then(|| &self.values[(PLANES * (row - self.first) + index) * bytes + shift..][..bytes - shift])
+        let start = (PLANES * (row - self.first) + index) * bytes + shift;
+        let start = start.checked_add_signed(moved).filter(|_| joined)?;
+        Some(&self.values[start..(start + bytes).min(self.values.len())])
     }
 }
 

@@ -25,6 +25,7 @@ mod layout;
 mod match_cost;
 mod pass;
 mod refine;
+mod seams;
 mod select_labels;
 mod shape;
 mod solver;

@@ -100,8 +100,8 @@ impl<'a> Answer<'a> {
     }
 
     /// Decides the labels of a band after its sweeps, row by row downwards, even nodes before odd ones.
-    pub(crate) fn decode_band(&self, labels: &mut [u16]) {
-        let mut above = None;
+    pub(crate) fn decode_band(&self, above: Option<&[u16]>, labels: &mut [u16]) {
+        let mut above = above;
         for (row, y) in labels.chunks_exact_mut(self.layout.size.width).zip(self.first..) {
             let (even, odd) = (PlaneRow { plane: y % 2, y }, PlaneRow { plane: 1 - y % 2, y });
             let above_row = above.filter(|_| self.layout.joined_above(y));

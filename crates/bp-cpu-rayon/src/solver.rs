@@ -15,9 +15,10 @@ use crate::{
     match_cost::{Matching, is_stored, match_cost},
     pass::Pass,
     refine::Coarser,
+    seams::{self, Seams},
     select_labels::{Answer, select_labels},
     shape::Shape,
-    sweep::{Bands, CostSource},
+    sweep::{CostSource, Sweep},
     windows::{self, Windows},
 };
 
@@ -31,6 +32,7 @@ pub(crate) struct RayonSolver {
     /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at the same time.
     messages: [Messages; 2],
     windows: Windows,
+    seams: Seams,
     /// Whether grid 0 starts with the messages that it already holds.
     keeps_messages: bool,
     seed: Option<Seed>,
@@ -76,7 +78,8 @@ pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let labels = 2 * plan.image_size().pixels() as u64;
     let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
-    let others = [labels, decided, features::bytes(plan.image_size(), plan.model()), windows::bytes(plan)];
+    let features = features::bytes(plan.image_size(), plan.model());
+    let others = [labels, decided, features, windows::bytes(plan), seams::bytes(plan)];
     costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
 
@@ -98,6 +101,7 @@ impl RayonSolver {
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
             messages: [messages(even)?, messages(odd)?],
             windows: Windows::new(plan)?,
+            seams: Seams::new(plan)?,
             keeps_messages: false,
             seed: None,
             decided: memory::filled("labels", decided, 0)?,
@@ -110,8 +114,8 @@ impl RayonSolver {
         Matching { level: *level, plan, layout: &layouts[0], features, seed: *seed }
     }
 
-    /// The bands of a grid that is swept.
-    fn bands(&self, grid: usize) -> Bands<'_> {
+    /// A grid, ready to be swept.
+    fn sweep(&self, grid: usize) -> Sweep<'_> {
         let Self { level, plan, layouts, windows, .. } = self;
         let costs = if is_stored(plan, grid) {
             CostSource::Stored(&self.costs[grid].stored)
@@ -119,7 +123,7 @@ impl RayonSolver {
             CostSource::Computed(self.matching())
         };
         let coarser = self.coarser(grid);
-        Bands { level: *level, plan, layout: &layouts[grid], costs, coarser, windows }
+        Sweep { level: *level, plan, layout: &layouts[grid], costs, coarser, windows }
     }
 
     /// The messages that a grid starts with.
@@ -195,7 +199,7 @@ impl Solver for RayonSolver {
         if self.plan.settings().schedule == Schedule::Sweep {
             // All loops of a band run together, at the last step.
             if steps.end == self.plan.settings().steps {
-                self.sweep(grid);
+                self.run_sweeps(grid);
             }
             return Ok(());
         }
@@ -219,7 +223,7 @@ impl Solver for RayonSolver {
 
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => self.bands(0).read_messages(side, messages),
+            Schedule::Sweep => self.sweep(0).read_messages(&self.seams, side, messages),
             Schedule::Sync | Schedule::Checkerboard => self.answer().read_messages(&self.plan, side, messages),
         }
         Ok(())
@@ -243,20 +247,30 @@ impl Solver for RayonSolver {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();
         let layouts: u64 = self.layouts.iter().map(Layout::bytes).sum();
-        self.features.bytes() + costs + messages + layouts + self.windows.bytes() + memory::bytes(&self.decided)
+        self.features.bytes()
+            + costs
+            + messages
+            + layouts
+            + self.windows.bytes()
+            + self.seams.bytes()
+            + memory::bytes(&self.decided)
     }
 }
 
 impl RayonSolver {
-    fn sweep(&mut self, grid: usize) {
+    /// Runs all loops on a grid, and decides the labels of the finest one.
+    fn run_sweeps(&mut self, grid: usize) {
+        let mut seams = std::mem::replace(&mut self.seams, Seams::none());
+        self.sweep(grid).prepare(&mut seams, grid == 0);
         if grid == 0 {
             let mut decided = std::mem::take(&mut self.decided);
-            self.bands(0).decode(&mut decided);
+            self.sweep(0).decode(&seams, &mut decided);
             self.decided = decided;
         } else {
             let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
-            self.bands(grid).keep_messages(&mut messages.sets[0]);
+            self.sweep(grid).keep_messages(&seams, &mut messages.sets[0]);
             self.messages[grid % 2] = messages;
         }
+        self.seams = seams;
     }
 }

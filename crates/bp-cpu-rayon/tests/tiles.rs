@@ -2,16 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use bp_core::{
-    Algorithm, Backend, Cut, Device, Driver, HALO, Likeness, MessageStart, Model, Plan, Profile, Progress, Schedule,
-    Settings, Side, Size, StereoPair, Tiled, Tiling,
+    Algorithm, Backend, Cut, Device, Driver, HALO, MessageStart, Model, Plan, Profile, Progress, Schedule, Settings,
+    Side, Size, StereoPair, Tiled, Tiling,
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{noise_pair, synthetic};
-
-fn devices() -> [Box<dyn Device>; 2] {
-    [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()]
-}
 
 fn whole(device: &dyn Device, pair: &StereoPair, plan: &Plan) -> Vec<u16> {
     let mut driver = Driver::new(device, plan.clone()).unwrap();
@@ -33,27 +29,6 @@ fn differing(a: &[u16], b: &[u16]) -> f64 {
 fn swept(grids: u32, steps: u32) -> Settings {
     let (schedule, message_start) = (Schedule::Sweep, MessageStart::Receiver);
     Settings { grids, steps, schedule, message_start, cut: None, coarse_clip: true }
-}
-
-#[test]
-fn strips_of_a_swept_image_are_the_whole_image() {
-    for device in devices() {
-        for (profile, (width, height), min_disparity, settings) in [
-            (Profile::Census, (70, 333), 0, swept(3, 1)),
-            (Profile::Census, (33, 257), -9, swept(2, 2)),
-            (Profile::Thesis, (131, 129), 3, swept(1, 1)),
-            (Profile::Mrf, (40, 200), -4, swept(2, 1)),
-            (Profile::Census, (20, 40), 0, swept(3, 1)),
-        ] {
-            let pair = noise_pair(width, height, 7);
-            let model = Model::new(profile, 14).unwrap().with_min_disparity(min_disparity).unwrap();
-            let plan = Plan::new(pair.size(), model, settings).unwrap();
-            let rows = 32 << (settings.grids - 1);
-            let tiling = Tiling::cut(plan.clone(), Size { width, height: rows }, HALO);
-            assert_eq!((tiling.likeness(), tiling.counts()), (Likeness::Same, (1, height.div_ceil(rows))));
-            assert!(tiled(device.as_ref(), &pair, tiling) == whole(device.as_ref(), &pair, &plan), "{plan:?}");
-        }
-    }
 }
 
 /// Checks the claim of docs/big-images.md about real images on a synthetic one.

@@ -1,42 +1,65 @@
 //! Labels under the schedule `sweep`, decided one after another.
 
-use bp_core::{BAND_ROWS, Side, Smoothness};
+use std::ops::Range;
+
+use bp_core::{BAND_ROWS, Node, Side, Smoothness};
 
 use crate::{
     beliefs::smallest_least,
     grid::Grid,
     messages::{Messages, add},
     row::{Parity, row_nodes},
+    seams::Seams,
 };
 
 /// Writes the label of every node in the order of [`bp_core::Schedule::Sweep`]. `sums` has room for one node's labels.
+pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, seams: &Seams, labels: &mut [u16], sums: &mut [u8]) {
+    let width = grid.size.width;
+    for (band, labels) in labels.chunks_mut(BAND_ROWS * width).enumerate() {
+        let first = band * BAND_ROWS;
+        decode_rows(grid, messages, first..first + labels.len() / width, seams.labels_above(width, band), labels, sums);
+    }
+}
+
+/// Writes the labels of these rows, given those of the row above, if there are any.
 ///
 /// A neighbour that already has a label adds its smoothness cost; any other adds its message.
-pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], sums: &mut [u8]) {
-    let size = grid.size;
-    for (y, parity) in (0..size.height).flat_map(|y| [(y, Parity::Even), (y, Parity::Odd)]) {
+pub(crate) fn decode_rows(
+    grid: &Grid<'_>,
+    messages: &Messages,
+    rows: Range<usize>,
+    above: Option<&[u16]>,
+    labels: &mut [u16],
+    sums: &mut [u8],
+) {
+    let (size, first) = (grid.size, rows.start);
+    let place = |Node { x, y }| (y - first) * size.width + x;
+    for (y, parity) in rows.flat_map(|y| [(y, Parity::Even), (y, Parity::Odd)]) {
         for node in row_nodes(size, y, parity) {
             let index = size.index(node);
             sums.copy_from_slice(grid.costs.of(index));
             for side in Side::ALL {
-                let has_label = match side {
-                    Side::Up => !y.is_multiple_of(BAND_ROWS),
-                    Side::Left | Side::Right => parity == Parity::Odd,
-                    Side::Down => false,
+                let decided = match side {
+                    Side::Up if y > first => grid.neighbour(node, side).map(|other| labels[place(other)]),
+                    Side::Up => grid.neighbour(node, side).and_then(|other| Some(above?[other.x])),
+                    Side::Left | Side::Right if parity == Parity::Odd => {
+                        grid.neighbour(node, side).map(|other| labels[place(other)])
+                    }
+                    _ => {
+                        add(messages.received(index, side), sums);
+                        None
+                    }
                 };
-                if !has_label {
-                    add(messages.received(index, side), sums);
-                } else if let Some(other) = grid.neighbour(node, side) {
-                    let other = size.index(other);
-                    add_smoothness(grid.greys.smoothness(index, other), labels[other], sums);
+                if let (Some(label), Some(other)) = (decided, grid.neighbour(node, side)) {
+                    add_smoothness(grid.greys.smoothness(index, size.index(other)), label, sums);
                 }
             }
-            labels[index] = smallest_least(sums);
+            labels[place(node)] = smallest_least(sums);
         }
     }
 }
 
-/// Adds the smoothness cost between every label and `label`. It is at most K, which fits 8 bits.
+/// Adds the smoothness cost of every label beside `label`. It is at most K, which fits 8 bits.
 fn add_smoothness(smoothness: Smoothness, label: u16, sums: &mut [u8]) {
     for (d, sum) in (0..).zip(sums) {
         *sum = sum.saturating_add(smoothness.of(d, label) as u8);

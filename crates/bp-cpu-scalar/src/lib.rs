@@ -14,6 +14,7 @@ mod match_cost;
 mod messages;
 mod refine;
 mod row;
+mod seams;
 mod select_labels;
 mod solver;
 mod sums;

@@ -1,5 +1,7 @@
 //! The messages of one grid, and room for those of the next loop.
 
+use std::ops::Range;
+
 use bp_core::{Error, Plan, Schedule, Side, memory};
 
 /// Adds a message to the sums of one node, label by label.
@@ -30,12 +32,11 @@ impl Messages {
         })
     }
 
-    /// Sets all messages of a grid with this many nodes to 0.
-    pub(crate) fn clear(&mut self, nodes: usize) {
-        let len = nodes * self.labels;
-        self.received.iter_mut().chain(&mut self.next).for_each(|volume| {
-            volume.iter_mut().take(len).for_each(|message| *message = 0);
-        });
+    /// Sets all messages of these nodes to 0.
+    pub(crate) fn clear(&mut self, nodes: Range<usize>) {
+        let values = nodes.start * self.labels..nodes.end * self.labels;
+        let volumes = self.received.iter_mut().chain(&mut self.next).filter(|volume| !volume.is_empty());
+        volumes.for_each(|volume| volume[values.clone()].fill(0));
     }
 
     /// The message that `node` received from `side`, one value for each label.
@@ -46,6 +47,28 @@ impl Messages {
     /// The messages that all nodes received from `side`, `[node][label]`.
     pub(crate) fn all_received(&self, side: Side) -> &[u8] {
         &self.received[side as usize]
+    }
+
+    /// The bytes of the messages that a row of nodes received from one side.
+    pub(crate) fn row_bytes(&self, width: usize) -> usize {
+        width * self.labels
+    }
+
+    /// The messages that row y received from `side`, `[x][label]`.
+    pub(crate) fn received_row(&self, width: usize, y: usize, side: Side) -> &[u8] {
+        let row = self.row_bytes(width);
+        &self.received[side as usize][y * row..][..row]
+    }
+
+    /// The same, to be written.
+    pub(crate) fn received_row_mut(&mut self, width: usize, y: usize, side: Side) -> &mut [u8] {
+        let row = self.row_bytes(width);
+        &mut self.received[side as usize][y * row..][..row]
+    }
+
+    /// Sets all messages from `side` to 0.
+    pub(crate) fn clear_side(&mut self, side: Side) {
+        self.received[side as usize].fill(0);
     }
 
     /// The slot of the message that `node` receives from `side`.

@@ -2,12 +2,12 @@
 
 use bp_core::Schedule;
 
-use crate::{beliefs::lowest_beliefs, decode::decode, grid::Grid, messages::Messages};
+use crate::{beliefs::lowest_beliefs, decode::decode, grid::Grid, messages::Messages, seams::Seams};
 
 /// Writes the label of every node of grid 0. `sums` has room for one node's labels.
-pub(crate) fn select_labels(grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], sums: &mut [u8]) {
+pub(crate) fn select_labels(grid: &Grid<'_>, messages: &Messages, seams: &Seams, labels: &mut [u16], sums: &mut [u8]) {
     match grid.plan.settings().schedule {
         Schedule::Sync | Schedule::Checkerboard => lowest_beliefs(grid.costs, messages, labels, sums),
-        Schedule::Sweep => decode(grid, messages, labels, sums),
+        Schedule::Sweep => decode(grid, messages, seams, labels, sums),
     }
 }

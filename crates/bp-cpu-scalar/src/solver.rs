@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use bp_core::{DataCost, Error, Plan, Seed, Side, Solver, Stage, StereoPair, memory};
+use bp_core::{DataCost, Error, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
     coarsen::coarsen, costs::Costs, greys::Greys, grid::Grid, match_cost::match_cost, messages::Messages,
-    refine::refine, select_labels::select_labels, update_messages::update_messages,
+    refine::refine, seams::Seams, select_labels::select_labels, update_messages::update_messages,
 };
 
 /// A prepared plan.
@@ -18,6 +18,7 @@ pub(crate) struct ScalarSolver {
     /// The messages of even grids and, if the plan has several grids, of odd ones: only a grid and the next coarser one are
     /// needed at the same time.
     messages: Vec<Messages>,
+    seams: Seams,
     scratch: Vec<u64>,
     h: Vec<u8>,
 }
@@ -31,6 +32,7 @@ impl ScalarSolver {
             costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid)).collect::<Result<_, _>>()?,
             greys: (0..plan.grids()).map(|grid| Greys::new(plan, grid)).collect::<Result<_, _>>()?,
             messages: (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid)).collect::<Result<_, _>>()?,
+            seams: Seams::new(plan)?,
             scratch: memory::filled("one node's costs", labels, 0)?,
             h: memory::filled("one node's message", labels, 0)?,
             plan: plan.clone(),
@@ -55,11 +57,12 @@ impl Solver for ScalarSolver {
     }
 
     fn refine(&mut self, grid: usize) -> Result<(), Error> {
-        if grid + 1 == self.plan.grids() {
-            self.messages[grid % 2].clear(self.plan.size(grid).pixels());
-        } else if let [even, odd] = self.messages.as_mut_slice() {
-            let (fine, coarse) = if grid.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-            refine(&self.plan, grid, coarse, fine);
+        let height = self.plan.size(grid).height;
+        self.first_messages(grid, 0..height);
+        if self.plan.settings().schedule == Schedule::Sweep {
+            self.with_seams(grid, |seams, grid, messages, h| seams.prepare(grid, messages, h));
+            Seam::all(height).for_each(|seam| self.first_messages(grid, seam.rows()));
+            self.with_seams(grid, |seams, grid, messages, _| seams.apply(grid, messages));
         }
         Ok(())
     }
@@ -72,17 +75,19 @@ impl Solver for ScalarSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
             let messages = &mut self.messages[grid % 2];
-            let size = self.plan.size(grid);
-            let grid = Grid { plan: &self.plan, index: grid, size, costs: &self.costs[grid], greys: &self.greys[grid] };
-            update_messages(&grid, step, messages, &mut self.h);
+            let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
+            update_messages(&on, step, messages, &mut self.h);
+            if self.plan.settings().schedule == Schedule::Sweep && step + 1 == self.plan.settings().steps {
+                // The messages down across seams count no longer.
+                messages.clear_side(Side::Up);
+            }
         }
         Ok(())
     }
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        let size = self.plan.image_size();
-        let grid = Grid { plan: &self.plan, index: 0, size, costs: &self.costs[0], greys: &self.greys[0] };
-        select_labels(&grid, &self.messages[0], labels, &mut self.h);
+        let grid = on_grid(&self.plan, 0, &self.costs, &self.greys);
+        select_labels(&grid, &self.messages[0], &self.seams, labels, &mut self.h);
         Ok(())
     }
 
@@ -100,6 +105,29 @@ impl Solver for ScalarSolver {
         let greys: u64 = self.greys.iter().map(Greys::bytes).sum();
         let messages: u64 = self.messages.iter().map(Messages::bytes).sum();
         let scratch = memory::bytes(&self.scratch) + memory::bytes(&self.h);
-        self.data_cost.bytes() + costs + greys + messages + scratch
+        self.data_cost.bytes() + costs + greys + messages + self.seams.bytes() + scratch
     }
+}
+
+impl ScalarSolver {
+    /// Writes the first messages of these rows of a grid.
+    fn first_messages(&mut self, grid: usize, rows: Range<usize>) {
+        if grid + 1 == self.plan.grids() {
+            let width = self.plan.size(grid).width;
+            self.messages[grid % 2].clear(rows.start * width..rows.end * width);
+        } else if let [even, odd] = self.messages.as_mut_slice() {
+            let (fine, coarse) = if grid.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+            refine(&self.plan, grid, rows, coarse, fine);
+        }
+    }
+
+    fn with_seams(&mut self, grid: usize, run: impl FnOnce(&mut Seams, &Grid<'_>, &mut Messages, &mut [u8])) {
+        let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
+        run(&mut self.seams, &on, &mut self.messages[grid % 2], &mut self.h);
+    }
+}
+
+/// A grid with its costs and grey values.
+fn on_grid<'a>(plan: &'a Plan, index: usize, costs: &'a [Costs], greys: &'a [Greys]) -> Grid<'a> {
+    Grid { plan, index, size: plan.size(index), costs: &costs[index], greys: &greys[index] }
 }

@@ -1,5 +1,7 @@
 //! Message passing under the schedule `sweep`.
 
+use std::ops::Range;
+
 use bp_core::{BAND_ROWS, Side};
 
 use crate::{
@@ -13,33 +15,41 @@ pub(crate) fn sweep(grid: &Grid<'_>, messages: &mut Messages, h: &mut [u8]) {
     let height = grid.size.height;
     let mut sweep = Sweep { grid, messages, h };
     for first in (0..height).step_by(BAND_ROWS) {
-        sweep.band(first, (first + BAND_ROWS).min(height) - 1);
+        let end = (first + BAND_ROWS).min(height);
+        sweep.forward(first..end);
+        sweep.backward(first + 1..end, true);
+        sweep.backward(first..first + 1, false);
     }
 }
 
-/// A loop over one grid.
-struct Sweep<'a> {
-    grid: &'a Grid<'a>,
-    messages: &'a mut Messages,
-    h: &'a mut [u8],
+/// Passes over rows of one grid.
+pub(crate) struct Sweep<'a> {
+    pub(crate) grid: &'a Grid<'a>,
+    pub(crate) messages: &'a mut Messages,
+    pub(crate) h: &'a mut [u8],
 }
 
 impl Sweep<'_> {
-    /// Passes forward and backward through the band from row `first` to row `last`.
-    fn band(&mut self, first: usize, last: usize) {
-        for y in first..last {
+    /// Passes down these rows. The last one sends nothing down.
+    pub(crate) fn forward(&mut self, rows: Range<usize>) {
+        for y in rows.start..rows.end - 1 {
             self.send_from(y, Parity::Even, &[Side::Left, Side::Right, Side::Down]);
             self.send_from(y, Parity::Odd, &[Side::Down]);
         }
-        self.send_from(last, Parity::Even, &[Side::Left, Side::Right]);
-        for y in (first + 1..=last).rev() {
-            self.send_from(y, Parity::Odd, &[Side::Left, Side::Right, Side::Up]);
-            self.send_from(y, Parity::Even, &[Side::Up]);
-        }
-        self.send_from(first, Parity::Odd, &[Side::Left, Side::Right]);
+        self.send_from(rows.end - 1, Parity::Even, &[Side::Left, Side::Right]);
     }
 
-    /// Sends from the even or the odd nodes of row y to these sides.
+    /// Passes up these rows, which send up only if `onward`.
+    pub(crate) fn backward(&mut self, rows: Range<usize>, onward: bool) {
+        let up: &[Side] = if onward { &[Side::Up] } else { &[] };
+        let sides: &[Side] = if onward { &[Side::Left, Side::Right, Side::Up] } else { &[Side::Left, Side::Right] };
+        for y in rows.rev() {
+            self.send_from(y, Parity::Odd, sides);
+            self.send_from(y, Parity::Even, up);
+        }
+    }
+
+    /// Sends messages from the even or the odd nodes of row y to these sides.
     fn send_from(&mut self, y: usize, parity: Parity, sides: &[Side]) {
         let size = self.grid.size;
         for node in row_nodes(size, y, parity) {
@@ -49,7 +59,7 @@ impl Sweep<'_> {
                 let slot = self.messages.received_mut(size.index(receiver), to.opposite());
                 self.grid.send(node, receiver, self.h, slot);
             }
-            // Clear received messages only now: a message from one side is part of the messages to the others.
+            // Not earlier: a message received from one side is part of those sent to the others.
             for &to in sides {
                 self.messages.received_mut(size.index(node), to).fill(0);
             }

@@ -59,6 +59,8 @@ parameters! {
     cut_y: u32,
     /// The sides to send to, one bit each.
     sends: u32,
+    /// 1 if the rows above have labels, under the schedule `sweep`.
+    labels_above: u32,
     /// The one side whose messages are refined.
     side: u32,
     /// Columns of the grid that is read.

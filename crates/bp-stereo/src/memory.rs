@@ -1,6 +1,6 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Likeness, Plan, Schedule, Size, Tiling};
+use bp_core::{Plan, Schedule, Size, Tiling};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory};
 
@@ -95,7 +95,7 @@ pub(crate) fn fitted(
         check_whole(beside, &whole, limit.bytes)?;
         let whole = whole.map_or_else(|error| error.to_string(), |bytes| format!("needs {}", iec(bytes)));
         let text = format!("the whole image {whole}: matching {} in {}", described(&tiling), iec(peak_bytes));
-        if tiling.likeness() == Likeness::Same { watch.note(&text) } else { watch.warn(&text) }
+        watch.warn(&text);
     }
     Ok(Fitted { tiling, peak_bytes })
 }

@@ -17,6 +17,7 @@
 mod case;
 mod cases;
 mod difference;
+pub mod jumps;
 mod noise;
 mod oracle;
 mod random;

@@ -94,6 +94,9 @@ impl Solver for State {
                 self.grids[grid].received[i][side as usize] = message;
             }
         }
+        if self.plan.settings().schedule == Schedule::Sweep {
+            self.prepare_seams(grid);
+        }
         Ok(())
     }
 
@@ -104,7 +107,12 @@ impl Solver for State {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         steps.for_each(|step| match self.plan.settings().schedule {
             Schedule::Sync | Schedule::Checkerboard => self.step(grid, step),
-            Schedule::Sweep => self.sweep(grid),
+            Schedule::Sweep => {
+                self.sweep(grid);
+                if step + 1 == self.plan.settings().steps {
+                    self.forget_downward(grid);
+                }
+            }
         });
         Ok(())
     }

@@ -1,26 +1,25 @@
 //! How a plan is cut into tiles. This is decided before anything runs.
 
 use super::tile::{Margin, Span, Tile, distinct, spans};
-use crate::{BAND_ROWS, Error, Plan, Schedule, Size};
+use crate::{Error, Plan, Schedule, Size};
 
 /// Tiles begin at multiples of this many columns and rows, so that on up to five grids their nodes have the same children
 /// and the same colour as in the whole image.
 const ALIGN: usize = 32;
 
-/// The columns that a tile matches on each side of those that it keeps. The same applies to rows, except under `sweep`.
+/// The columns that a tile matches on each side of those that it keeps, and its rows above and below.
 pub const HALO: usize = 96;
+
+/// The same for rows under [`Schedule::Sweep`], where less reaches a row from far above or below.
+const SWEPT_ROWS_HALO: usize = 64;
 
 /// How close the result of tiles comes to that of the whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Likeness {
-    /// Bit-identical. Either there is one tile, or there are strips under [`Schedule::Sweep`] that begin at seams of
-    /// the coarsest grid: a band depends only on the bands that cover it on coarser grids. A known match rules strips
-    /// out, because it sets costs on both sides of a cut, which may be a seam.
+    /// Bit-identical: there is one tile.
     Same,
-    /// Nearly the same: only pixels beyond the halo have no influence.
+    /// Nearly the same, and as accurate: only pixels beyond the halo have no influence.
     Near,
-    /// Less similar: the tiles cut through bands of coarser grids under [`Schedule::Sweep`].
-    Rough,
 }
 
 impl Likeness {
@@ -30,7 +29,6 @@ impl Likeness {
         match self {
             Self::Same => "the whole image's answer",
             Self::Near => "nearly the whole image's answer",
-            Self::Rough => "a less accurate answer",
         }
     }
 }
@@ -51,10 +49,10 @@ impl Tiling {
         Self { plan, columns: spans(width, width, Margin::default()), rows: spans(height, height, Margin::default()) }
     }
 
-    /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32, with at least `halo` columns around
-    /// them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
-    /// keeps have the same costs as in the whole image; likewise on the right. Rows have a halo too, except under
-    /// [`Schedule::Sweep`], where bands of rows do not depend on each other.
+    /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32, with at least `halo` columns and rows
+    /// around them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
+    /// keeps have the same costs as in the whole image; likewise on the right. Under [`Schedule::Sweep`] no halo has more
+    /// than 64 rows.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
         let Size { width, height } = plan.image_size();
@@ -62,19 +60,14 @@ impl Tiling {
         let [left, right] = [model.disparity(model.labels() as u16 - 1), -model.min_disparity()]
             .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(ALIGN));
         let swept = plan.settings().schedule == Schedule::Sweep;
-        let beyond = if swept { 0 } else { halo.next_multiple_of(ALIGN) };
+        let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(ALIGN);
         let columns = spans(width, kept.width.next_multiple_of(ALIGN), Margin { before: left, after: right });
         let rows = spans(height, kept.height.next_multiple_of(ALIGN), Margin { before: beyond, after: beyond });
         Self { plan, columns, rows }
     }
 
-    /// The tiling that runs within `bytes`. `needed` returns how many bytes a device needs for a plan, or why it cannot
-    /// run it. Takes the first of these that fits:
-    ///
-    /// 1. the whole image;
-    /// 2. the fewest strips of rows that give the same result; see [`Likeness::Same`];
-    /// 3. tiles with a halo of [`HALO`]: those with the least total work. Under [`Schedule::Sweep`], it prefers the
-    ///    tallest tiles whose work is at most four times that of the whole image.
+    /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that need the least
+    /// work in total. `needed` returns how many bytes a device needs for a plan, or why it cannot run it.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] with the bytes that the smallest tiles need, or the reason why they cannot run.
@@ -84,14 +77,8 @@ impl Tiling {
         if fits(&whole) {
             return Ok(whole);
         }
-        if let Some(strips) = exact_strips(plan, fits) {
-            return Ok(strips);
-        }
-        let tiles: Vec<Self> = heights(plan).filter_map(|height| widest(plan, height, fits)).collect();
-        let swept = plan.settings().schedule == Schedule::Sweep;
-        let high = tiles.iter().position(|tiling| swept && tiling.work() <= 4.0);
-        let least = (0..tiles.len()).min_by(|&a, &b| tiles[a].work().total_cmp(&tiles[b].work()));
-        match high.or(least).and_then(|index| tiles.into_iter().nth(index)) {
+        let tiles = heights(plan).filter_map(|height| widest(plan, height, fits));
+        match tiles.min_by(|a, b| a.work().total_cmp(&b.work())) {
             Some(tiling) => Ok(tiling),
             None => {
                 let smallest = Self::cut(plan.clone(), Size { width: 1, height: 1 }, HALO);
@@ -140,15 +127,7 @@ impl Tiling {
     /// How close the result comes to that of the whole image.
     #[must_use]
     pub fn likeness(&self) -> Likeness {
-        let swept = self.plan.settings().schedule == Schedule::Sweep;
-        let unit = exact_rows(&self.plan);
-        let seeded = self.plan.settings().cut.is_some_and(|cut| cut.seed_start);
-        match self.rows.iter().all(|rows| rows.all.start.is_multiple_of(unit)) {
-            _ if self.is_whole() => Likeness::Same,
-            true if swept && self.columns.len() == 1 && !seeded => Likeness::Same,
-            false if swept => Likeness::Rough,
-            _ => Likeness::Near,
-        }
+        if self.is_whole() { Likeness::Same } else { Likeness::Near }
     }
 
     /// The message entries that all tiles compute.
@@ -188,29 +167,9 @@ impl Tiling {
 /// Returns how many bytes a device needs for a plan, or why it cannot run it.
 pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
 
-/// The rows of the image that a band of the coarsest grid covers.
-fn exact_rows(plan: &Plan) -> usize {
-    BAND_ROWS << (plan.grids() - 1)
-}
-
-/// The fewest exact strips that fit.
-fn exact_strips(plan: &Plan, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
-    let (size, unit) = (plan.image_size(), exact_rows(plan));
-    let strips = |units: usize| Tiling::cut(plan.clone(), Size { width: size.width, height: units * unit }, 0);
-    let swept = plan.settings().schedule == Schedule::Sweep;
-    if !swept || size.height <= unit {
-        return None;
-    }
-    evenly(size.height.div_ceil(unit), |units| fits(&strips(units))).map(strips)
-}
-
 /// Heights of tiles to try, the tallest first.
 fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
-    let height = plan.image_size().height;
-    let highest = match plan.settings().schedule {
-        Schedule::Sweep => exact_rows(plan),
-        Schedule::Sync | Schedule::Checkerboard => height.next_multiple_of(ALIGN),
-    };
+    let highest = plan.image_size().height.next_multiple_of(ALIGN);
     std::iter::successors(Some(highest), |&rows| (rows > ALIGN).then(|| rows.div_ceil(2).next_multiple_of(ALIGN)))
 }
 
@@ -239,7 +198,7 @@ fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Cut, Model, Profile, Settings};
+    use crate::{Algorithm, Cut, Model, Profile};
 
     fn plan((width, height): (usize, usize), labels: usize, algorithm: Algorithm) -> Plan {
         let size = Size { width, height };
@@ -258,25 +217,22 @@ mod tests {
     }
 
     #[test]
-    fn less_memory_means_strips_then_tiles_then_an_error_that_names_the_least() {
+    fn less_memory_means_smaller_tiles_then_an_error_that_names_the_least() {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let whole = plan.bytes();
         assert_eq!(within(&plan, whole).likeness(), Likeness::Same);
-        for (bytes, counts, likeness) in [
-            (whole - 1, (1, 2), Likeness::Same),
-            (whole / 2, (1, 3), Likeness::Same),
-            (whole / 5, (1, 6), Likeness::Same),
-            (whole / 8, (2, 6), Likeness::Near),
-            (whole / 40, (6, 24), Likeness::Rough),
-        ] {
+        let mut work = 1.0;
+        for (bytes, counts) in [(whole - 1, (1, 2)), (whole / 2, (1, 4)), (whole / 5, (1, 8))] {
             let tiling = within(&plan, bytes);
-            assert_eq!((tiling.counts(), tiling.likeness()), (counts, likeness), "{bytes}");
+            assert_eq!((tiling.counts(), tiling.likeness()), (counts, Likeness::Near), "{bytes}");
+            assert!(tiling.work() > work);
+            work = tiling.work();
         }
         let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed) else {
             panic!()
         };
         assert_eq!(available, Some(1));
-        assert_eq!(within(&plan, least).likeness(), Likeness::Rough);
+        assert_eq!(within(&plan, least).likeness(), Likeness::Near);
         assert!(Tiling::within(&plan, least - 1, &needed).is_err());
     }
 
@@ -342,16 +298,5 @@ mod tests {
         assert!(cuts.contains(&(64, 64, cut(36, 0, false))));
         assert!(cuts.contains(&(0, 0, cut(0, 50, false))));
         assert!(cuts.contains(&(0, 64, None)));
-    }
-    #[test]
-    fn a_known_match_on_a_seam_is_not_promised_to_be_the_whole_images() {
-        let size = Size { width: 3, height: 192 };
-        let seeded = |seed_start| {
-            let cut = Some(Cut { x: 1, y: 96, seed_start });
-            let settings = Settings { grids: 1, cut, ..Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep) };
-            let plan = Plan::new(size, Model::new(Profile::Census, 4).unwrap(), settings).unwrap();
-            Tiling::cut(plan, Size { width: 3, height: 32 }, 0).likeness()
-        };
-        assert_eq!([true, false].map(seeded), [Likeness::Near, Likeness::Same]);
     }
 }

@@ -45,12 +45,8 @@ impl Composer<'_> {
 
     pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
         let sweep = self.plan.settings().schedule == Schedule::Sweep;
-        let constants = vec![
-            ("SATURATING", self.saturates(4, 0)),
-            ("SWEEP", sweep.into()),
-            self.looks_for_weak_edges(),
-            ("BAND_ROWS", bp_core::BAND_ROWS as u32),
-        ];
+        let constants =
+            vec![("SATURATING", self.saturates(4, 0)), ("SWEEP", sweep.into()), self.looks_for_weak_edges()];
         let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);

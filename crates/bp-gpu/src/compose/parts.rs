@@ -118,18 +118,23 @@ impl Composer<'_> {
 
     pub(super) fn refine(&mut self, part: &mut PartRecorder, grid: usize) {
         for (nodes, side) in self.nodes(grid).flat_map(|nodes| Side::ALL.map(|side| (nodes, side))) {
-            let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
-            if grid + 1 == self.plan.grids() || !self.starts(nodes, side) {
-                part.push_short(Command::Clear { buffer: sent });
+            if self.starts(nodes, side) && grid + 1 < self.plan.grids() {
+                let count = self.grids[grid].strips[nodes.strip].rows;
+                self.refine_rows(part, nodes, side, Rows { first: 0, step: 1, count });
             } else {
-                self.refine_side(part, nodes, side, sent);
+                let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
+                part.push_short(Command::Clear { buffer: sent });
             }
         }
-        self.join_strips(part, grid, 0, &[0, 1]);
+        self.join_strips(part, grid, 0, &[Side::Up, Side::Down]);
+        if self.plan.settings().schedule == Schedule::Sweep {
+            part.push_short(Command::Barrier);
+            self.prepare_seams(part, grid);
+        }
     }
 
     /// Whether these nodes start with the messages of the coarser grid to that side; see [`Schedule::Sweep`].
-    fn starts(&self, nodes: Nodes, side: Side) -> bool {
+    pub(super) fn starts(&self, nodes: Nodes, side: Side) -> bool {
         self.plan.settings().schedule != Schedule::Sweep
             || match side {
                 Side::Up => true,
@@ -138,19 +143,27 @@ impl Composer<'_> {
             }
     }
 
-    fn refine_side(&mut self, part: &mut PartRecorder, nodes: Nodes, side: Side, sent: usize) {
+    /// Records the first messages that these rows send to a side.
+    pub(super) fn refine_rows(&mut self, part: &mut PartRecorder, nodes: Nodes, side: Side, rows: Rows) {
         let settings = self.plan.settings();
-        let start = match settings.message_start {
-            _ if settings.schedule == Schedule::Sweep => 2,
-            MessageStart::Receiver => 0,
-            MessageStart::Sender => 1,
-        };
-        let coarse = &self.grids[nodes.grid + 1];
-        let from = coarse.strip_of(self.grids[nodes.grid].strips[nodes.strip].first / 2);
-        let planes = &self.buffers.strips[nodes.grid + 1][from].sent[self.set(settings.steps)][side as usize];
-        let mut work = self.reading(self.all_rows(nodes), nodes.grid + 1, coarse.strips[from]);
+        let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
+        let mut work = self.work(nodes, rows);
         work.parameters.side = side as u32;
         work.row_invocations = work.row_invocations.div_ceil(2);
+        let (start, planes) = match self.grids.get(nodes.grid + 1) {
+            Some(coarse) => {
+                let from = coarse.strip_of(self.grids[nodes.grid].strips[nodes.strip].first / 2);
+                work = self.reading(work, nodes.grid + 1, coarse.strips[from]);
+                let sent = &self.buffers.strips[nodes.grid + 1][from].sent[self.set(settings.steps)];
+                let start = match settings.message_start {
+                    _ if settings.schedule == Schedule::Sweep => 2,
+                    MessageStart::Receiver => 0,
+                    MessageStart::Sender => 1,
+                };
+                (start, sent[side as usize])
+            }
+            None => (3, [self.buffers.unused; 2]),
+        };
         let pipeline = Pipeline { kernel: Kernel::Refine, constants: vec![("START", start)] };
         self.dispatch(part, pipeline, vec![sent, planes[0], planes[1]], work);
     }
@@ -161,13 +174,13 @@ impl Composer<'_> {
         match self.plan.settings().schedule {
             Schedule::Sync => {
                 self.nodes(grid).for_each(|nodes| self.update(part, nodes, read, written));
-                self.join_strips(part, grid, written, &[0, 1]);
+                self.join_strips(part, grid, written, &[Side::Up, Side::Down]);
             }
             Schedule::Checkerboard => {
                 let colour = step as usize % 2;
                 let nodes = self.nodes(grid).filter(|nodes| nodes.colour == colour);
                 nodes.for_each(|nodes| self.update(part, nodes, read, written));
-                self.join_strips(part, grid, written, &[colour]);
+                self.join_strips(part, grid, written, &[Side::Up, Side::Down]);
             }
             Schedule::Sweep => self.sweep(part, grid),
         }
@@ -179,8 +192,8 @@ impl Composer<'_> {
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }
 
-    /// Copies messages that cross the border between two strips to the buffers of the other strip.
-    fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, colours: &[usize]) {
+    /// Copies the messages to these sides in the rows beside the border of two strips to the buffers of the other strip.
+    pub(super) fn join_strips(&self, part: &mut PartRecorder, grid: usize, set: usize, sides: &[Side]) {
         let (layout, strips) = (&self.grids[grid], &self.buffers.strips[grid]);
         let bytes = layout.row_bytes();
         for upper in 0..strips.len() - 1 {
@@ -188,21 +201,16 @@ impl Composer<'_> {
                 part.push_short(Command::Barrier);
             }
             let rows = layout.strips[upper].rows as u64;
-            for &colour in colours {
-                let buffer = |strip: usize, side: Side| strips[strip].sent[set][side as usize][colour];
-                let mut copy = |side, (from, from_row), (to, to_row)| {
-                    let (from, to) = (buffer(from, side), buffer(to, side));
-                    part.push_short(Command::Copy {
-                        from,
-                        from_offset: from_row * bytes,
-                        to,
-                        to_offset: to_row * bytes,
-                        bytes,
-                    });
+            for (&side, colour) in sides.iter().flat_map(|side| [0, 1].map(|colour| (side, colour))) {
+                let buffer = |strip: usize| strips[strip].sent[set][side as usize][colour];
+                let mut copy = |from, from_row: u64, to, to_row: u64| {
+                    let (from, to) = (buffer(from), buffer(to));
+                    let (from_offset, to_offset) = (from_row * bytes, to_row * bytes);
+                    part.push_short(Command::Copy { from, from_offset, to, to_offset, bytes });
                 };
                 // Row 0 of a strip is the second row of its planes.
-                copy(Side::Down, (upper, rows), (upper + 1, 0));
-                copy(Side::Up, (upper + 1, 1), (upper, rows + 1));
+                copy(upper, rows, upper + 1, 0);
+                copy(upper + 1, 1, upper, rows + 1);
             }
         }
     }

@@ -1,39 +1,108 @@
-//! The schedule `sweep`: processes all bands at the same time, and their rows one after another.
+//! The schedule `sweep`: all bands at the same time, their rows one after another.
 
-use bp_core::{BAND_ROWS, Side};
+use bp_core::{BAND_ROWS, Seam, Side};
 
 use super::{
     composer::{Composer, Nodes, Rows},
     recorder::PartRecorder,
 };
-use crate::Command;
+use crate::{Command, layout::Strip};
 
 const EVEN: usize = 0;
 const ODD: usize = 1;
+const HORIZONTAL: [Side; 2] = [Side::Left, Side::Right];
+const FORWARD: [Side; 3] = [Side::Left, Side::Right, Side::Down];
+const BACKWARD: [Side; 3] = [Side::Left, Side::Right, Side::Up];
 
-/// The nodes of one colour in the same row of every band of a grid.
+/// Which bands take part.
+#[derive(Clone, Copy)]
+enum Bands {
+    All,
+    /// Those with a seam above.
+    BelowSeams,
+    /// Those with a seam below.
+    AboveSeams,
+}
+
+/// The nodes of one colour in the same row of some bands of a grid.
 #[derive(Clone, Copy)]
 struct BandRow {
     grid: usize,
+    bands: Bands,
     colour: usize,
     /// Counted from the first row of the band.
     row: usize,
 }
 
 impl Composer<'_> {
-    /// Records one loop on a grid: forward and backward through every band; see [`bp_core::Schedule::Sweep`].
+    /// Records one loop on a grid, forward and backward through every band; see [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, part: &mut PartRecorder, grid: usize) {
-        let (last, horizontal) = (BAND_ROWS - 1, [Side::Left, Side::Right]);
+        let (bands, last) = (Bands::All, BAND_ROWS - 1);
         for row in 0..last {
-            self.send(part, BandRow { grid, colour: EVEN, row }, &[Side::Left, Side::Right, Side::Down]);
-            self.send(part, BandRow { grid, colour: ODD, row }, &[Side::Down]);
+            self.forward(part, grid, bands, row);
         }
-        self.send(part, BandRow { grid, colour: EVEN, row: last }, &horizontal);
+        self.send(part, BandRow { grid, bands, colour: EVEN, row: last }, &HORIZONTAL);
         for row in (1..=last).rev() {
-            self.send(part, BandRow { grid, colour: ODD, row }, &[Side::Left, Side::Right, Side::Up]);
-            self.send(part, BandRow { grid, colour: EVEN, row }, &[Side::Up]);
+            self.backward(part, grid, bands, row);
         }
-        self.send(part, BandRow { grid, colour: ODD, row: 0 }, &horizontal);
+        self.send(part, BandRow { grid, bands, colour: ODD, row: 0 }, &HORIZONTAL);
+        // The finer grid's first messages are interpolated between rows, also across strips.
+        self.join_strips(part, grid, 0, &[Side::Left, Side::Right, Side::Up]);
+    }
+
+    /// Records what is done for all seams of a grid before its first loop; see [`Seam`]. A message is stored with its sender,
+    /// and loops send nothing across seams, so the messages across them stay. What else the first messages need is written
+    /// again afterwards.
+    pub(super) fn prepare_seams(&mut self, part: &mut PartRecorder, grid: usize) {
+        if Seam::all(self.grids[grid].size.height).len() == 0 {
+            return;
+        }
+        let last_below = Seam::ROWS_BELOW - 1;
+        let labelled = BAND_ROWS - Seam::LABEL_ROWS..BAND_ROWS;
+        for row in BAND_ROWS - Seam::ROWS_ABOVE..BAND_ROWS {
+            self.forward(part, grid, Bands::AboveSeams, row);
+        }
+        self.join_strips(part, grid, 0, &[Side::Down]);
+        part.push_short(Command::Barrier);
+        for row in 0..last_below {
+            self.forward(part, grid, Bands::BelowSeams, row);
+        }
+        self.send(part, BandRow { grid, bands: Bands::BelowSeams, colour: EVEN, row: last_below }, &HORIZONTAL);
+        for row in (0..Seam::ROWS_BELOW).rev() {
+            self.backward(part, grid, Bands::BelowSeams, row);
+        }
+        self.join_strips(part, grid, 0, &[Side::Up]);
+        part.push_short(Command::Barrier);
+        if grid == 0 {
+            for row in labelled.clone().rev() {
+                self.backward(part, grid, Bands::AboveSeams, row);
+            }
+            self.decode_rows(part, Bands::AboveSeams, labelled.clone());
+            labelled.for_each(|row| self.refine_again(part, grid, Bands::AboveSeams, row, &BACKWARD));
+        }
+        self.refine_again(part, grid, Bands::BelowSeams, 0, &HORIZONTAL);
+        (1..Seam::ROWS_BELOW).for_each(|row| self.refine_again(part, grid, Bands::BelowSeams, row, &BACKWARD));
+        part.push_short(Command::Barrier);
+    }
+
+    fn refine_again(&mut self, part: &mut PartRecorder, grid: usize, bands: Bands, row: usize, sides: &[Side]) {
+        for (colour, &side) in [EVEN, ODD].into_iter().flat_map(|colour| sides.iter().map(move |side| (colour, side))) {
+            for (nodes, rows) in self.band_rows(BandRow { grid, bands, colour, row }) {
+                if self.starts(nodes, side) {
+                    self.refine_rows(part, nodes, side, rows);
+                }
+            }
+        }
+    }
+
+    fn forward(&mut self, part: &mut PartRecorder, grid: usize, bands: Bands, row: usize) {
+        self.send(part, BandRow { grid, bands, colour: EVEN, row }, &FORWARD);
+        self.send(part, BandRow { grid, bands, colour: ODD, row }, &[Side::Down]);
+    }
+
+    fn backward(&mut self, part: &mut PartRecorder, grid: usize, bands: Bands, row: usize) {
+        self.send(part, BandRow { grid, bands, colour: ODD, row }, &BACKWARD);
+        self.send(part, BandRow { grid, bands, colour: EVEN, row }, &[Side::Up]);
     }
 
     /// Records that these nodes send to these sides.
@@ -48,11 +117,27 @@ impl Composer<'_> {
         part.push_short(Command::Barrier);
     }
 
-    /// Records label selection in every band from its top row to its bottom row, in each row first for even nodes.
+    /// Records the labels of every band. Above its first row are the labels that were decided for the seam.
     pub(super) fn decode(&mut self, part: &mut PartRecorder) {
-        for (row, colour) in (0..BAND_ROWS).flat_map(|row| [(row, EVEN), (row, ODD)]) {
-            for (nodes, rows) in self.band_rows(BandRow { grid: 0, colour, row }) {
-                self.select(part, nodes, self.work(nodes, rows));
+        for row in 0..BAND_ROWS {
+            self.decode_row(part, Bands::All, row, true);
+        }
+    }
+
+    /// Records the labels of these rows, which have no labels above them.
+    fn decode_rows(&mut self, part: &mut PartRecorder, bands: Bands, rows: std::ops::Range<usize>) {
+        for row in rows.clone() {
+            self.decode_row(part, bands, row, row > rows.start);
+        }
+    }
+
+    /// Records the labels of a row, first for its even nodes.
+    fn decode_row(&mut self, part: &mut PartRecorder, bands: Bands, row: usize, labels_above: bool) {
+        for colour in [EVEN, ODD] {
+            for (nodes, rows) in self.band_rows(BandRow { grid: 0, bands, colour, row }) {
+                let mut work = self.work(nodes, rows);
+                work.parameters.labels_above = labels_above.into();
+                self.select(part, nodes, work);
             }
             part.push_short(Command::Barrier);
         }
@@ -60,11 +145,15 @@ impl Composer<'_> {
 
     /// The nodes and rows of a [`BandRow`] in each strip that has any. Strips begin with a band.
     fn band_rows(&self, at: BandRow) -> Vec<(Nodes, Rows)> {
-        let BandRow { grid, colour, row } = at;
+        let BandRow { grid, bands, colour, row } = at;
+        let seams = Seam::all(self.grids[grid].size.height).len();
         let strips = self.grids[grid].strips.iter().enumerate();
-        let rows = strips.map(|(strip, &layout)| {
-            let count = layout.rows.saturating_sub(row).div_ceil(BAND_ROWS);
-            (Nodes { grid, strip, colour }, Rows { first: row, step: BAND_ROWS, count })
+        let rows = strips.map(|(strip, &Strip { first, rows })| {
+            let bands_before = first / BAND_ROWS;
+            let skipped = usize::from(matches!(bands, Bands::BelowSeams) && bands_before == 0);
+            let most = if matches!(bands, Bands::AboveSeams) { seams - seams.min(bands_before) } else { usize::MAX };
+            let count = rows.saturating_sub(row).div_ceil(BAND_ROWS).min(most).saturating_sub(skipped);
+            (Nodes { grid, strip, colour }, Rows { first: row + skipped * BAND_ROWS, step: BAND_ROWS, count })
         });
         rows.filter(|(_, rows)| rows.count > 0).collect()
     }

@@ -17,6 +17,8 @@ pub(super) struct Grid {
 pub(super) struct State {
     pub(super) plan: Plan,
     pub(super) grids: Vec<Grid>,
+    /// The labels that were decided for the rows above seams, `[height][width]`.
+    pub(super) above_seams: Vec<u16>,
 }
 
 impl State {
@@ -31,7 +33,8 @@ impl State {
                 plan.size(grid).pixels()
             ],
         };
-        Self { grids: (0..plan.grids()).map(grid).collect(), plan: plan.clone() }
+        let above_seams = vec![0; plan.image_size().pixels()];
+        Self { grids: (0..plan.grids()).map(grid).collect(), above_seams, plan: plan.clone() }
     }
 
     /// The index of a node in the lists of its grid.

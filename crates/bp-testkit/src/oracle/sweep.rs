@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Node, Side};
+use bp_core::{BAND_ROWS, Node, Seam, Side};
 
 use super::state::State;
 
@@ -15,10 +15,52 @@ fn row_nodes(width: usize, y: usize, parity: usize) -> impl Iterator<Item = Node
 }
 
 impl State {
+    /// Prepares all seams; see [`Seam`].
+    pub(super) fn prepare_seams(&mut self, grid: usize) {
+        for seam in Seam::all(self.plan.size(grid).height) {
+            let first_messages = self.grids[grid].received.clone();
+            self.forward(grid, seam.rows());
+            let down = self.row(grid, seam.below, Side::Up);
+            self.backward(grid, seam.rows_below(), Some(Side::Up));
+            let up = self.row(grid, seam.below - 1, Side::Down);
+            if grid == 0 {
+                self.backward(grid, seam.label_rows(), Some(Side::Up));
+                let mut labels = std::mem::take(&mut self.above_seams);
+                self.decide_rows(seam.label_rows(), false, &mut labels);
+                self.above_seams = labels;
+            }
+            self.grids[grid].received = first_messages;
+            self.set_row(grid, seam.below, Side::Up, down);
+            self.set_row(grid, seam.below - 1, Side::Down, up);
+        }
+    }
+
+    /// The messages that row y received from a side.
+    fn row(&self, grid: usize, y: usize, side: Side) -> Vec<Vec<i64>> {
+        let nodes = (0..self.plan.size(grid).width).map(|x| self.index(grid, Node { x, y }));
+        nodes.map(|node| self.grids[grid].received[node][side as usize].clone()).collect()
+    }
+
+    fn set_row(&mut self, grid: usize, y: usize, side: Side, messages: Vec<Vec<i64>>) {
+        for (x, message) in messages.into_iter().enumerate() {
+            let node = self.index(grid, Node { x, y });
+            self.grids[grid].received[node][side as usize] = message;
+        }
+    }
+
     /// One loop of [`bp_core::Schedule::Sweep`].
     pub(super) fn sweep(&mut self, grid: usize) {
         for rows in self.bands(grid) {
-            self.sweep_band(grid, rows);
+            self.forward(grid, rows.clone());
+            self.backward(grid, rows.start + 1..rows.end, Some(Side::Up));
+            self.backward(grid, rows.start..rows.start + 1, None);
+        }
+    }
+
+    /// Forgets the downward messages of seams, after the last loop.
+    pub(super) fn forget_downward(&mut self, grid: usize) {
+        for received in &mut self.grids[grid].received {
+            received[Side::Up as usize].fill(0);
         }
     }
 
@@ -28,23 +70,24 @@ impl State {
         (0..height.div_ceil(BAND_ROWS)).map(|b| BAND_ROWS * b..height.min(BAND_ROWS * b + BAND_ROWS)).collect()
     }
 
-    fn sweep_band(&mut self, grid: usize, rows: Range<usize>) {
-        let (first, last) = (rows.start, rows.end - 1);
+    /// Forward over rows, of which the last sends nothing down.
+    fn forward(&mut self, grid: usize, rows: Range<usize>) {
         for y in rows.clone() {
-            if y < last {
+            if y + 1 < rows.end {
                 self.send_row(grid, y, EVEN, &[Side::Left, Side::Right, Side::Down]);
                 self.send_row(grid, y, ODD, &[Side::Down]);
             } else {
                 self.send_row(grid, y, EVEN, &[Side::Left, Side::Right]);
             }
         }
+    }
+
+    /// Backward over rows, which also send `onward`.
+    fn backward(&mut self, grid: usize, rows: Range<usize>, onward: Option<Side>) {
+        let sides: Vec<_> = [Side::Left, Side::Right].into_iter().chain(onward).collect();
         for y in rows.rev() {
-            if y > first {
-                self.send_row(grid, y, ODD, &[Side::Left, Side::Right, Side::Up]);
-                self.send_row(grid, y, EVEN, &[Side::Up]);
-            } else {
-                self.send_row(grid, y, ODD, &[Side::Left, Side::Right]);
-            }
+            self.send_row(grid, y, ODD, &sides);
+            self.send_row(grid, y, EVEN, onward.as_slice());
         }
     }
 
@@ -76,38 +119,62 @@ impl State {
         }
     }
 
-    /// The first message that a node holds from `side`, if it has a neighbour there.
+    /// The first message that a node holds from `side`, where it has a neighbour.
     pub(super) fn first_sweep_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
-        let parent = node.parent();
-        let coarse = self.plan.size(grid + 1);
-        let receiver_x = match side {
-            Side::Up => return None,
-            Side::Down => parent.x,
-            Side::Left | Side::Right if !node.is_even() => return None,
-            Side::Left | Side::Right if parent.is_even() => parent.x,
-            Side::Left => parent.x.checked_sub(1)?,
-            Side::Right => Some(parent.x + 1).filter(|&x| x < coarse.width)?,
-        };
-        let receiver = self.index(grid + 1, Node { x: receiver_x, y: parent.y });
-        Some(self.grids[grid + 1].received[receiver][side as usize].clone())
+        if side == Side::Up || (side != Side::Down && !node.is_even()) {
+            return None;
+        }
+        let Node { x, y } = node.parent();
+        let (other_x, other_y) = (beside(x, node.x), beside(y, node.y));
+        let at = |x: Option<usize>, y: Option<usize>| self.coarse_message(grid + 1, Node { x: x?, y: y? }, side);
+        let between_rows = |x: Option<usize>| Some(nearer(at(x, Some(y))?, at(x, other_y)));
+        let near = between_rows(Some(x))?;
+        Some(if side == Side::Down { nearer(near, between_rows(other_x)) } else { near })
     }
 
-    /// Selects labels one after another.
+    /// M(Q) of the definition. `None` if there is no such node, or its row receives nothing from that side.
+    fn coarse_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
+        let size = self.plan.size(grid);
+        if node.x >= size.width || node.y >= size.height {
+            return None;
+        }
+        let receiver = match side {
+            Side::Left | Side::Right if !node.is_even() => self.plan.neighbour(grid, node, side),
+            Side::Left | Side::Right => Some(node),
+            Side::Up | Side::Down => Some(self.plan.neighbour(grid, node, side).map(|_| node)?),
+        };
+        let zeros = || vec![0; self.plan.model().labels()];
+        Some(
+            receiver
+                .map_or_else(zeros, |node| self.grids[grid].received[self.index(grid, node)][side as usize].clone()),
+        )
+    }
+
+    /// Decides labels one after another.
     pub(super) fn decode(&self, labels: &mut [u16]) {
         let width = self.plan.image_size().width;
         for rows in self.bands(0) {
-            for y in rows.clone() {
-                for parity in [EVEN, ODD] {
-                    for node in row_nodes(width, y, parity) {
-                        labels[self.index(0, node)] = self.decide(node, y == rows.start, labels);
-                    }
+            let above = rows.start.saturating_sub(1) * width..rows.start * width;
+            let decided = labels[above.clone()].to_vec();
+            labels[above.clone()].copy_from_slice(&self.above_seams[above.clone()]);
+            self.decide_rows(rows, true, labels);
+            labels[above].copy_from_slice(&decided);
+        }
+    }
+
+    /// Decides the labels of rows, which may have decided labels above them.
+    fn decide_rows(&self, rows: Range<usize>, has_above: bool, labels: &mut [u16]) {
+        for y in rows.clone() {
+            for parity in [EVEN, ODD] {
+                for node in row_nodes(self.plan.image_size().width, y, parity) {
+                    labels[self.index(0, node)] = self.decide(node, has_above || y > rows.start, labels);
                 }
             }
         }
     }
 
     /// The smallest best label of a node, given the labels decided before.
-    fn decide(&self, node: Node, first_row: bool, labels: &[u16]) -> u16 {
+    fn decide(&self, node: Node, has_above: bool, labels: &[u16]) -> u16 {
         let even = node.is_even();
         let messages: &[Side] = if even { &[Side::Left, Side::Right, Side::Down] } else { &[Side::Down] };
         let decided: &[Side] = if even { &[Side::Up] } else { &[Side::Up, Side::Left, Side::Right] };
@@ -117,7 +184,7 @@ impl State {
             for &side in messages {
                 sum += self.grids[0].received[index][side as usize][usize::from(*d)];
             }
-            for &side in decided.iter().filter(|&&side| !(first_row && side == Side::Up)) {
+            for &side in decided.iter().filter(|&&side| has_above || side != Side::Up) {
                 if let Some(other) = self.plan.neighbour(0, node, side) {
                     let other = usize::from(labels[self.index(0, other)]);
                     sum += self.smoothness(0, node, side)(usize::from(*d), other);
@@ -127,4 +194,15 @@ impl State {
         };
         (0..self.plan.model().labels() as u16).min_by_key(sum).unwrap_or(0)
     }
+}
+
+/// The coarse row or column beside a parent's, on the side where its child lies.
+fn beside(parent: usize, child: usize) -> Option<usize> {
+    if child.is_multiple_of(2) { parent.checked_sub(1) } else { Some(parent + 1) }
+}
+
+/// w(a, b) of the definition; a if there is no b.
+fn nearer(a: Vec<i64>, b: Option<Vec<i64>>) -> Vec<i64> {
+    let Some(b) = b else { return a };
+    a.iter().zip(b).map(|(&a, b)| ((a + b + 1) / 2 + a + 1) / 2).collect()
 }

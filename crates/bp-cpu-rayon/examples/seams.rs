@@ -1,0 +1,111 @@
+//! How visible the borders of bands and of coarse nodes are in maps of `sweep`: prints the table of docs/algorithms.md.
+//!
+//! `cargo run --release -p bp-cpu-rayon --example seams -- DATA`, where DATA has the Middlebury pairs of 2006 at half size and
+//! those of version 3 at a quarter of their size.
+
+use std::{error::Error, path::Path};
+
+use bp_core::{
+    Algorithm, Backend, Device, DisparityMap, Driver, Energy, GroundTruth, Image, Model, Plan, Profile, Schedule,
+    StereoPair,
+};
+use bp_testkit::jumps;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+/// Scenes at half size. Their truth is stored as twice the disparity.
+const HALF: [&str; 6] = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"];
+
+/// Scenes of version 3, and their labels.
+const VERSION_3: [(&str, usize); 8] = [
+    ("ArtL", 64),
+    ("Motorcycle", 72),
+    ("MotorcycleE", 72),
+    ("Piano", 68),
+    ("Playroom", 84),
+    ("Playtable", 76),
+    ("Recycle", 68),
+    ("Teddy", 64),
+];
+
+/// Every so many rows or columns.
+const PERIODS: [usize; 4] = [16, 32, 64, 128];
+
+fn main() -> Result<()> {
+    let data = std::env::args().nth(1).ok_or("usage: seams DATA")?;
+    let data = Path::new(&data);
+    let device = bp_cpu_rayon::Rayon.open(0)?;
+    let periods = PERIODS.map(|period| format!(" every {period} |")).concat();
+    println!("| scene | rows:{periods} columns:{periods} bad-1.0 non-occluded | bad-1.0 all | RMSE | energy |");
+    println!("|---|{}", "---:|".repeat(12));
+    let mut sums = vec![];
+    for name in HALF {
+        let file = |name: &str| data.join("middlebury2006").join(name);
+        let (truth, right) = (map(&file(name).join("disp1.png"))?, map(&file(name).join("disp5.png"))?);
+        let pair = pair(&file(name).join("view1.png"), &file(name).join("view5.png"))?;
+        let truth = GroundTruth::with_right(truth, &right)?;
+        sums.push(row(name, &solve(device.as_ref(), &pair, 112)?, Some(&truth))?);
+    }
+    for (name, labels) in VERSION_3 {
+        let folder = data.join("middlebury-v3-quarter").join(name);
+        let pair = pair(&folder.join("im0.png"), &folder.join("im1.png"))?;
+        sums.push(row(name, &solve(device.as_ref(), &pair, labels)?, None)?);
+    }
+    let mean = |of: &[Vec<f64>], i: usize| of.iter().map(|row| row[i]).sum::<f64>() / of.len() as f64;
+    let (half, all) = (&sums[..HALF.len()], &sums);
+    let ratios: Vec<f64> = (0..8).map(|i| mean(all, i)).collect();
+    let errors: Vec<f64> = (8..12).map(|i| mean(half, i)).collect();
+    println!("{}", cells("mean", &[ratios, errors].concat()));
+    Ok(())
+}
+
+struct Solved {
+    map: DisparityMap,
+    labels: Vec<u16>,
+    energy: f64,
+}
+
+fn solve(device: &dyn Device, pair: &StereoPair, labels: usize) -> Result<Solved> {
+    let model = Model::new(Profile::Census, labels)?;
+    let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+    let mut driver = Driver::new(device, Plan::new(pair.size(), model, settings)?)?;
+    driver.solve(pair)?;
+    let energy = Energy::of(pair, &model, driver.labels())?.total() as f64;
+    Ok(Solved { map: driver.disparities(), labels: driver.labels().to_vec(), energy })
+}
+
+/// Prints a row, and returns its numbers.
+fn row(name: &str, solved: &Solved, truth: Option<&GroundTruth>) -> Result<Vec<f64>> {
+    let (labels, size) = (&solved.labels, solved.map.size());
+    let jumps = [jumps::between_rows(labels, size), jumps::between_columns(labels, size)];
+    let mut numbers: Vec<f64> =
+        jumps.iter().flat_map(|jumps| PERIODS.map(|period| jumps::ratio(jumps, period))).collect();
+    if let Some(truth) = truth {
+        let errors = truth.errors(&solved.map)?;
+        numbers.extend([errors.visible.map_or(f64::NAN, |e| e.bad[1]), errors.all.bad[1], errors.all.rmse]);
+        numbers.push(solved.energy);
+    }
+    let unknown = if truth.is_some() { "" } else { " - | - | - | - |" };
+    println!("{}{unknown}", cells(name, &numbers));
+    Ok(numbers)
+}
+
+fn cells(name: &str, numbers: &[f64]) -> String {
+    numbers.iter().fold(format!("| {name} |"), |text, number| format!("{text} {number:.2} |"))
+}
+
+fn pair(left: &Path, right: &Path) -> Result<StereoPair> {
+    Ok(StereoPair::new(image(left)?, image(right)?)?)
+}
+
+fn image(path: &Path) -> Result<Image> {
+    let read = image::ImageReader::open(path)?.decode()?.to_rgb8();
+    Ok(Image::from_rgb(read.width() as usize, read.height() as usize, read.pixels().map(|pixel| pixel.0).collect())?)
+}
+
+/// A map of stored values that are twice the disparity, 0 where it is unknown.
+fn map(path: &Path) -> Result<DisparityMap> {
+    let stored = image(path)?;
+    let disparity = |&[value, ..]: &[u8; 3]| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / 2.0 };
+    Ok(DisparityMap::new(stored.size(), stored.pixels().iter().map(disparity).collect())?)
+}

@@ -1,0 +1,60 @@
+//! Maps of `sweep` show no borders of bands.
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+use std::path::{Path, PathBuf};
+
+use bp_core::{Algorithm, Backend, Driver, Image, Model, Plan, Profile, Schedule, StereoPair};
+use bp_cpu_rayon::Rayon;
+use bp_testkit::{jumps, synthetic};
+
+/// Bands and the nodes of all five grids repeat after one of these numbers of rows.
+const PERIODS: [usize; 4] = [16, 32, 64, 128];
+
+/// How many times as frequent jumps are between rows at these periods as elsewhere, means over the pairs.
+fn ratios(pairs: &[(StereoPair, usize)]) -> [f64; 4] {
+    let device = Rayon.open(0).unwrap();
+    let mut means = [0.0; 4];
+    for (pair, labels) in pairs {
+        let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+        let plan = Plan::new(pair.size(), Model::new(Profile::Census, *labels).unwrap(), settings).unwrap();
+        let mut driver = Driver::new(device.as_ref(), plan).unwrap();
+        driver.solve(pair).unwrap();
+        let jumps = jumps::between_rows(driver.labels(), pair.size());
+        PERIODS.iter().zip(&mut means).for_each(|(&period, mean)| *mean += jumps::ratio(&jumps, period));
+    }
+    means.map(|sum| sum / pairs.len() as f64)
+}
+
+/// Bands that exchanged nothing had ratios of 5.7, 10.0, 12.8 and 16.6.
+#[test]
+fn synthetic_scenes_have_no_seams() {
+    let pairs: Vec<_> = (0..6).map(|scene| (synthetic::scene(scene, 2).pair, 56)).collect();
+    let ratios = ratios(&pairs);
+    assert!(ratios.iter().all(|&ratio| ratio < 1.5), "{ratios:?}");
+}
+
+/// Bands that exchanged nothing had ratios of 5.6, 8.9, 10.8 and 14.0. A sweep over the whole image as one band has 1.2, 1.0,
+/// 1.0 and 1.2.
+#[test]
+fn real_scenes_have_no_seams() {
+    let Some(data) = std::env::var_os("BP_DATA").map(PathBuf::from) else {
+        return eprintln!("skipped: BP_DATA names no folder of public data");
+    };
+    let half = ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"].map(|scene| (scene, 112));
+    let half = half.map(|(scene, labels)| pair(&data.join("middlebury2006").join(scene), ["view1", "view5"], labels));
+    let version_3 = [("ArtL", 64), ("Motorcycle", 72), ("MotorcycleE", 72), ("Piano", 68), ("Playroom", 84)];
+    let version_3 = version_3.into_iter().chain([("Playtable", 76), ("Recycle", 68), ("Teddy", 64)]);
+    let quarter = data.join("middlebury-v3-quarter");
+    let version_3 = version_3.map(|(scene, labels)| pair(&quarter.join(scene), ["im0", "im1"], labels));
+    let ratios = ratios(&half.into_iter().chain(version_3).collect::<Vec<_>>());
+    assert!(ratios.iter().all(|&ratio| ratio < 1.4), "{ratios:?}");
+}
+
+fn pair(folder: &Path, names: [&str; 2], labels: usize) -> (StereoPair, usize) {
+    let image = |name: &str| {
+        let read = image::open(folder.join(name).with_extension("png")).unwrap().to_rgb8();
+        let pixels = read.pixels().map(|pixel| pixel.0).collect();
+        Image::from_rgb(read.width() as usize, read.height() as usize, pixels).unwrap()
+    };
+    (StereoPair::new(image(names[0]), image(names[1])).unwrap(), labels)
+}
