@@ -27,7 +27,7 @@ use crate::{
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
-    heap::return_large_buffers();
+    heap::hold_little();
     match (args.batch()?, &args.left, &args.right) {
         (None, Some(left), Some(right)) => match_one(args, [left, right]),
         (Some(options), ..) => match_many(args, &options),
