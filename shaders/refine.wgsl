@@ -68,7 +68,7 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     return odd[index];
 }
 
-// The same for columns x, x + 2, x + 4 and x + 6 of coarse row y.
+// As coarse_nodes, for columns x, x + 2, x + 4 and x + 6 of coarse row y.
 fn coarse_messages(x: i32, y: i32, quad: u32) -> vec4<u32> {
     return coarse_nodes((x + y) & 1, u32(y + 1 - i32(parameters.other_first_row)), x >> 1, quad);
 }
@@ -91,8 +91,7 @@ fn nearer(near: vec4<u32>, far: vec4<u32>) -> vec4<u32> {
     return mean(mean(near, far), near);
 }
 
-// Messages between two coarse rows: from column x.x of row y.x and from column x.y of row y.y, and so on as in
-// coarse_messages.
+// Interpolates between the coarse rows y.x, the nearer one, and y.y, from columns x.x and x.y on.
 fn between_rows(x: vec2<i32>, y: vec2<i32>, quad: u32) -> vec4<u32> {
     return nearer(coarse_messages(x.x, y.x, quad), coarse_messages(x.y, y.y, quad));
 }

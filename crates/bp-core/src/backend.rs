@@ -134,7 +134,8 @@ pub trait Solver: Send {
     /// Errors of the device.
     fn coarsen(&mut self, grid: usize) -> Result<(), Error>;
 
-    /// Sets the first messages of `grid`: zeros on the coarsest grid, otherwise copies from the next coarser grid.
+    /// Sets the first messages of `grid`: zeros on the coarsest grid, otherwise those made from the next coarser grid's. Under
+    /// [`crate::Schedule::Sweep`] it also prepares the seams. A backend may do all this in [`Solver::update_messages`].
     ///
     /// # Errors
     /// Errors of the device.

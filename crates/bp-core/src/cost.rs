@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(found, [(3, 9), (0, 0), (6, 18), (3, 9), (3, 9)]);
     }
 
-    /// Matching an image in strips relies on this.
+    /// Matching an image in tiles relies on this.
     #[test]
     fn costs_of_a_strip_are_those_of_the_whole_image() {
         let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);

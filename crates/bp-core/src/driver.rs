@@ -197,12 +197,8 @@ fn pass_messages(
     observer: &mut Observer<'_>,
 ) -> Result<(), Error> {
     let grids = from.grids(plan);
-    let of_grid = |grid| {
-        u64::from(plan.settings().steps)
-            .saturating_mul(plan.updates_per_step(grid))
-            .saturating_add(plan.seam_updates(grid))
-    };
-    let mut progress = Progress { done: 0, total: (0..grids).map(of_grid).fold(0, u64::saturating_add) };
+    let mut progress =
+        Progress { done: 0, total: (0..grids).map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add) };
     for grid in (0..grids).rev() {
         timed(times, Stage::Refine, || match from {
             Start::Cold => solver.refine(grid),

@@ -32,6 +32,9 @@
 //! **Labels one after another.** Under [`crate::Schedule::Sweep`] a label minimises D plus at most four terms:
 //! messages, or smoothness costs to labels already decided. Each lies in 0..=K, so the argument for beliefs applies.
 //!
+//! **Interpolated first messages.** Under [`crate::Schedule::Sweep`] they lie between coarse messages, so in 0..=K. Their
+//! least value may exceed 0, but no bound here needs it to be 0.
+//!
 //! **Coarser grids.** A coarse node's cost is the sum of its children's. Subtracting a child's least cost first shifts
 //! the sum by a constant, which cancels; clipping a child first would not. So unclipped costs are summed, and the sums
 //! are normalised and clipped. The lower clip of [`crate::Settings::coarse_clip`] changes what is computed, not how:

@@ -116,14 +116,14 @@ pub enum Schedule {
     /// 2. Backward, rows from bottom to top. In a row all odd nodes send left, right and up in the same way; then all
     ///    even nodes send up. The first row sends nothing up.
     ///
-    /// So after a loop every vertical edge holds an upward message, and every horizontal edge holds the message from its
-    /// odd to its even end. The downward messages of seams count no longer.
+    /// So after the last loop every vertical edge holds an upward message, and every horizontal edge holds the message from
+    /// its odd to its even end. The downward messages of seams count no longer.
     ///
     /// **First messages** of a finer grid come from these edges of the coarser grid. Let M(Q) be, for a coarse node Q,
     ///
     /// - from below: the message that Q received from below;
     /// - from the left: the message that Q received from its left if Q is even, else the one that the left neighbour of Q
-    ///   received from its left, or zeros if Q has no left neighbour;
+    ///   received from its left; zeros if there was none;
     /// - from the right: the same with left and right swapped.
     ///
     /// A fine node (x, y) lies between four coarse nodes: its parent P = (x div 2, y div 2) and those beside it, one column to
@@ -134,7 +134,8 @@ pub enum Schedule {
     /// - from below: the same in P's column and in the other one, then w of both;
     /// - zeros otherwise.
     ///
-    /// Where the other row or column does not exist, or its row receives nothing from that side, P's takes its place.
+    /// If the other row does not exist, or receives nothing from that side, P's row takes its place; if the other column does
+    /// not exist, P's column does. If P's row receives nothing from that side, the first message is zeros.
     ///
     /// **Labels** of each band are decided one after another, from its top row to its bottom row, in each row first for the
     /// even nodes, then for the odd ones. Let f be the labels already decided and V the smoothness cost. A label is the

@@ -7,7 +7,7 @@ pub enum Stage {
     MatchCost,
     /// Data costs of the coarser grids.
     Coarsen,
-    /// First messages of every grid.
+    /// First messages of every grid, and the seams of [`crate::Schedule::Sweep`]. A backend may do this while it updates messages.
     Refine,
     /// Message passing.
     UpdateMessages,

@@ -1,4 +1,5 @@
-//! How visible the borders of bands and of coarse nodes are in maps of `sweep`: prints the table of docs/algorithms.md.
+//! How visible the borders of bands and of coarse nodes are in maps of `sweep`: prints each scene, and the means that
+//! docs/algorithms.md shows.
 //!
 //! `cargo run --release -p bp-cpu-rayon --example seams -- DATA`, where DATA has the Middlebury pairs of 2006 at half size and
 //! those of version 3 at a quarter of their size.

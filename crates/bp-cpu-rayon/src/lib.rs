@@ -13,7 +13,7 @@
 //! * Each kernel has its own file: `match_cost` (on `features`), `coarsen`, `refine`, `update_messages` and
 //!   `select_labels`. Each file begins with the loop of the scalar version.
 //! * `pass` is the work of a row in a step. `half_steps` runs such passes over whole grids by `wavefront`; `sweep` runs
-//!   them over one band at a time, in `windows`.
+//!   them over one band at a time, in `windows`, after it has prepared the `seams` between them.
 
 mod coarsen;
 mod costs;

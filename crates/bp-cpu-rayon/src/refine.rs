@@ -7,6 +7,8 @@
 //!     message(x, y) from side = message(parent of (x, y)) from side, on the next coarser grid
 //! ```
 //!
+//! Under `sweep`, it interpolates between the parent and the coarse nodes beside it; see [`Between`].
+//!
 //! Two fine columns share a parent, so a vector of parents is interleaved with the parents of the next plane.
 
 use bp_core::{MessageStart, Plan, Schedule, Side};

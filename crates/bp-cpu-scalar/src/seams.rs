@@ -18,7 +18,7 @@ impl Seams {
         let size = plan.image_size();
         let swept = plan.settings().schedule == Schedule::Sweep;
         let nodes = if swept { Seam::all(size.height).len() * size.width } else { 0 };
-        let messages = || memory::filled("messages", nodes * plan.model().labels(), 0);
+        let messages = || memory::filled("messages", nodes.saturating_mul(plan.model().labels()), 0);
         Ok(Self {
             messages: [messages()?, messages()?],
             labels: memory::filled("labels", nodes * Seam::LABEL_ROWS, 0)?,

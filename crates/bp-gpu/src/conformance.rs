@@ -5,7 +5,7 @@
 
 use std::{env, thread, time::Duration};
 
-use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule};
+use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
 use bp_testkit::{Case, Difference, compare, compare_at_random, conform_every, noise_pair};
 
 use crate::Limits;
@@ -69,6 +69,9 @@ pub fn conforms_cut_up(
     for (case, device) in banded_cases().iter().step_by(n).flat_map(|case| [(case, &devices[1]), (case, &devices[2])]) {
         compare(reference, device.as_ref(), case)?;
     }
+    if let Some(device) = open(&|limits| limits.binding_bytes = COARSE_STRIP_BYTES) {
+        coarse_strip_cases().iter().try_for_each(|case| compare(reference, device.as_ref(), case))?;
+    }
     let devices: Vec<_> = devices.iter().map(Box::as_ref).collect();
     let refused = compare_at_random(reference, &devices, (1000..1100).step_by(n))?;
     assert!(refused <= 5, "{refused} plans refused");
@@ -82,6 +85,16 @@ fn banded_cases() -> Vec<Case> {
     let plan = |(profile, settings)| Plan::new(pair.size(), Model::new(profile, 19).ok()?, settings).ok();
     plans.filter_map(plan).map(|plan| Case { pair: pair.clone(), plan }).collect()
 }
+
+/// Sweeps whose second grid is cut into strips too, if buffers hold [`COARSE_STRIP_BYTES`].
+fn coarse_strip_cases() -> Vec<Case> {
+    let pair = noise_pair(8, 97, 3);
+    let sweep = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+    let plan = |steps| Plan::new(pair.size(), Model::new(Profile::Census, 100).ok()?, Settings { steps, ..sweep }).ok();
+    [1, 2].into_iter().filter_map(plan).map(|plan| Case { pair: pair.clone(), plan }).collect()
+}
+
+const COARSE_STRIP_BYTES: u64 = 32 << 10;
 
 /// Runs several plans at the same time. They share the device's queue and kernels.
 ///
@@ -142,4 +155,20 @@ pub fn tells_times(open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>
     let sum: Duration = stages.iter().sum();
     assert!(sum <= times.total && 4 * sum > times.total, "{times:?}");
     assert!(stages[bp_core::Stage::UpdateMessages as usize] > sum / 4, "{times:?}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Program;
+
+    #[test]
+    fn two_grids_are_cut_into_strips() {
+        let limits = Limits { binding_bytes: COARSE_STRIP_BYTES, ..Limits::roomy() };
+        for case in coarse_strip_cases() {
+            let program = Program::new(&case.plan, &limits).expect("it fits");
+            let strips: Vec<_> = program.grids.iter().map(|grid| grid.strips.len()).collect();
+            assert_eq!(strips, [2, 2, 1]);
+        }
+    }
 }

@@ -56,7 +56,7 @@ pub struct Options {
     pub device: Option<String>,
     /// Threads of the backend rayon; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor.
     pub threads: Option<usize>,
-    /// Most bytes that the program may hold, including images and answer. Larger pairs are matched in strips or tiles.
+    /// Most bytes that the program may hold, including images and answer. Larger pairs are matched in tiles.
     /// `None` means the free memory.
     pub max_memory: Option<u64>,
 }

@@ -16,7 +16,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
     // Wide enough for several tiles of the widest vectors, or high enough for several bands, the last one short, on
     // coarser grids too. Models are fewer, since the oracle is slow.
-    let wide_or_high = [(131, 7), (200, 3), (67, 40), (9, 33), (6, 70), (3, 65), (2, 130)];
+    let wide_or_high = [(131, 35), (200, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
         let weak = Model::new(Profile::Census, 5).map(|model| model.with_weak_edges(Some(25)));
@@ -82,9 +82,10 @@ fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
     let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
     let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });
     let unclipped = grids.map(|settings| Settings { coarse_clip: false, ..settings });
-    let cuts = [(0, 1), (31, 1), (31, 2), (32, 1), (32, 2), (33, 1), (33, 2)].map(|(y, steps)| {
-        let cut = Cut { x: size.width / 2, y, seed_start: false };
-        Settings { cut: Some(cut), grids: 1, steps, ..ours }
-    });
+    let cuts =
+        [(0, 1), (20, 1), (26, 2), (31, 1), (31, 2), (32, 1), (32, 2), (33, 1), (33, 2), (36, 1)].map(|(y, steps)| {
+            let cut = Cut { x: size.width / 2, y, seed_start: false };
+            Settings { cut: Some(cut), grids: 1, steps, ..ours }
+        });
     std::iter::once(ours).chain(grids).chain(unclipped).chain(cuts)
 }

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule};
+use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
 
 use crate::{
     Answer, Case, Difference, Fault, cases, difference::same, noise_pair, random_case, solve, videos::compare_videos,
@@ -76,16 +76,25 @@ fn compare_answer(reference: &dyn Device, found: Result<Answer, Error>, case: &C
     same(&solve(reference, case).map_err(failed)?, &found, case)
 }
 
-/// Every algorithm, schedule and profile with one loop, so that traces of old messages are not yet washed out.
+/// Sweeps with seams, and every algorithm, schedule and profile with one loop, so that traces of old messages are not yet
+/// washed out.
 fn short_cases() -> impl Iterator<Item = Case> {
     let pair = noise_pair(21, 17, 1);
+    let seams = noise_pair(21, 70, 1);
+    let sweep = Algorithm::Sweep.settings(seams.size(), 1, 1, Schedule::Sweep);
+    let swept =
+        [(3, 1), (1, 2)].map(|(grids, steps)| Settings { grids, steps, ..sweep }).into_iter().map(move |settings| {
+            let case = Model::new(Profile::Census, 70).and_then(|model| Case::new(seams.clone(), model, settings));
+            case.unwrap_or_else(|error| panic!("{error}"))
+        });
     let schedules = Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|schedule| (a, schedule)));
     let all = schedules.flat_map(|(a, schedule)| Profile::ALL.map(|profile| (a, schedule, profile)));
-    all.map(move |(algorithm, schedule, profile)| {
+    let all = all.map(move |(algorithm, schedule, profile)| {
         let settings = algorithm.settings(pair.size(), 1, 1, schedule);
         let case = Model::new(profile, 9).and_then(|model| Case::new(pair.clone(), model, settings));
         case.unwrap_or_else(|error| panic!("{error}"))
-    })
+    });
+    swept.chain(all)
 }
 
 /// Checks that a driver answers like a fresh one, both after another pair and after a stopped solve.

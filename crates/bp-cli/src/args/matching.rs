@@ -40,7 +40,7 @@ pub(crate) struct MatchArgs {
     pub(crate) max_megapixels: u32,
     /// Limit memory use, including images and answer; for example 2GiB. [default: the free memory]
     ///
-    /// Larger pairs are matched in strips or tiles. SIZE is in bytes, or has a unit: 512M and 2G use powers of 1000,
+    /// Larger pairs are matched in tiles. SIZE is in bytes, or has a unit: 512M and 2G use powers of 1000,
     /// 512MiB and 2GiB powers of 1024.
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_short_help = true)]
     pub(crate) max_memory: Option<ByteSize>,

@@ -18,7 +18,8 @@ const SWEPT_ROWS_HALO: usize = 64;
 pub enum Likeness {
     /// Bit-identical: there is one tile.
     Same,
-    /// Nearly the same, and as accurate: only pixels beyond the halo have no influence.
+    /// Nearly the same, and as accurate: pixels beyond the halo have no influence. Under [`Schedule::Sweep`], bands also begin
+    /// at the first row of each tile.
     Near,
 }
 

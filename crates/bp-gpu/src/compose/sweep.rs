@@ -1,5 +1,7 @@
 //! The schedule `sweep`: all bands at the same time, their rows one after another.
 
+use std::ops::Range;
+
 use bp_core::{BAND_ROWS, Seam, Side};
 
 use super::{
@@ -125,7 +127,7 @@ impl Composer<'_> {
     }
 
     /// Records the labels of these rows, which have no labels above them.
-    fn decode_rows(&mut self, part: &mut PartRecorder, bands: Bands, rows: std::ops::Range<usize>) {
+    fn decode_rows(&mut self, part: &mut PartRecorder, bands: Bands, rows: Range<usize>) {
         for row in rows.clone() {
             self.decode_row(part, bands, row, row > rows.start);
         }

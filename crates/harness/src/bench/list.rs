@@ -128,6 +128,7 @@ fn kernel(stage: Stage, problem: &'static str, backend: &str, speed: Option<&Spe
     let bytes = measured.and_then(|measured| Some(measured.moved_bytes.as_ref()?.in_order()[stage as usize]));
     let bytes = bytes.filter(|&bytes| bytes > 0);
     let entries = contest.filter(|_| stage == Stage::UpdateMessages).map(|contest| contest.settings.message_updates);
+    let schedule = contest.map_or("", |contest| &contest.settings.schedule);
     let contestant = speed.and_then(|speed| speed.contestants.iter().find(|contestant| contestant.name == backend));
     let samples = measured.map_or(&[][..], |measured| &measured.samples);
     let is_timed = contestant.zip(measured).is_some_and(|(contestant, measured)| contestant.times_stages(measured));
@@ -137,7 +138,7 @@ fn kernel(stage: Stage, problem: &'static str, backend: &str, speed: Option<&Spe
         name: format!("{problem} {backend}"),
         entries,
         bytes,
-        samples: durations(samples.iter().map(|sample| is_timed.then(|| sample.stages_ms()[stage as usize]))),
+        samples: durations(samples.iter().map(|sample| is_timed.then(|| sample.kernel_ms(stage, schedule)))),
         of: Of::Problem(problem),
     }
 }

@@ -1,6 +1,6 @@
 //! One timed solve. Every experiment records its times in this form.
 
-use bp_core::{Stage, Times};
+use bp_core::{Schedule, Stage, Times};
 use bp_stereo::description::{Clock, Clocked, Stages, clocks, milliseconds};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -71,6 +71,14 @@ impl Sample {
     /// Milliseconds of each stage, by the device's clock if it has one.
     pub fn stages_ms(&self) -> [f64; Stage::ALL.len()] {
         self.clocks.last().map_or([0.0; 5], |clocked| clocked.stages.in_order())
+    }
+
+    /// Milliseconds of a stage. Under the schedule `sweep`, message passing includes `refine`: some backends prepare seams there,
+    /// which counts as message updates.
+    pub fn kernel_ms(&self, stage: Stage, schedule: &str) -> f64 {
+        let stages = self.stages_ms();
+        let with_seams = stage == Stage::UpdateMessages && schedule == Schedule::Sweep.name();
+        stages[stage as usize] + if with_seams { stages[Stage::Refine as usize] } else { 0.0 }
     }
 
     /// Milliseconds of all stages by the device's clock, if it has one.

@@ -146,16 +146,16 @@ fn times(speed: &Speed) -> String {
         }
         cells
     });
-    let note = "Message entries are timed in the stage update_messages, by the device's clock where it has one. Each \
-                problem is prepared once; kernels that opening the device or an earlier problem compiled are not \
-                compiled again.";
+    let note = "Message entries are timed in the stage update_messages (under sweep, also in refine, where some backends \
+                prepare seams), by the device's clock where it has one. Each problem is prepared once; kernels that \
+                opening the device or an earlier problem compiled are not compiled again.";
     format!("{}\n{note}\n", table(&columns, rows))
 }
 
 fn times_of(contest: &Contest, measurement: &Measurement) -> [String; 7] {
     let Measurement { samples, prepare_ms, compile_ms, allocated_bytes, .. } = measurement;
-    let update = Stage::UpdateMessages as usize;
-    let ns = |sample: &Sample| 1e6 * sample.stages_ms()[update] / contest.settings.message_updates as f64;
+    let (settings, update) = (&contest.settings, Stage::UpdateMessages);
+    let ns = |sample: &Sample| 1e6 * sample.kernel_ms(update, &settings.schedule) / settings.message_updates as f64;
     let device = Spread::of(samples.iter().filter_map(Sample::device_ms));
     [
         samples.len().to_string(),
