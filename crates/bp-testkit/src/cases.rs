@@ -14,9 +14,9 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let every = small
         .chain(many_labels)
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
-    // Wide enough for several tiles of the widest vectors, or high enough for several bands, the last one short, on
-    // coarser grids too. Models are fewer, since the oracle is slow.
-    let wide_or_high = [(131, 35), (200, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
+    // Wide enough for several tiles of the widest vectors, once without padding beside them, or high enough for several
+    // bands, the last one short, on coarser grids too. Models are fewer, since the oracle is slow.
+    let wide_or_high = [(131, 35), (256, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
         let weak = Model::new(Profile::Census, 5).map(|model| model.with_weak_edges(Some(25)));
