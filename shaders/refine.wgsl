@@ -12,7 +12,7 @@
 const RECEIVER: u32 = 0;
 const SENDER: u32 = 1;
 // Under the schedule `sweep`, coarse messages to the left and right are valid only if the sender is odd.
-// Messages are interpolated between the receiver's parent and the coarse nodes beside it.
+// Messages are interpolated between the four coarse nodes nearest to the receiver.
 const SWEEP: u32 = 2;
 // Zeros, on the coarsest grid.
 const ZERO: u32 = 3;
@@ -163,7 +163,7 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let x = columns(nodes);
     let even = vec2(coarse_x(x[0], y.x), coarse_x(x[0], y.y));
     let odd = vec2(coarse_x(x[1], y.x), coarse_x(x[1], y.y));
-    // A sender below the coarsest row does not exist, whatever lies beside it.
+    // If the sender would lie below the last coarse row, there is no message, and no other row replaces it.
     let exists = select(0u, 0xffffffffu, START != SWEEP || near < i32(parameters.other_height));
     let mask = vec4(starting(nodes) & exists);
     let next_mask = vec4(starting(nodes_at(line, nodes.word + 1)) & exists);

@@ -126,8 +126,9 @@ pub enum Schedule {
     ///   received from its left; zeros if there was none;
     /// - from the right: the same with left and right swapped.
     ///
-    /// A fine node (x, y) lies between four coarse nodes: its parent P = (x div 2, y div 2) and those beside it, one column to
-    /// the left (x even) or right (x odd), one row above (y even) or below (y odd). If the node has a neighbour on that side,
+    /// A fine node (x, y) lies between four coarse nodes. One is its parent P = (x div 2, y div 2). The others are in the column
+    /// to the left (x even) or right (x odd), in the row above (y even) or below (y odd), or both. If the node has a neighbour
+    /// on that side,
     /// its first message is, with w(a, b) = (((a + b + 1) div 2) + a + 1) div 2, three quarters of a and one of b,
     ///
     /// - from the left or right, of an even node: w of M at P and at the node in the other row;

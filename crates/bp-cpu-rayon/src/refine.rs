@@ -7,7 +7,7 @@
 //!     message(x, y) from side = message(parent of (x, y)) from side, on the next coarser grid
 //! ```
 //!
-//! Under `sweep`, it interpolates between the parent and the coarse nodes beside it; see [`Between`].
+//! Under `sweep`, it interpolates between the four nearest coarse nodes; see [`Between`].
 //!
 //! Two fine columns share a parent, so a vector of parents is interleaved with the parents of the next plane.
 

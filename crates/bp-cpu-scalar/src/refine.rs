@@ -34,7 +34,7 @@ fn coarse_receiver(plan: &Plan, grid: usize, node: Node, side: Side) -> Option<N
     }
 }
 
-/// Writes a first message of [`bp_core::Schedule::Sweep`]: interpolated between the parent and the coarse nodes beside it.
+/// Writes a first message of [`bp_core::Schedule::Sweep`], interpolated between the four nearest coarse nodes.
 fn interpolate(plan: &Plan, grid: usize, node: Node, side: Side, coarse: &Messages, message: &mut [u8]) {
     let starts = side == Side::Down || (side != Side::Up && node.is_even());
     let parent = node.parent();

@@ -14,8 +14,9 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let every = small
         .chain(many_labels)
         .flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)).collect::<Vec<_>>());
-    // Wide enough for several tiles of the widest vectors, once without padding beside them, or high enough for several
-    // bands, the last one short, on coarser grids too. Models are fewer, since the oracle is slow.
+    // Some are wide enough for several tiles of the widest vectors; the rows of one fill its vectors exactly. Others are high
+    // enough for several bands, on coarser grids too, and their last band is short. The oracle is slow, so these sizes get
+    // fewer models.
     let wide_or_high = [(131, 35), (256, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());

@@ -1,4 +1,4 @@
-//! Tables, charts and pages, made from a record and the maps beside it.
+//! Tables, charts and pages. They are made from a record and the maps in its folder.
 
 mod diagrams;
 mod figures;

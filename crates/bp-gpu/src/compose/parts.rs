@@ -12,6 +12,12 @@ use crate::{
     layout::Strip,
 };
 
+// The values of START in refine.wgsl.
+const START_RECEIVER: u32 = 0;
+const START_SENDER: u32 = 1;
+const START_SWEEP: u32 = 2;
+const START_ZERO: u32 = 3;
+
 impl Composer<'_> {
     pub(super) fn match_cost(&mut self, part: &mut PartRecorder) {
         let (buffers, size) = (self.buffers, self.plan.image_size());
@@ -156,13 +162,13 @@ impl Composer<'_> {
                 work = self.reading(work, nodes.grid + 1, coarse.strips[from]);
                 let sent = &self.buffers.strips[nodes.grid + 1][from].sent[self.set(settings.steps)];
                 let start = match settings.message_start {
-                    _ if settings.schedule == Schedule::Sweep => 2,
-                    MessageStart::Receiver => 0,
-                    MessageStart::Sender => 1,
+                    _ if settings.schedule == Schedule::Sweep => START_SWEEP,
+                    MessageStart::Receiver => START_RECEIVER,
+                    MessageStart::Sender => START_SENDER,
                 };
                 (start, sent[side as usize])
             }
-            None => (3, [self.buffers.unused; 2]),
+            None => (START_ZERO, [self.buffers.unused; 2]),
         };
         let pipeline = Pipeline { kernel: Kernel::Refine, constants: vec![("START", start)] };
         self.dispatch(part, pipeline, vec![sent, planes[0], planes[1]], work);

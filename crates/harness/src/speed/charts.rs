@@ -71,7 +71,7 @@ fn grown(speed: &Speed, family: Family, first: &Entry) -> Series<Point> {
     }
 }
 
-/// A chart of the memory throughput of each device's stages, beside its copy rate.
+/// A chart of the memory throughput of each device's stages. It also shows the rate at which the device copies memory.
 pub(super) fn roofline(speed: &Speed) -> Option<Chart> {
     let contestants = speed.contestants.iter().map(|contestant| (contestant, rates(speed, contestant)));
     let (devices, others): (Vec<_>, Vec<_>) = contestants.partition(|(_, rates)| !rates.is_empty());
