@@ -183,6 +183,7 @@ fn what_is_no_record_of_ours_is_refused_by_name() {
     let folder = Folder::new();
     let rayon = run(&folder, RAYON);
     fs::write(folder.path("broken.json"), "{\"schema_version\": 1").unwrap();
+    fs::write(folder.path("other.json"), "{}").unwrap();
     File::create(folder.path("huge.json")).unwrap().set_len(1 << 40).unwrap();
     changed(&folder, RAYON, "version.json", |record| *record = json!({ "schema_version": 2, "new": [] }));
     changed(&folder, RAYON, "field.json", |record| record["\u{1b}[2J"] = json!(1));
@@ -193,6 +194,7 @@ fn what_is_no_record_of_ours_is_refused_by_name() {
     fs::create_dir(folder.path("folder")).unwrap();
     for (file, word) in [
         ("broken.json", "not a record"),
+        ("other.json", "missing field \"schema_version\""),
         ("huge.json", "larger than 64 MiB"),
         ("version.json", "schema version 2, this program reads 1"),
         ("field.json", "unknown field"),

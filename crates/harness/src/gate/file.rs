@@ -36,7 +36,8 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failur
 
 /// Parses the text of a baseline file.
 pub(super) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Failure> {
-    let failed = |error: serde_json::Error| Failure::reading(path, &error);
+    // Backquotes mark names of options here, but names of fields in serde's messages.
+    let failed = |error: serde_json::Error| Failure::reading(path, &error.to_string().replace('`', "\""));
     // The version is checked first, because other versions may have other fields.
     let Version { schema_version } = serde_json::from_str(text).map_err(failed)?;
     if schema_version != SCHEMA_VERSION {

@@ -71,7 +71,8 @@ const REPRODUCE: Kind = Kind { what: "record of `bp reproduce` (see results/sche
 const SPEED: Kind = Kind { what: "record of `bp speed`", version: speed::SCHEMA_VERSION };
 
 fn refused(path: &Path, kind: &Kind, error: &dyn Display) -> Failure {
-    let why: String = printable(&error.to_string()).chars().take(MAX_MESSAGE).collect();
+    // Backquotes mark names of options here, but names of fields in serde's messages.
+    let why: String = printable(&error.to_string().replace('`', "\"")).chars().take(MAX_MESSAGE).collect();
     Failure::reading(path, &format!("not a {}: {why}", kind.what))
 }
 
