@@ -43,9 +43,11 @@ struct Parameters {
     sends: u32,
     // select_labels under the schedule `sweep`: 1 if the rows above have labels.
     labels_above: u32,
-    // refine: the side that the messages are sent to, with the same numbering.
+    // Kernels of label sets: 1 if the sets are those of seams, 0 if they are those of bands.
+    seams: u32,
+    // refine and extend_messages: the side that the messages are sent to, with the same numbering.
     side: u32,
-    // coarsen, coarsen_greys and refine: size, words and strip of the grid that is read.
+    // coarsen, coarsen_greys, refine and label_sets: size, words and strip of the grid that is read.
     other_width: u32,
     other_height: u32,
     other_words: u32,

@@ -27,6 +27,12 @@ wgsl! {
     UPDATE_MESSAGES = "update_messages.wgsl";
     /// Selects labels.
     SELECT_LABELS = "select_labels.wgsl";
+    /// Finds the label sets of a grid.
+    LABEL_SETS = "label_sets.wgsl";
+    /// Computes the data costs of label sets.
+    RESTRICT_COSTS = "restrict_costs.wgsl";
+    /// Extends messages from label sets to all labels.
+    EXTEND_MESSAGES = "extend_messages.wgsl";
 }
 
 // Shared by several kernels.
@@ -39,6 +45,8 @@ wgsl! {
     COSTS = "costs.wgsl";
     /// Reads data costs and messages.
     MESSAGES = "messages.wgsl";
+    /// The layout of label sets.
+    SETS = "sets.wgsl";
     /// Finds the edges whose smoothness cost is lower.
     WEAK_EDGES = "weak_edges.wgsl";
 }

@@ -17,6 +17,18 @@ pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<
     Ok(values)
 }
 
+/// Lengthens a vector to `len` elements, if it has fewer. It keeps what it allocates.
+///
+/// # Errors
+/// As [`filled`].
+pub fn grow<T: Clone>(what: &'static str, values: &mut Vec<T>, len: usize, value: T) -> Result<(), Error> {
+    let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
+    let more = len.saturating_sub(values.len());
+    values.try_reserve_exact(more).map_err(|_| Error::OutOfMemory { what, needed, available: None })?;
+    values.resize(len.max(values.len()), value);
+    Ok(())
+}
+
 /// The bytes that a vector holds.
 #[must_use]
 pub fn bytes<T>(values: &Vec<T>) -> u64 {

@@ -22,7 +22,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`Error::Plan`] if a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or comes with
-    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`]. Also the errors of [`Size::new`].
+    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`], or label sets with another schedule. Also the errors of [`Size::new`].
     pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
         let size = Size::new(size.width, size.height)?;
         if settings.grids == 0 || settings.steps == 0 {
@@ -39,6 +39,9 @@ impl Plan {
         }
         if settings.schedule == Schedule::Sweep && settings.message_start == MessageStart::Sender {
             return Err(Error::Plan("message start sender has no meaning under the schedule sweep"));
+        }
+        if settings.label_sets && settings.schedule != Schedule::Sweep {
+            return Err(Error::Plan("label sets need the schedule sweep"));
         }
         let sizes =
             std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids as usize).collect();
@@ -153,7 +156,8 @@ impl Plan {
         let beside = self.sizes[grid].width as u64 - 1 - cut;
         let up = |rows: Range<usize>| rows.map(|y| self.edges_above(grid, y)).sum::<u64>();
         let prepare = |seam: Seam| {
-            let back = if grid == 0 { seam.label_rows().start } else { seam.below }..seam.rows_below().end;
+            let back =
+                if self.decides_labels(grid) { seam.label_rows().start } else { seam.below }..seam.rows_below().end;
             let rows = (seam.rows().len() + back.len()) as u64;
             rows * beside + up(seam.rows().start + 1..seam.rows().end) + up(back)
         };
@@ -187,10 +191,30 @@ impl Plan {
         if grid > 0 && self.settings.coarse_clip { truncation + truncation / 2 } else { self.model.clip() }
     }
 
-    /// Whether the next coarser grid needs wide sums beside this grid's stored costs, because those may have been clipped.
+    /// Whether the nodes of a grid have label sets: on grids 0 and 1 of at least three, under [`Settings::label_sets`].
+    #[must_use]
+    pub fn has_label_sets(&self, grid: usize) -> bool {
+        self.settings.label_sets && self.grids() > 2 && grid < 2
+    }
+
+    /// Whether the labels of a grid are decided: those of grid 0, and those that determine label sets.
+    #[must_use]
+    pub fn decides_labels(&self, grid: usize) -> bool {
+        grid.checked_sub(1).is_none_or(|finer| self.has_label_sets(finer))
+    }
+
+    /// The number of labels that determine label sets: those of grid 2, then those of grid 1 in their place.
+    #[must_use]
+    pub fn coarser_labels(&self) -> usize {
+        if self.has_label_sets(0) { self.size(1).pixels() } else { 0 }
+    }
+
+    /// Whether a grid's unclipped costs are needed beside its stored costs: for the sums of the next coarser grid, if the
+    /// stored costs may have been clipped, or for those of its label sets.
     #[must_use]
     pub fn keeps_sums(&self, grid: usize) -> bool {
-        grid + 1 < self.grids() && self.model.max_cost(grid) > u64::from(self.clip(grid))
+        let clipped = self.model.max_cost(grid) > u64::from(self.clip(grid));
+        grid + 1 < self.grids() && clipped || self.has_label_sets(grid)
     }
 
     /// The bytes of one such sum: the fewest of 1, 2, 4 and 8 that hold the largest sum.
@@ -243,6 +267,9 @@ impl Plan {
             let node_bytes = 2 * (self.model.labels() + Seam::LABEL_ROWS);
             let bytes = (seams * self.image_size().width) as u64 * node_bytes as u64;
             buffers.push(Buffer { name: "seams", grid: 0, bytes });
+        }
+        if self.has_label_sets(0) {
+            buffers.push(Buffer { name: "coarser labels", grid: 1, bytes: 2 * self.coarser_labels() as u64 });
         }
         buffers
     }

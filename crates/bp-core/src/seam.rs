@@ -15,7 +15,7 @@ use crate::BAND_ROWS;
 ///    the seam sends down are what the row below the seam holds from above, in all loops.
 /// 2. Backward over [`Seam::rows_below`]. The messages that the first of them sends up are what the row above the seam holds
 ///    from below, in all loops.
-/// 3. On the finest grid only, backward over [`Seam::label_rows`], all of which send up. Then the labels of these rows are
+/// 3. On grids whose labels are decided ([`Plan::decides_labels`](crate::Plan::decides_labels)), backward over [`Seam::label_rows`], all of which send up. Then the labels of these rows are
 ///    decided, as in a band that begins with them and has nothing above it. The labels of the row above the seam are f_up for
 ///    the row below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

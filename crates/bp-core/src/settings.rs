@@ -72,6 +72,7 @@ impl Algorithm {
                 message_start: MessageStart::Receiver,
                 cut: None,
                 coarse_clip: true,
+                label_sets: false,
             };
         }
         let levels = if self.is_coarse_to_fine() { log2 + 1 } else { 1 };
@@ -84,6 +85,7 @@ impl Algorithm {
             message_start: MessageStart::Receiver,
             cut: self.is_cut().then(|| Cut::at_centre(size)),
             coarse_clip: false,
+            label_sets: false,
         }
     }
 }
@@ -238,6 +240,20 @@ pub struct Settings {
     /// coarser grids stay unclipped. Clipping lowers the energy and the root mean squared error of [`Algorithm::Sweep`].
     /// It is off for the algorithms of the thesis.
     pub coarse_clip: bool,
+    /// Whether the nodes of grids 1 and 0 may take only the labels that the next coarser grid's answer makes likely, see
+    /// [`LabelSet`](crate::LabelSet). Only under [`Schedule::Sweep`], and without effect on fewer than three grids.
+    ///
+    /// The labels of grids 2 and 1 are decided as those of grid 0. Then the nodes of each [`Patch`](crate::Patch) of the next
+    /// finer grid share a set, and other labels do not exist for them:
+    ///
+    /// - The data cost of a node is that of its set's labels, less the least of these, clipped as usual.
+    /// - A message has a value for each label of the receiver's set: the least, over the labels a of the sender's set, of
+    ///   `h(a) + min(s |a - d|, K)`, less the least h.
+    /// - Where a message is used for other labels than those of its receiver's set S, its value at d is the least
+    ///   `min(M(e) + s |d - e|, K)` over e in S, with s and K of the model. This applies to the messages that the first messages
+    ///   of the finer grid are made from, and to those of a seam, whose rows have other sets than the bands.
+    /// - A label is the smallest of its node's set that minimises what it minimises otherwise.
+    pub label_sets: bool,
 }
 
 #[cfg(test)]

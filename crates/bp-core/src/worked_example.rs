@@ -58,7 +58,7 @@
 //! let device = bp_cpu_scalar::Scalar.open(0)?;
 //! let run = |grids, steps, cut| {
 //!     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
-//!     let settings = Settings { grids, steps, schedule, message_start, cut, coarse_clip: false };
+//!     let settings = Settings { grids, steps, schedule, message_start, cut, coarse_clip: false, label_sets: false };
 //!     let mut driver = Driver::new(device.as_ref(), Plan::new(pair.size(), model, settings)?)?;
 //!     driver.solve(&pair)?;
 //!     let energy = Energy::of(&pair, &model, driver.labels())?;

@@ -11,7 +11,9 @@
 //!
 //! Here one lane of a vector is one coarse node.
 
-use bp_core::Plan;
+use std::array;
+
+use bp_core::{MAX_LABELS, Patch, Plan};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
@@ -19,7 +21,7 @@ use crate::{
     layout::Layout,
     match_cost::Matching,
     shape::{BLOCK, BlockStart, STRIP, Strip},
-    windows::Windows,
+    sweep::{self, Block, LANES, Windows},
 };
 
 /// Computes the costs of `grid` from those of the finer grid, `grid - 1`. `layouts` has the layouts of both, the finer
@@ -41,19 +43,43 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
     }
 }
 
-/// As [`coarsen`], for a grid 0 whose costs are not stored: computes them again, two rows at a time.
-pub(crate) fn coarsen_unstored(matching: &Matching<'_>, windows: &Windows, layout: &Layout, coarse: &mut Costs) {
-    let (fine, clip) = (matching.layout, matching.plan.clip(1));
-    let grids = Grids { level: matching.level, layouts: [fine, layout], clip };
-    grids.narrow_rows_of(coarse, |y, sum| {
+/// As [`coarsen`], for a `grid` whose finer grid's costs are not stored: computes them again, patch by patch. Its sums must fit 8
+/// bits.
+pub(crate) fn coarsen_unstored(
+    matching: &Matching<'_>,
+    windows: &Windows,
+    grid: usize,
+    layout: &Layout,
+    coarse: &mut Costs,
+) {
+    let (clip, level) = (matching.plan.clip(grid), matching.level);
+    let labels = array::from_fn::<u16, MAX_LABELS, _>(|label| label as u16);
+    let labels = &labels[..layout.labels];
+    let Costs { stored, sums } = coarse;
+    costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
         windows.with(|window| {
-            let rows = (2 * y..fine.size.height.min(2 * y + 2)).zip(window.costs.chunks_exact_mut(fine.row()));
-            rows.for_each(|(y, raw)| matching.unclipped_row(y, raw));
-            let (upper, rest) = window.costs.split_at(fine.row());
-            let lower = if 2 * y + 1 < fine.size.height { &rest[..fine.row()] } else { &[] };
-            sum([upper, lower]);
+            let (even, rest) = window.work.costs.split_at_mut(labels.len());
+            let (odd, rest) = rest.split_at_mut(labels.len());
+            for patch in 0..layout.size.width.div_ceil(Patch::COLUMNS) {
+                matching.unclipped(grid, patch, y, labels, [&mut *even, &mut *odd], rest);
+                for (plane, costs) in [&mut *even, &mut *odd].into_iter().enumerate() {
+                    let first = plane * layout.plane() + LANES * patch;
+                    if let Some(keep) = keep.as_deref_mut() {
+                        store(layout, costs, &mut keep[first..]);
+                    }
+                    dispatch!(level, simd => sweep::normalise(simd, clip, costs));
+                    store(layout, costs, &mut stored[first..]);
+                }
+            }
         });
     });
+}
+
+/// Stores the blocks of all labels.
+fn store(layout: &Layout, costs: &[Block], stored: &mut [u8]) {
+    for (label, block) in costs.iter().enumerate() {
+        stored[label * layout.lanes..][..LANES].copy_from_slice(&block.0);
+    }
 }
 
 struct Grids<'a> {
@@ -98,16 +124,10 @@ impl Grids<'_> {
 
     /// As [`Grids::rows`], for sums that fit 8 bits, as those of the largest grids do.
     fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
-        self.narrow_rows_of(coarse, |y, sum| sum(self.children(fine, y)));
-    }
-
-    /// As [`Grids::narrow_rows`], for rows that are computed on demand: `children(y, sum)` calls `sum` with the rows.
-    fn narrow_rows_of(&self, coarse: &mut Costs, children: impl Fn(usize, &mut dyn FnMut([&[u8]; 2])) + Sync) {
         let Costs { stored, sums } = coarse;
-        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, mut keep| {
-            children(y, &mut |children| {
-                dispatch!(self.level, simd => self.narrow_row(simd, children, stored, keep.as_deref_mut()));
-            });
+        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, keep| {
+            let children = self.children(fine, y);
+            dispatch!(self.level, simd => self.narrow_row(simd, children, stored, keep));
         });
     }
 

@@ -126,6 +126,11 @@ impl Around<'_> {
         self
     }
 
+    /// Whether the edge of this slot is weak.
+    pub(crate) fn is_weak(&self, slot: usize, lane: usize) -> bool {
+        self.own[lane].abs_diff(self.neighbours[slot][lane]) > self.threshold
+    }
+
     /// Chooses one of two values for each node of a vector from `lane` on: `weak` if the edge of this slot is weak.
     #[inline(always)]
     pub(crate) fn choose<S: Simd, V: SimdInt<S, Element = u8>>(

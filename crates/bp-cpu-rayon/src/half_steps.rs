@@ -1,17 +1,23 @@
 //! The schedules `sync` and `checkerboard`: half-steps in which the nodes of one colour send.
 
+mod edges;
+mod pass;
+mod refine;
+mod select_labels;
+mod update_messages;
+mod wavefront;
+
 use std::ops::Range;
 
-use bp_core::{Schedule, Side};
+use bp_core::Schedule;
 
-use crate::{
-    edges::{self, Edges},
-    layout::Layout,
-    pass::{Pass, Way},
-    shape::PlaneRow,
-    update_messages::Sends,
-    wavefront::{Part, Wavefront, fused_steps},
-};
+use crate::{layout::Layout, shape::PlaneRow};
+use wavefront::{Part, Wavefront, fused_steps};
+
+pub(crate) use edges::{Edges, Rows, bytes};
+pub(crate) use pass::Pass;
+pub(crate) use refine::Coarser;
+pub(crate) use select_labels::{Answer, select_labels};
 
 /// The number of steps that run together on a grid.
 pub(crate) fn steps_at_a_time(layout: &Layout) -> usize {
@@ -45,13 +51,13 @@ fn half_steps(grid: &Pass<'_>, steps: Range<usize>, sends_first: usize, sets: [&
         let t = steps.start + t;
         let at = PlaneRow { plane: (y + t + sends_first) % 2, y };
         if t == 0 && !grid.keeps_messages {
-            grid.refine(at, &Side::ALL, rows);
+            grid.refine(at, rows);
         }
         if last == Some(t) {
             edges::copy(grid.layout, rows, other, at.plane);
-            grid.send(Way::Down, at, Sends::All, other);
+            grid.send(at, other);
         } else {
-            grid.send(Way::Down, at, Sends::All, rows);
+            grid.send(at, rows);
         }
     };
     Wavefront { height: grid.layout.size.height, steps: steps.len() }.run([set, other], &step);

@@ -9,30 +9,24 @@
 //! Where to start reading:
 //!
 //! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and which are weak.
-//! * `edges` explains why one message per edge is enough.
-//! * Each kernel has its own file: `match_cost` (on `features`), `coarsen`, `refine`, `update_messages` and
-//!   `select_labels`. Each file begins with the loop of the scalar version.
-//! * `pass` is the work of a row in a step. `half_steps` runs such passes over whole grids by `wavefront`; `sweep` runs
-//!   them over one band at a time, in `windows`, after it has prepared the `seams` between them.
+//! * `match_cost` (on `features` and `compare`) and `coarsen` compute data costs.
+//! * `half_steps` runs the schedules `sync` and `checkerboard` over whole grids. Its `edges` explains why one message per edge
+//!   is enough.
+//! * `sweep` runs the schedule of that name over one band of rows at a time, in blocks, each with its own list of labels.
+//! * Both have the kernels `refine` and those that send messages and select labels. Each file begins with the loop of the
+//!   scalar version or with what differs from it.
 
 mod coarsen;
+mod compare;
 mod costs;
-mod edges;
 mod features;
 mod greys;
 mod half_steps;
 mod layout;
 mod match_cost;
-mod pass;
-mod refine;
-mod seams;
-mod select_labels;
 mod shape;
 mod solver;
 mod sweep;
-mod update_messages;
-mod wavefront;
-mod windows;
 
 use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver, memory};
 use fearless_simd::Level;

@@ -11,14 +11,16 @@
 //!
 //! Here one lane of a vector is one pixel, so a label is a shift of the right image's lanes.
 
-use bp_core::{Plan, Profile, Schedule, Seed};
-use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
+use bp_core::{Plan, Schedule, Seed};
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
+    compare::compare_by,
     costs::{self, Costs, Sums},
     features::Features,
     layout::Layout,
     shape::{BLOCK, BlockStart, Column, STRIP, Strip},
+    sweep::{self, Bytes, LANES},
 };
 
 /// The inputs of the data costs of a pair.
@@ -30,9 +32,14 @@ pub(crate) struct Matching<'a> {
     pub(crate) seed: Option<Seed>,
 }
 
-/// Whether the costs of a grid are stored. Under `sweep`, those of grid 0 are computed when needed if they fit 8 bits.
+/// Whether the costs of a grid are stored. Under `sweep`, those of grid 0 are computed when needed if they fit 8 bits, and so
+/// are those of grid 1 if it has label sets and the sums of grid 2 fit too.
 pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
-    grid > 0 || plan.settings().schedule != Schedule::Sweep || !is_narrow(plan)
+    match grid {
+        0 => plan.settings().schedule != Schedule::Sweep || !is_narrow(plan),
+        1 => !plan.has_label_sets(1) || plan.sum_bytes(2) > 1,
+        _ => true,
+    }
 }
 
 /// Whether all costs of grid 0 fit 8 bits.
@@ -61,10 +68,7 @@ impl Matching<'_> {
     /// Stores the costs of a row of a narrow profile. Also stores the unclipped costs if `sums` has room for them.
     pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
         let row = Row { matching: self, y };
-        // Normalising and clipping never change a message. They keep sums within 8 bits. Sums that fit need neither.
-        let model = self.plan.model();
-        let fits = model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into();
-        if fits && sums.is_none() {
+        if self.fits() && sums.is_none() {
             dispatch!(self.level, simd => row.unclipped(simd, stored));
         } else {
             dispatch!(self.level, simd => row.narrow(simd, stored, sums));
@@ -72,10 +76,32 @@ impl Matching<'_> {
         self.fix(y, stored);
     }
 
-    /// Writes the unclipped costs of a row of a narrow profile.
-    pub(crate) fn unclipped_row(&self, y: usize, raw: &mut [u8]) {
+    /// Whether unclipped costs need not be normalised and clipped. That never changes a message. It keeps sums within 8 bits.
+    pub(crate) fn fits(&self) -> bool {
+        let model = self.plan.model();
+        model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into()
+    }
+
+    /// Writes the unclipped costs of a block of nodes in row y, for these labels, or adds them to what `costs` hold.
+    pub(crate) fn block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [sweep::Block], add: bool) {
         let row = Row { matching: self, y };
-        dispatch!(self.level, simd => row.unclipped(simd, raw));
+        dispatch!(self.level, simd => row.of_block(simd, at, labels, costs, add));
+    }
+
+    /// As [`Matching::fix`], for a block.
+    pub(crate) fn fix_block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [sweep::Block]) {
+        let Some(seed) = self.seed else { return };
+        for lane in 0..LANES {
+            if seed.touches(2 * (at.lane + lane) + at.plane, y) {
+                let cost = |&label: &u16| if label.abs_diff(seed.label) <= 1 { 0 } else { self.dear() };
+                labels.iter().zip(&mut *costs).for_each(|(label, block)| block.0[lane] = cost(label));
+            }
+        }
+    }
+
+    /// The cost of labels far from that of a known match.
+    fn dear(&self) -> u8 {
+        self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8
     }
 
     fn wide_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u16]>) {
@@ -98,11 +124,10 @@ impl Matching<'_> {
     fn fix(&self, y: usize, row: &mut [u8]) {
         let Some(seed) = self.seed else { return };
         let layout = self.layout;
-        let dear = self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8;
         for Column { plane, lane, .. } in layout.columns().filter(|column| seed.touches(column.x, y)) {
             for label in 0..layout.labels {
                 let near = (label as u16).abs_diff(seed.label) <= 1;
-                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { dear };
+                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { self.dear() };
             }
         }
     }
@@ -152,28 +177,7 @@ impl Row<'_> {
 
     #[inline(always)]
     fn costs<S: Simd>(&self, simd: S, plane: usize, strip: Strip, raw: &mut [u8]) -> [u8; STRIP] {
-        // A closure, because the compiler may call a function that is passed by name instead of inlining it.
-        macro_rules! compared_by {
-            ($cost:expr) => {
-                self.strip(
-                    simd,
-                    plane,
-                    strip,
-                    raw,
-                    #[inline(always)]
-                    |left, right| $cost(simd, left, right),
-                )
-            };
-        }
-        match self.matching.plan.model().profile() {
-            Profile::Census => compared_by!(hamming_distance),
-            Profile::Census5x5 => compared_by!(hamming_distance_of_24::<S, 20>),
-            Profile::Gradient => compared_by!(gradient_difference),
-            Profile::BirchfieldTomasi => compared_by!(sampling_insensitive_difference),
-            Profile::CensusRgb => compared_by!(hamming_distance_of_24::<S, 18>),
-            // `mrf` has costs above 8 bits and never gets here.
-            Profile::Thesis | Profile::Mrf => compared_by!(truncated_difference),
-        }
+        compare_by!(self.matching.plan.model().profile(), S::u8s, self.strip(simd, plane, strip, raw))
     }
 
     /// Computes the costs of a strip of nodes by comparing `CHANNELS` channels. Returns the least cost of each node.
@@ -209,6 +213,101 @@ impl Row<'_> {
             }
         }
         least
+    }
+
+    /// Writes the costs of a block of nodes.
+    #[inline(always)]
+    fn of_block<S: Simd>(&self, simd: S, at: BlockStart, labels: &[u16], costs: &mut [sweep::Block], add: bool) {
+        let profile = self.matching.plan.model().profile();
+        if add {
+            compare_by!(profile, Bytes<S>, self.add_block(simd, at, labels, costs));
+        } else {
+            compare_by!(profile, Bytes<S>, self.write_block(simd, at, labels, costs));
+        }
+    }
+
+    /// Writes the costs of a block of nodes, by comparing `CHANNELS` channels.
+    #[inline(always)]
+    fn write_block<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        at: BlockStart,
+        labels: &[u16],
+        costs: &mut [sweep::Block],
+        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
+    ) {
+        self.each_block(
+            simd,
+            at,
+            labels,
+            costs,
+            cost,
+            #[inline(always)]
+            |out, cost| out.store(cost),
+        );
+    }
+
+    /// Adds the costs of a block of nodes to others.
+    #[inline(always)]
+    fn add_block<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        at: BlockStart,
+        labels: &[u16],
+        costs: &mut [sweep::Block],
+        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
+    ) {
+        self.each_block(
+            simd,
+            at,
+            labels,
+            costs,
+            cost,
+            #[inline(always)]
+            |out, cost| out.store(out.load(simd) + cost),
+        );
+    }
+
+    #[inline(always)]
+    fn each_block<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        at: BlockStart,
+        labels: &[u16],
+        costs: &mut [sweep::Block],
+        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
+        then: impl Fn(&mut sweep::Block, Bytes<S>),
+    ) {
+        let Matching { features, plan, .. } = self.matching;
+        let outside = Bytes::<S>::splat(simd, plan.model().profile().out_of_range_cost() as u8);
+        let load = |lanes: &[u8], at: usize| Bytes::<S>::from_slice(simd, &lanes[at..at + LANES]);
+        let left = channels::<CHANNELS>(|channel| features.left(self.y, channel, at.plane));
+        let left = left.map(|left| load(left, at.lane));
+        let node = load(features.inside(at.plane), BLOCK + at.lane);
+        let right = [0, 1].map(|parity| {
+            let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
+            (right, features.inside(parity))
+        });
+        // As in `lanes`, with everything that does not depend on the label computed once.
+        let (first, min) = (at.lane as i32, plan.model().min_disparity());
+        let (shift, before) = (at.plane as i32 - min, BLOCK as i32);
+        let nodes = [0, 1].map(|parity| self.matching.layout.nodes(parity) as i32);
+        for (&label, out) in labels.iter().zip(costs) {
+            let shift = shift - i32::from(label);
+            let parity = (shift & 1) as usize;
+            let start = first + (shift >> 1);
+            let (right, inside) = &right[parity];
+            if start >= 0 && start + LANES as i32 <= nodes[parity] {
+                // All of them match columns of the right image.
+                let start = (start + before) as usize;
+                then(out, cost(left, right.map(|right| load(right, start))) & node);
+            } else {
+                let start = (start.clamp(-before, nodes[parity]) + before) as usize;
+                let cost = cost(left, right.map(|right| load(right, start)));
+                let inside = load(inside, start);
+                then(out, (cost & inside | outside & !inside) & node);
+            }
+        }
     }
 
     /// The sum of the differences over the colour channels.
@@ -262,68 +361,6 @@ fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'
     let mut all = [[].as_slice(); CHANNELS];
     all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
     all
-}
-
-/// [`Profile::Census`].
-#[inline(always)]
-fn hamming_distance<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
-    (left ^ right).count_ones().min(S::u8s::splat(simd, 6))
-}
-
-/// [`Profile::Census5x5`] and [`Profile::CensusRgb`]: the Hamming distance of 24 bits, at most `MOST`.
-#[inline(always)]
-fn hamming_distance_of_24<S: Simd, const MOST: u8>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
-    let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
-    // A full adder per bit gives a sum and a carry that counts twice. That leaves two vectors of bits to count, not three.
-    let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
-    let twice = carry.count_ones();
-    (sum.count_ones() + twice + twice).min(S::u8s::splat(simd, MOST))
-}
-
-/// [`Profile::Thesis`], with a table.
-#[inline(always)]
-fn truncated_difference<S: Simd>(simd: S, [left]: [S::u8s; 1], [right]: [S::u8s; 1]) -> S::u8s {
-    let table = |difference| (7 * difference + 5) / 10;
-    look_up(simd, table, difference::<S>(left, right).min(S::u8s::splat(simd, 15)))
-}
-
-/// [`Profile::Gradient`]: `(3 a + 35 b + 5) div 10`, which is `(3 a div 5 + 7 b + 1) div 2`.
-#[inline(always)]
-fn gradient_difference<S: Simd>(simd: S, left: [S::u8s; 2], right: [S::u8s; 2]) -> S::u8s {
-    let (grey, gradient) = (difference::<S>(left[0], right[0]), difference::<S>(left[1], right[1]));
-    let [four, five, fifteen] = [4, 5, 15].map(|most| S::u8s::splat(simd, most));
-    // A table has 16 entries, but a has 21 possible values. Beyond 15 a second look-up adds the rest: 3 (15 + c) div 5
-    // is 9 + 3 c div 5.
-    let table = |difference| 3 * difference / 5;
-    let upper = grey.saturating_sub(fifteen).min(five);
-    let greys = look_up(simd, table, grey.min(fifteen)) + look_up(simd, table, upper);
-    let gradients = look_up(simd, |difference| 7 * difference + 1, gradient.min(four));
-    (greys + gradients) >> 1
-}
-
-/// [`Profile::BirchfieldTomasi`]: `(15 d + 5) div 10`, which is `d + (d + 1) div 2`.
-#[inline(always)]
-fn sampling_insensitive_difference<S: Simd>(simd: S, left: [S::u8s; 3], right: [S::u8s; 3]) -> S::u8s {
-    let outside = outside::<S>(left, right).min(outside::<S>(right, left)).min(S::u8s::splat(simd, 20));
-    outside + ((outside + S::u8s::splat(simd, 1)) >> 1)
-}
-
-/// By how much a value lies outside the range around the other pixel.
-#[inline(always)]
-fn outside<S: Simd>([value, ..]: [S::u8s; 3], [_, least, greatest]: [S::u8s; 3]) -> S::u8s {
-    value.saturating_sub(greatest) | least.saturating_sub(value)
-}
-
-#[inline(always)]
-fn difference<S: Simd>(left: S::u8s, right: S::u8s) -> S::u8s {
-    left.saturating_sub(right) | right.saturating_sub(left)
-}
-
-/// Looks up indices from 0 to 15 in `table`.
-#[inline(always)]
-fn look_up<S: Simd>(simd: S, table: impl Fn(u8) -> u8, indices: S::u8s) -> S::u8s {
-    let table = u8x16::from_fn(simd, |index| table(index as u8));
-    S::u8s::block_splat(table).swizzle_dyn_within_blocks(indices)
 }
 
 struct Block<'a> {

@@ -2,24 +2,18 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, memory};
+use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
 use fearless_simd::Level;
 
 use crate::{
     coarsen::{coarsen, coarsen_unstored},
     costs::{self, Costs},
-    edges::{self, Edges, Rows},
     features::{self, Features},
-    half_steps,
+    half_steps::{self, Answer, Coarser, Edges, Pass, Rows, select_labels},
     layout::{self, Layout},
     match_cost::{Matching, is_stored, match_cost},
-    pass::Pass,
-    refine::Coarser,
-    seams::{self, Seams},
-    select_labels::{Answer, select_labels},
     shape::Shape,
-    sweep::{CostSource, Sweep},
-    windows::{self, Windows},
+    sweep::{self, CostSource, Grid, Swept},
 };
 
 /// A prepared plan.
@@ -31,21 +25,18 @@ pub(crate) struct RayonSolver {
     costs: Vec<Costs>,
     /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at the same time.
     messages: [Messages; 2],
-    windows: Windows,
-    seams: Seams,
+    swept: Swept,
     /// Whether grid 0 starts with the messages that it already holds.
     keeps_messages: bool,
     seed: Option<Seed>,
-    /// The labels of a swept image. They are decided while its messages are in cache.
-    decided: Vec<u16>,
 }
 
-/// The messages of one grid. A set has one message per edge, and a schedule needs one or two sets.
+/// The messages of one grid, in two sets.
 ///
 /// A grid is bipartite. So a synchronous run consists of two independent runs of half-steps: in one the even nodes send
 /// first, in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is only the first run; its
-/// last half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps one
-/// message per edge by definition.
+/// last half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps none here,
+/// see [`Swept`].
 struct Messages {
     sets: [Edges; 2],
 }
@@ -56,55 +47,37 @@ impl Messages {
     }
 }
 
-/// The number of sets of messages that a grid keeps. Grid 0 keeps none under `sweep`.
-fn sets(plan: &Plan, grid: usize) -> usize {
-    match plan.settings().schedule {
-        Schedule::Sweep => usize::from(grid > 0),
-        Schedule::Sync | Schedule::Checkerboard => 2,
-    }
+/// Whether messages are kept in sets.
+fn has_sets(plan: &Plan) -> bool {
+    plan.settings().schedule != Schedule::Sweep
 }
 
-/// The two grids whose messages need the most memory: the finest grids of even and of odd index that keep any.
-fn largest(plan: &Plan) -> [usize; 2] {
-    if sets(plan, 0) == 0 { [2, 1] } else { [0, 1] }
-}
-
-/// The bytes that a solver will allocate.
+/// The bytes that a solver will allocate, or with label sets the most that it may allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
-    let kept = largest(plan).into_iter().filter(|&grid| grid < plan.grids());
-    let messages = kept.map(|grid| edges::bytes(&Shape::new(plan, grid)) as u64 * sets(plan, grid) as u64);
-    let labels = 2 * plan.image_size().pixels() as u64;
-    let decided = if plan.settings().schedule == Schedule::Sweep { labels } else { 0 };
+    let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
+    let messages = kept.map(|grid| 2 * half_steps::bytes(&Shape::new(plan, grid)) as u64);
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let features = features::bytes(plan.image_size(), plan.model());
-    let others = [labels, decided, features, windows::bytes(plan), seams::bytes(plan)];
-    costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
+    costs.chain(messages).chain(layouts).chain([features, sweep::bytes(plan)]).fold(0, u64::saturating_add)
 }
 
 impl RayonSolver {
     /// Allocates all buffers.
     pub(crate) fn new(level: Level, plan: &Plan) -> Result<Self, Error> {
-        let set = |grid, set| {
-            let needed = grid < plan.grids() && set < sets(plan, grid);
-            if needed { Edges::new(plan, grid) } else { Ok(Edges::none()) }
-        };
-        let messages = |grid| Ok::<_, Error>(Messages { sets: [set(grid, 0)?, set(grid, 1)?] });
+        let set = |grid| if has_sets(plan) && grid < plan.grids() { Edges::new(plan, grid) } else { Ok(Edges::none()) };
+        let messages = |grid| Ok::<_, Error>(Messages { sets: [set(grid)?, set(grid)?] });
         let costs = |grid| if is_stored(plan, grid) { Costs::new(plan, grid) } else { Ok(Costs::none()) };
-        let [even, odd] = largest(plan);
-        let decided = if plan.settings().schedule == Schedule::Sweep { plan.image_size().pixels() } else { 0 };
         Ok(Self {
             level,
             layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect::<Result<_, _>>()?,
             features: Features::new(plan.image_size(), plan.model())?,
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
-            messages: [messages(even)?, messages(odd)?],
-            windows: Windows::new(plan)?,
-            seams: Seams::new(plan)?,
+            messages: [messages(0)?, messages(1)?],
+            swept: Swept::new(plan)?,
             keeps_messages: false,
             seed: None,
-            decided: memory::filled("labels", decided, 0)?,
             plan: plan.clone(),
         })
     }
@@ -114,16 +87,15 @@ impl RayonSolver {
         Matching { level: *level, plan, layout: &layouts[0], features, seed: *seed }
     }
 
-    /// A grid, ready to be swept.
-    fn sweep(&self, grid: usize) -> Sweep<'_> {
-        let Self { level, plan, layouts, windows, .. } = self;
-        let costs = if is_stored(plan, grid) {
-            CostSource::Stored(&self.costs[grid].stored)
+    /// A grid, ready to be swept, and what is swept.
+    fn grid(&self, index: usize) -> Grid<'_> {
+        let Self { level, plan, layouts, costs, .. } = self;
+        let source = if is_stored(plan, index) {
+            CostSource::Stored(&costs[index])
         } else {
             CostSource::Computed(self.matching())
         };
-        let coarser = self.coarser(grid);
-        Sweep { level: *level, plan, layout: &layouts[grid], costs, coarser, windows }
+        Grid { level: *level, plan, index, layouts, costs: source }
     }
 
     /// The messages that a grid starts with.
@@ -133,9 +105,9 @@ impl RayonSolver {
     }
 
     fn answer(&self) -> Answer<'_> {
-        let (level, model, layout) = (self.level, self.plan.model(), &self.layouts[0]);
+        let layout = &self.layouts[0];
         let received = received(&self.plan, layout, &self.messages[0]);
-        Answer { level, model, layout, first: 0, stored: &self.costs[0].stored, received }
+        Answer { level: self.level, layout, stored: &self.costs[0].stored, received }
     }
 }
 
@@ -150,6 +122,7 @@ fn received_in(plan: &Plan) -> [usize; 2] {
     [0, 1].map(|colour| match plan.settings().schedule {
         Schedule::Sync => (colour + steps) % 2,
         Schedule::Checkerboard => usize::from(colour == steps % 2),
+        // Nothing is kept.
         Schedule::Sweep => 0,
     })
 }
@@ -169,11 +142,13 @@ impl Solver for RayonSolver {
 
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
         let mut coarse = std::mem::replace(&mut self.costs[grid], Costs::none());
-        if is_stored(&self.plan, grid - 1) {
+        if !is_stored(&self.plan, grid) {
+            // Its costs are computed when needed.
+        } else if is_stored(&self.plan, grid - 1) {
             let layouts = [&self.layouts[grid - 1], &self.layouts[grid]];
             coarsen(self.level, &self.plan, grid, layouts, &self.costs[grid - 1], &mut coarse);
         } else {
-            coarsen_unstored(&self.matching(), &self.windows, &self.layouts[grid], &mut coarse);
+            coarsen_unstored(&self.matching(), self.swept.windows(), grid, &self.layouts[grid], &mut coarse);
         }
         self.costs[grid] = coarse;
         let (fine, coarse) = self.layouts.split_at_mut(grid);
@@ -198,16 +173,14 @@ impl Solver for RayonSolver {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
             // All loops of a band run together, at the last step.
-            if steps.end == self.plan.settings().steps {
-                self.run_sweeps(grid);
-            }
-            return Ok(());
+            let is_last = steps.end == self.plan.settings().steps;
+            return if is_last { self.with_swept(|swept, solver| swept.run(&solver.grid(grid))) } else { Ok(()) };
         }
         let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
         let coarser = self.coarser(grid);
         let keeps_messages = grid == 0 && self.keeps_messages;
-        let pass = Pass { level: self.level, plan: &self.plan, layout, first: 0, costs, coarser, keeps_messages };
+        let pass = Pass { level: self.level, plan: &self.plan, layout, costs, coarser, keeps_messages };
         half_steps::run(&pass, steps.start as usize..steps.end as usize, &mut messages.sets);
         self.messages[grid % 2] = messages;
         Ok(())
@@ -215,7 +188,7 @@ impl Solver for RayonSolver {
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => labels.copy_from_slice(&self.decided),
+            Schedule::Sweep => labels.copy_from_slice(self.swept.labels()),
             Schedule::Sync | Schedule::Checkerboard => select_labels(&self.answer(), labels),
         }
         Ok(())
@@ -223,10 +196,12 @@ impl Solver for RayonSolver {
 
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => self.sweep(0).read_messages(&self.seams, side, messages),
-            Schedule::Sync | Schedule::Checkerboard => self.answer().read_messages(&self.plan, side, messages),
+            Schedule::Sweep => self.swept.read_messages(&self.grid(0), side, messages),
+            Schedule::Sync | Schedule::Checkerboard => {
+                self.answer().read_messages(&self.plan, side, messages);
+                Ok(())
+            }
         }
-        Ok(())
     }
 
     fn fused_steps(&self) -> u32 {
@@ -247,30 +222,16 @@ impl Solver for RayonSolver {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();
         let layouts: u64 = self.layouts.iter().map(Layout::bytes).sum();
-        self.features.bytes()
-            + costs
-            + messages
-            + layouts
-            + self.windows.bytes()
-            + self.seams.bytes()
-            + memory::bytes(&self.decided)
+        self.features.bytes() + costs + messages + layouts + self.swept.bytes()
     }
 }
 
 impl RayonSolver {
-    /// Runs all loops on a grid, and decides the labels of the finest one.
-    fn run_sweeps(&mut self, grid: usize) {
-        let mut seams = std::mem::replace(&mut self.seams, Seams::none());
-        self.sweep(grid).prepare(&mut seams, grid == 0);
-        if grid == 0 {
-            let mut decided = std::mem::take(&mut self.decided);
-            self.sweep(0).decode(&seams, &mut decided);
-            self.decided = decided;
-        } else {
-            let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
-            self.sweep(grid).keep_messages(&seams, &mut messages.sets[0]);
-            self.messages[grid % 2] = messages;
-        }
-        self.seams = seams;
+    /// Calls `run` with what is swept, which it may change while it reads everything else.
+    fn with_swept(&mut self, run: impl FnOnce(&mut Swept, &Self) -> Result<(), Error>) -> Result<(), Error> {
+        let mut swept = std::mem::take(&mut self.swept);
+        let result = run(&mut swept, self);
+        self.swept = swept;
+        result
     }
 }

@@ -1,213 +1,231 @@
-//! [`bp_core::Schedule::Sweep`]: sweeps every band of rows independently, in cache.
+//! [`bp_core::Schedule::Sweep`]: passes every band of rows by itself, in cache.
+//!
+//! Values lie in blocks: 32 nodes of one column parity in the 64 columns of a [`bp_core::Patch`], one byte for each node.
+//! Every array is `[row][patch][entry]`, where the entries of a patch are the labels of its list ([`lists`]). So walks over
+//! the labels are contiguous, and patches may have different labels ([`bp_core::Settings::label_sets`]).
+//!
+//! `pass` runs over rows; it calls `costs`, `refine` and `send` block by block. `decode` decides labels.
+
+mod block;
+mod costs;
+mod decode;
+mod lists;
+mod messages;
+mod pass;
+mod refine;
+mod seams;
+mod send;
+mod swept;
+mod windows;
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Plan, Seam, Side};
+use bp_core::{BAND_ROWS, Error, Plan, Seam, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use crate::{
-    edges::{self, Edges, Rows},
-    layout::Layout,
-    match_cost::Matching,
-    pass::{Pass, Way},
-    refine::Coarser,
-    seams::{PreparedMut, Seams},
-    select_labels::Answer,
-    shape::PlaneRow,
-    update_messages::Sends,
-    windows::{Window, Windows},
-};
+pub(crate) use block::{Block, Bytes, LANES};
+pub(crate) use costs::{CostSource, normalise};
+pub(crate) use swept::{Grid, Swept, bytes};
+pub(crate) use windows::Windows;
 
-/// Where the costs of a grid come from.
-pub(crate) enum CostSource<'a> {
-    /// They are stored.
-    Stored(&'a [u8]),
-    /// They are computed when needed, which takes less time than reading them from memory.
-    Computed(Matching<'a>),
+use crate::layout::Layout;
+use lists::Lists;
+use messages::{Entry, Messages};
+use pass::{Gap, Pass, Start};
+use refine::Coarser;
+use seams::Prepared;
+use windows::{Window, Work};
+
+/// A band of a grid whose messages the next finer grid starts with.
+#[derive(Default)]
+pub(crate) struct Band {
+    lists: Lists,
+    messages: Messages,
+}
+
+/// The bytes of a band of so many rows, patches and entries.
+fn band_bytes(rows: usize, patches: usize, entries: usize) -> u64 {
+    lists::bytes(patches, entries).saturating_add(messages::bytes(rows, entries))
+}
+
+impl Band {
+    /// Allocates room for so many rows, patches and entries.
+    fn new(rows: usize, patches: usize, entries: usize) -> Result<Self, Error> {
+        let mut band = Self::default();
+        band.lists.reserve(patches, entries)?;
+        band.messages.fit(rows, entries)?;
+        Ok(band)
+    }
+
+    /// The bytes held.
+    fn bytes(&self) -> u64 {
+        self.lists.bytes() + self.messages.bytes()
+    }
 }
 
 /// A grid that is swept.
 pub(crate) struct Sweep<'a> {
-    pub(crate) level: Level,
-    pub(crate) plan: &'a Plan,
-    pub(crate) layout: &'a Layout,
-    pub(crate) costs: CostSource<'a>,
-    pub(crate) coarser: Option<Coarser<'a>>,
-    pub(crate) windows: &'a Windows,
+    level: Level,
+    plan: &'a Plan,
+    grid: usize,
+    layout: &'a Layout,
+    costs: &'a CostSource<'a>,
+    coarser: Option<Coarser<'a>>,
+    /// The labels of the next coarser grid, if they determine label sets.
+    coarser_labels: &'a [u16],
+    windows: &'a Windows,
+    gaps: [Gap; 4],
 }
 
 impl Sweep<'_> {
-    /// Prepares all seams. Their labels are decided only if `decides`.
-    pub(crate) fn prepare(&self, seams: &mut Seams, decides: bool) {
-        seams.all_mut(self.layout).for_each(|(seam, prepared)| self.prepare_seam(seam, prepared, decides));
+    /// Prepares all seams.
+    fn prepare(&self, seams: &mut [Prepared]) -> Result<(), Error> {
+        let height = self.layout.size.height;
+        let seams = seams.par_iter_mut().enumerate();
+        seams.try_for_each(|(index, prepared)| match Seam::all(height).nth(index) {
+            Some(seam) => self.windows.with(|window| self.prepare_seam(seam, prepared, window)),
+            None => Ok(()),
+        })
     }
 
-    fn prepare_seam(&self, seam: Seam, prepared: PreparedMut<'_>, decides: bool) {
-        self.with_rows(seam.rows(), |rows, edges| {
-            edges::up(self.layout, edges).fill(0);
-            rows.forward(Start::Refined, edges);
-            prepared.down.copy_from_slice(edges::up(self.layout, rows.from(seam.below, edges)));
-            rows.backward(seam.rows_below(), edges);
-            prepared.up.copy_from_slice(edges::up(self.layout, rows.from(seam.below, edges)));
-            if decides {
-                rows.backward(seam.label_rows(), edges);
-                self.answer(rows, seam.label_rows().start, edges).decode_band(None, prepared.labels);
-            }
-        });
+    fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
+        let Window { messages, work, .. } = window;
+        self.fill(seam.rows(), &mut prepared.lists, messages, work)?;
+        let entries = prepared.lists.entries();
+        prepared.fit_messages(entries)?;
+        let [down, up] = &mut prepared.messages;
+        let mut pass = Pass { sweep: self, rows: seam.rows(), lists: &prepared.lists, messages, work };
+        pass.up_mut(seam.rows().start).fill(Block::ZERO);
+        pass.forward(Start::Refined);
+        down[..2 * entries].copy_from_slice(pass.up_mut(seam.below));
+        pass.backward(seam.rows_below());
+        up[..2 * entries].copy_from_slice(pass.up_mut(seam.below));
+        if self.plan.decides_labels(self.grid) {
+            pass.backward(seam.label_rows());
+            let labels = Seam::LABEL_ROWS * self.layout.size.width;
+            pass.decode(seam.label_rows(), None, &mut prepared.labels[..labels]);
+        }
+        Ok(())
     }
 
-    /// Sweeps all bands and keeps their messages.
-    pub(crate) fn keep_messages(&self, seams: &Seams, edges: &mut Edges) {
-        edges.bands_mut(self.layout, BAND_ROWS).enumerate().for_each(|(index, kept)| {
-            self.sweep(index, seams, |_, edges| {
-                kept.copy_from_slice(&edges::inside_and_down(self.layout, edges)[..kept.len()]);
-            });
-        });
+    /// Makes the lists of rows that are passed together, and room for everything else.
+    fn fill(
+        &self,
+        rows: Range<usize>,
+        lists: &mut Lists,
+        messages: &mut Messages,
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        lists.fill(self.plan, self.grid, rows.clone(), self.coarser_labels)?;
+        messages.fit(rows.len(), lists.entries())?;
+        work.fit(rows.len(), lists.entries())?;
+        work.crossings.find(lists);
+        Ok(())
+    }
+
+    /// Sweeps all bands and keeps their messages. Decides their labels, if `labels` has room for any.
+    fn keep(&self, seams: &[Prepared], bands: &mut [Band], labels: &mut [u16]) -> Result<(), Error> {
+        let band_labels = BAND_ROWS * self.layout.size.width;
+        let bands = bands.par_iter_mut().take(self.layout.size.height.div_ceil(BAND_ROWS)).enumerate();
+        let sweep = |index: usize, band: &mut Band, labels: Option<&mut [u16]>| {
+            self.windows.with(|window| {
+                let Band { lists, messages } = band;
+                self.sweep(index, seams, (lists, messages, &mut window.work), |pass, above| {
+                    if let Some(labels) = labels {
+                        pass.decode(pass.rows.clone(), above, labels);
+                    }
+                })
+            })
+        };
+        if labels.is_empty() {
+            bands.try_for_each(|(index, band)| sweep(index, band, None))
+        } else {
+            let labels = labels.par_chunks_mut(band_labels);
+            bands.zip(labels).try_for_each(|((index, band), labels)| sweep(index, band, Some(labels)))
+        }
     }
 
     /// Sweeps all bands and decides their labels.
-    pub(crate) fn decode(&self, seams: &Seams, labels: &mut [u16]) {
+    fn decode(&self, seams: &[Prepared], labels: &mut [u16]) -> Result<(), Error> {
         let bands = labels.par_chunks_mut(BAND_ROWS * self.layout.size.width);
-        bands.enumerate().for_each(|(index, labels)| {
-            let above = above(index).and_then(|seam| seams.get(self.layout, seam)).map(|seam| seam.labels);
-            self.sweep(index, seams, |rows, edges| self.answer(rows, rows.first, edges).decode_band(above, labels));
-        });
+        bands.enumerate().try_for_each(|(index, labels)| {
+            self.in_window(index, seams, |pass, above| pass.decode(pass.rows.clone(), above, labels))
+        })
     }
 
-    /// Sweeps all bands again and copies the messages received from `side`, `[height][width][labels]`.
-    pub(crate) fn read_messages(&self, seams: &Seams, side: Side, messages: &mut [u8]) {
+    /// Sweeps all bands again and copies the messages received from `side`, `[height][width][labels]`. Labels that the
+    /// receiver's set lacks have zeros.
+    fn read_messages(&self, seams: &[Prepared], side: Side, messages: &mut [u8]) -> Result<(), Error> {
+        messages.fill(0);
         let bands = messages.par_chunks_mut(BAND_ROWS * self.layout.size.width * self.layout.labels);
-        bands.enumerate().for_each(|(index, messages)| {
-            self.sweep(index, seams, |rows, edges| {
-                self.answer(rows, rows.first, edges).read_messages(self.plan, side, messages);
-            });
-        });
+        bands
+            .enumerate()
+            .try_for_each(|(index, out)| self.in_window(index, seams, |pass, _| pass.read_messages(side, out)))
     }
 
-    fn answer<'a>(&'a self, rows: &'a SweptRows<'_>, first: usize, edges: &'a [u8]) -> Answer<'a> {
-        let row = first - rows.first;
-        let received = Rows::new(self.layout, first, &edges[row * edges::row_bytes(self.layout)..]);
-        let (level, model, layout) = (self.level, self.plan.model(), self.layout);
-        let stored = &rows.pass.costs[row * layout.row()..];
-        Answer { level, model, layout, first, stored, received: [received, received] }
+    fn in_window(
+        &self,
+        index: usize,
+        seams: &[Prepared],
+        then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
+    ) -> Result<(), Error> {
+        self.windows.with(|window| {
+            let Window { lists, messages, work } = window;
+            self.sweep(index, seams, (lists, messages, work), then)
+        })
     }
 
-    /// Sweeps a band as often as the plan requires, then calls `then` with its rows and edges.
-    fn sweep(&self, index: usize, seams: &Seams, then: impl FnOnce(&SweptRows<'_>, &[u8])) {
-        let first = index * BAND_ROWS;
-        let end = (first + BAND_ROWS).min(self.layout.size.height);
-        self.with_rows(first..end, |rows, edges| {
-            match above(index).and_then(|seam| seams.get(self.layout, seam)) {
-                Some(seam) => edges::up(self.layout, edges).copy_from_slice(seam.down),
-                None => edges::up(self.layout, edges).fill(0),
-            }
-            let mut start = Start::Refined;
-            if let Some(seam) = seams.get(self.layout, index) {
-                edges::up(self.layout, rows.from(end, edges)).copy_from_slice(seam.up);
-                start = Start::RefinedAboveSeam;
-            }
-            for _ in 0..self.plan.settings().steps {
-                rows.forward(start, edges);
-                rows.backward(first..end, edges);
-                start = Start::Held;
-            }
-            then(rows, edges);
-        });
+    /// Sweeps a band as often as the plan requires, then calls `then` with it and the labels above it.
+    fn sweep(
+        &self,
+        index: usize,
+        seams: &[Prepared],
+        (lists, messages, work): (&mut Lists, &mut Messages, &mut Work),
+        then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
+    ) -> Result<(), Error> {
+        let (first, height) = (index * BAND_ROWS, self.layout.size.height);
+        let rows = first..height.min(first + BAND_ROWS);
+        self.fill(rows.clone(), lists, messages, work)?;
+        let mut pass = Pass { sweep: self, rows: rows.clone(), lists, messages, work };
+        let above = index.checked_sub(1).map(|seam| &seams[seam]);
+        match above {
+            Some(seam) => seam.carry(self.plan, 0, lists, pass.up_mut(first)),
+            None => pass.up_mut(first).fill(Block::ZERO),
+        }
+        let mut start = Start::Refined;
+        if let Some(seam) = seams.get(index).filter(|_| rows.end < height) {
+            seam.carry(self.plan, 1, lists, pass.up_mut(rows.end));
+            start = Start::RefinedAboveSeam;
+        }
+        for _ in 0..self.plan.settings().steps {
+            pass.forward(start);
+            pass.backward(rows.clone());
+            start = Start::Held;
+        }
+        then(&pass, above.map(|seam| seam.labels_above(self.layout.size.width)));
+        Ok(())
     }
+}
 
-    /// Calls `work` with these rows and with memory for their edges.
-    fn with_rows(&self, rows: Range<usize>, work: impl FnOnce(&SweptRows<'_>, &mut [u8])) {
-        let row = self.layout.row();
-        self.windows.with(|Window { costs, edges }| {
-            let costs = match &self.costs {
-                CostSource::Stored(stored) => &stored[rows.start * row..rows.end * row],
-                CostSource::Computed(matching) => {
-                    let rows = rows.clone().zip(costs.chunks_exact_mut(row));
-                    rows.for_each(|(y, stored)| matching.narrow_row(y, stored, None));
-                    &*costs
+impl Pass<'_> {
+    /// Copies the messages received from `side`, `[row][width][labels]`.
+    fn read_messages(&self, side: Side, out: &mut [u8]) {
+        let (layout, entries) = (self.sweep.layout, self.lists.entries());
+        let rows = out.chunks_exact_mut(layout.size.width * layout.labels).zip(self.rows.clone());
+        for (row, out, y) in rows.enumerate().map(|(row, (out, y))| (row, out, y)) {
+            for (column, out) in layout.columns().zip(out.chunks_exact_mut(layout.labels)) {
+                let node = bp_core::Node { x: column.x, y };
+                let went_away = side == Side::Up || side != Side::Down && !node.is_even();
+                if went_away || self.sweep.plan.neighbour(self.sweep.grid, node, side).is_none() {
+                    continue;
                 }
-            };
-            let Self { level, plan, layout, coarser, .. } = *self;
-            let pass = Pass { level, plan, layout, first: rows.start, costs, coarser, keeps_messages: false };
-            work(&SweptRows { pass, first: rows.start, end: rows.end }, edges);
-        });
-    }
-}
-
-/// The seam above a band.
-fn above(band: usize) -> Option<usize> {
-    band.checked_sub(1)
-}
-
-/// Rows that are swept together: a band, or those around a seam.
-struct SweptRows<'a> {
-    pass: Pass<'a>,
-    first: usize,
-    end: usize,
-}
-impl SweptRows<'_> {
-    /// The edges from row y on.
-    fn from<'e>(&self, y: usize, edges: &'e mut [u8]) -> &'e mut [u8] {
-        &mut edges[(y - self.first) * edges::row_bytes(self.pass.layout)..]
-    }
-
-    /// Passes down all rows.
-    fn forward(&self, start: Start, edges: &mut [u8]) {
-        for y in self.first..self.end {
-            self.forward_row(y, start, self.from(y, edges));
-        }
-    }
-
-    /// Even nodes send left, right and down; then odd nodes send down. The last row sends nothing down.
-    fn forward_row(&self, y: usize, start: Start, edges: &mut [u8]) {
-        let (even, odd) = planes(y);
-        let last = y + 1 == self.end;
-        if start != Start::Held {
-            self.pass.refine(even, &[Side::Left, Side::Right], edges);
-            if !last || start == Start::Refined {
-                self.pass.refine(even, &[Side::Down], edges);
-            }
-            if last && start == Start::Refined {
-                self.pass.refine(odd, &[Side::Down], edges);
+                let (patch, lane) = (column.lane / LANES, column.lane % LANES);
+                for (entry, &label) in self.lists.range(patch).zip(self.lists.list(patch).labels) {
+                    let at = Entry { row, plane: column.plane, entry, lane };
+                    out[usize::from(label)] = self.messages.value(entries, at, side);
+                }
             }
         }
-        self.pass.send(Way::Down, even, if last { Sends::Sides } else { Sends::SidesAndOn }, edges);
-        if !last {
-            self.pass.send(Way::Down, odd, Sends::On, edges);
-        }
     }
-
-    /// Passes up these rows.
-    fn backward(&self, rows: Range<usize>, edges: &mut [u8]) {
-        for y in rows.rev() {
-            self.backward_row(y, self.from(y, edges));
-        }
-    }
-
-    /// Odd nodes send left, right and up; then even nodes send up. The first row sends nothing up.
-    fn backward_row(&self, y: usize, edges: &mut [u8]) {
-        let (even, odd) = planes(y);
-        let first = y == self.first;
-        self.pass.send(Way::Up, odd, if first { Sends::Sides } else { Sends::SidesAndOn }, edges);
-        if !first {
-            self.pass.send(Way::Up, even, Sends::On, edges);
-        }
-    }
-}
-
-/// The messages that a pass down starts with.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Start {
-    /// Those that the edges hold.
-    Held,
-    /// The first messages of all rows.
-    Refined,
-    /// The first messages of all rows. The last row holds those from below already, which came across a seam.
-    RefinedAboveSeam,
-}
-
-/// The even and the odd nodes of row y.
-fn planes(y: usize) -> (PlaneRow, PlaneRow) {
-    (PlaneRow { plane: y % 2, y }, PlaneRow { plane: 1 - y % 2, y })
 }

@@ -28,7 +28,7 @@ fn differing(a: &[u16], b: &[u16]) -> f64 {
 
 fn swept(grids: u32, steps: u32) -> Settings {
     let (schedule, message_start) = (Schedule::Sweep, MessageStart::Receiver);
-    Settings { grids, steps, schedule, message_start, cut: None, coarse_clip: true }
+    Settings { grids, steps, schedule, message_start, cut: None, coarse_clip: true, label_sets: false }
 }
 
 /// Checks the claim of docs/big-images.md about real images on a synthetic one.

@@ -1,6 +1,6 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, Plan, memory};
+use bp_core::{Error, LabelSet, Plan, memory};
 
 use crate::sums::{self, Sums};
 
@@ -38,6 +38,18 @@ impl Costs {
         }
         if let Some(sums) = &mut self.sums {
             sums.store(node, costs);
+        }
+    }
+
+    /// Computes the stored costs of one node again, for the labels of its set. Others get 255. `scratch` has room for one
+    /// node's labels.
+    pub(crate) fn restrict(&mut self, node: usize, set: &LabelSet, scratch: &mut [u64]) {
+        scratch.fill(0);
+        self.add_unclipped(node, scratch);
+        let least = set.labels().map(|label| scratch[label]).min().unwrap_or(0);
+        for (label, stored) in self.stored[node * self.labels..][..self.labels].iter_mut().enumerate() {
+            let cost = || (scratch[label] - least).min(self.clip) as u8;
+            *stored = if set.contains(label) { cost() } else { u8::MAX };
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! It is the baseline of all speed tables. Every other backend must compute bit-identical labels and messages.
 //! Each kernel has its own file: `match_cost`, `coarsen`, `refine`, `update_messages` and `select_labels`. The files
-//! `sweep`, `seams` and `decode` hold the parts that differ under the schedule `sweep`. `grid` computes a message.
+//! `sweep`, `seams`, `decode` and `label_sets` hold the parts that differ under the schedule `sweep`. `grid` computes a message.
 
 mod beliefs;
 mod coarsen;
@@ -10,6 +10,7 @@ mod costs;
 mod decode;
 mod greys;
 mod grid;
+mod label_sets;
 mod match_cost;
 mod messages;
 mod refine;

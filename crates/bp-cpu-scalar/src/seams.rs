@@ -1,6 +1,6 @@
 //! The seams of the schedule `sweep`; see [`bp_core::Seam`].
 
-use bp_core::{Error, Plan, Schedule, Seam, Side, memory};
+use bp_core::{BAND_ROWS, Error, Plan, Schedule, Seam, Side, memory};
 
 use crate::{decode::decode_rows, grid::Grid, messages::Messages, sweep::Sweep};
 
@@ -25,21 +25,20 @@ impl Seams {
         })
     }
 
-    /// Prepares the seams of a grid. `messages` are its first messages, and are overwritten.
-    pub(crate) fn prepare(&mut self, grid: &Grid<'_>, messages: &mut Messages, h: &mut [u8]) {
+    /// Prepares a seam of a grid. `messages` are the grid's first messages, and are overwritten.
+    pub(crate) fn prepare(&mut self, seam: Seam, grid: &Grid<'_>, messages: &mut Messages, h: &mut [u8]) {
         let (width, row) = (grid.size.width, messages.row_bytes(grid.size.width));
-        for (index, seam) in Seam::all(grid.size.height).enumerate() {
-            let [down, up] = self.messages.each_mut().map(|messages| &mut messages[index * row..][..row]);
-            let mut sweep = Sweep { grid, messages, h };
-            sweep.forward(seam.rows());
-            down.copy_from_slice(sweep.messages.received_row(width, seam.below, Side::Up));
-            sweep.backward(seam.rows_below(), true);
-            up.copy_from_slice(sweep.messages.received_row(width, seam.below - 1, Side::Down));
-            if grid.index == 0 {
-                sweep.backward(seam.label_rows(), true);
-                let labels = &mut self.labels[index * Seam::LABEL_ROWS * width..][..Seam::LABEL_ROWS * width];
-                decode_rows(grid, messages, seam.label_rows(), None, labels, h);
-            }
+        let index = seam.below / BAND_ROWS - 1;
+        let [down, up] = self.messages.each_mut().map(|messages| &mut messages[index * row..][..row]);
+        let mut sweep = Sweep { grid, messages, h };
+        sweep.forward(seam.rows());
+        down.copy_from_slice(sweep.messages.received_row(width, seam.below, Side::Up));
+        sweep.backward(seam.rows_below(), true);
+        up.copy_from_slice(sweep.messages.received_row(width, seam.below - 1, Side::Down));
+        if grid.plan.decides_labels(grid.index) {
+            sweep.backward(seam.label_rows(), true);
+            let labels = &mut self.labels[index * Seam::LABEL_ROWS * width..][..Seam::LABEL_ROWS * width];
+            decode_rows(grid, messages, seam.label_rows(), None, labels, h);
         }
     }
 

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use bp_core::{DataCost, Error, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory};
+use bp_core::{BAND_ROWS, DataCost, Error, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
-    coarsen::coarsen, costs::Costs, greys::Greys, grid::Grid, match_cost::match_cost, messages::Messages,
-    refine::refine, seams::Seams, select_labels::select_labels, update_messages::update_messages,
+    coarsen::coarsen, costs::Costs, decode::decode, greys::Greys, grid::Grid, label_sets, match_cost::match_cost,
+    messages::Messages, refine::refine, seams::Seams, select_labels::select_labels, update_messages::update_messages,
 };
 
 /// A prepared plan.
@@ -19,6 +19,8 @@ pub(crate) struct ScalarSolver {
     /// needed at the same time.
     messages: Vec<Messages>,
     seams: Seams,
+    /// The labels of grid 2, then those of grid 1, if they determine label sets.
+    coarser: Vec<u16>,
     scratch: Vec<u64>,
     h: Vec<u8>,
 }
@@ -33,6 +35,7 @@ impl ScalarSolver {
             greys: (0..plan.grids()).map(|grid| Greys::new(plan, grid)).collect::<Result<_, _>>()?,
             messages: (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid)).collect::<Result<_, _>>()?,
             seams: Seams::new(plan)?,
+            coarser: memory::filled("labels", plan.coarser_labels(), 0)?,
             scratch: memory::filled("one node's costs", labels, 0)?,
             h: memory::filled("one node's message", labels, 0)?,
             plan: plan.clone(),
@@ -60,9 +63,8 @@ impl Solver for ScalarSolver {
         let height = self.plan.size(grid).height;
         self.first_messages(grid, 0..height);
         if self.plan.settings().schedule == Schedule::Sweep {
-            self.with_seams(grid, |seams, grid, messages, h| seams.prepare(grid, messages, h));
-            Seam::all(height).for_each(|seam| self.first_messages(grid, seam.rows()));
-            self.with_seams(grid, |seams, grid, messages, _| seams.apply(grid, messages));
+            self.prepare_seams(grid);
+            self.bands(grid).for_each(|rows| self.restrict(grid, rows));
         }
         Ok(())
     }
@@ -74,12 +76,10 @@ impl Solver for ScalarSolver {
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         for step in steps {
-            let messages = &mut self.messages[grid % 2];
             let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
-            update_messages(&on, step, messages, &mut self.h);
+            update_messages(&on, step, &mut self.messages[grid % 2], &mut self.h);
             if self.plan.settings().schedule == Schedule::Sweep && step + 1 == self.plan.settings().steps {
-                // The messages down across seams count no longer.
-                messages.clear_side(Side::Up);
+                self.finish_sweeps(grid);
             }
         }
         Ok(())
@@ -93,6 +93,11 @@ impl Solver for ScalarSolver {
 
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         messages.copy_from_slice(self.messages[0].all_received(side));
+        // A stored cost of 255 marks a label that the node's set lacks.
+        if self.plan.has_label_sets(0) {
+            let costs = (0..self.plan.image_size().pixels()).flat_map(|node| self.costs[0].of(node));
+            messages.iter_mut().zip(costs).filter(|(_, cost)| **cost == u8::MAX).for_each(|(message, _)| *message = 0);
+        }
         Ok(())
     }
 
@@ -105,7 +110,7 @@ impl Solver for ScalarSolver {
         let greys: u64 = self.greys.iter().map(Greys::bytes).sum();
         let messages: u64 = self.messages.iter().map(Messages::bytes).sum();
         let scratch = memory::bytes(&self.scratch) + memory::bytes(&self.h);
-        self.data_cost.bytes() + costs + greys + messages + self.seams.bytes() + scratch
+        self.data_cost.bytes() + costs + greys + messages + self.seams.bytes() + memory::bytes(&self.coarser) + scratch
     }
 }
 
@@ -121,9 +126,57 @@ impl ScalarSolver {
         }
     }
 
-    fn with_seams(&mut self, grid: usize, run: impl FnOnce(&mut Seams, &Grid<'_>, &mut Messages, &mut [u8])) {
+    /// The rows of the bands of a grid.
+    fn bands(&self, grid: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+        let height = self.plan.size(grid).height;
+        (0..height).step_by(BAND_ROWS).map(move |first| first..height.min(first + BAND_ROWS))
+    }
+
+    /// Prepares all seams of a grid, which holds its first messages before and after.
+    fn prepare_seams(&mut self, grid: usize) {
+        let height = self.plan.size(grid).height;
+        for seam in Seam::all(height) {
+            self.restrict(grid, seam.rows());
+            let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
+            self.seams.prepare(seam, &on, &mut self.messages[grid % 2], &mut self.h);
+        }
+        Seam::all(height).for_each(|seam| self.first_messages(grid, seam.rows()));
         let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
-        run(&mut self.seams, &on, &mut self.messages[grid % 2], &mut self.h);
+        self.seams.apply(&on, &mut self.messages[grid % 2]);
+        for seam in Seam::all(height) {
+            let Range { start, end } = seam.rows();
+            self.extend(grid, [start..end, seam.below..seam.below + 1], &[Side::Up]);
+            self.extend(grid, [start..end, seam.below - 1..seam.below], &[Side::Down]);
+        }
+    }
+
+    /// Forgets the messages down across seams, which count no longer. Decides the labels that determine label sets, and
+    /// extends the messages that the first ones of the next finer grid are made from.
+    fn finish_sweeps(&mut self, grid: usize) {
+        self.messages[grid % 2].clear_side(Side::Up);
+        if grid == 0 || !self.plan.decides_labels(grid) {
+            return;
+        }
+        for rows in self.bands(grid) {
+            self.extend(grid, [rows.clone(), rows], &[Side::Left, Side::Right, Side::Down]);
+        }
+        let labels = &mut self.coarser[..self.plan.size(grid).pixels()];
+        let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
+        decode(&on, &self.messages[grid % 2], &self.seams, labels, &mut self.h);
+    }
+
+    /// Gives rows that are passed together the costs of their label sets, if the grid has any.
+    fn restrict(&mut self, grid: usize, rows: Range<usize>) {
+        if self.plan.has_label_sets(grid) {
+            label_sets::restrict(&self.plan, grid, rows, &self.coarser, &mut self.costs[grid], &mut self.scratch);
+        }
+    }
+
+    /// Extends messages that some of the rows that were passed together received, if the grid has label sets.
+    fn extend(&mut self, grid: usize, rows: [Range<usize>; 2], sides: &[Side]) {
+        if self.plan.has_label_sets(grid) {
+            label_sets::extend(&self.plan, grid, rows, &self.coarser, sides, &mut self.messages[grid % 2]);
+        }
     }
 }
 

@@ -12,7 +12,15 @@ use bp_testkit::{Answer, Case, Oracle, compare, noise_pair, solve};
 use proptest::prelude::*;
 
 fn plan_settings(grids: u32, steps: u32, schedule: Schedule) -> Settings {
-    Settings { grids, steps, schedule, message_start: MessageStart::Receiver, cut: None, coarse_clip: false }
+    Settings {
+        grids,
+        steps,
+        schedule,
+        message_start: MessageStart::Receiver,
+        cut: None,
+        coarse_clip: false,
+        label_sets: false,
+    }
 }
 
 fn answer(pair: &StereoPair, model: Model, settings: Settings) -> Answer {
@@ -38,7 +46,7 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
             let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
             let grids = if cut.is_some() { 1 } else { grids };
             let message_start = if schedule == Schedule::Sweep { MessageStart::Receiver } else { start };
-            Settings { grids, steps, schedule, message_start, cut, coarse_clip }
+            Settings { grids, steps, schedule, message_start, cut, coarse_clip, label_sets: false }
         },
     )
 }

@@ -68,6 +68,20 @@ pub(crate) fn read_messages(
             }
         }
     }
+    if plan.has_label_sets(0) { drop_impossible(plan, program, queue, messages) } else { Ok(()) }
+}
+
+/// Sets the values for labels that a node's set lacks to zeros. Their data costs are 255.
+fn drop_impossible(plan: &Plan, program: &Program, queue: &mut dyn Queue, messages: &mut [u8]) -> Result<(), Error> {
+    let (size, labels, grid) = (plan.image_size(), plan.model().labels(), &program.grids[0]);
+    for (&strip, buffers) in grid.strips.iter().zip(&program.costs) {
+        let planes = [queue.read(buffers[0])?, queue.read(buffers[1])?];
+        for node in size.nodes().filter(|node| (strip.first..strip.first + strip.rows).contains(&node.y)) {
+            let received = &mut messages[size.index(node) * labels..][..labels];
+            let cost = |label| planes[colour(node)][grid.byte(strip, node, label)];
+            received.iter_mut().enumerate().filter(|&(label, _)| cost(label) == u8::MAX).for_each(|(_, m)| *m = 0);
+        }
+    }
     Ok(())
 }
 

@@ -23,7 +23,8 @@ fn solve(device: &dyn Device) -> Result<Vec<u16>, Error> {
     let right = Image::from_grey(3, 2, &[52, 60, 61, 40, 60, 60])?;
     let pair = StereoPair::new(left, right)?;
     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
-    let settings = Settings { grids: 2, steps: 1, schedule, message_start, cut: None, coarse_clip: false };
+    let settings =
+        Settings { grids: 2, steps: 1, schedule, message_start, cut: None, coarse_clip: false, label_sets: false };
     let plan = Plan::new(pair.size(), Model::new(Profile::Thesis, 3)?, settings)?;
     let mut driver = Driver::new(device, plan)?;
     driver.solve(&pair)?;

@@ -3,6 +3,7 @@
 mod buffers;
 mod composer;
 mod kernels;
+mod label_sets;
 mod parts;
 mod recorder;
 mod sweep;
@@ -123,6 +124,7 @@ impl Composer<'_> {
         Program {
             marks: self.marks(submission_entries),
             last_sent: self.last_sent(),
+            costs: self.buffers.strips[0].iter().map(|strip| strip.cost).collect(),
             parameters,
             pipelines: self.pipelines.into_iter().collect(),
             bind_groups: self.bind_groups.into_iter().collect(),

@@ -65,5 +65,6 @@ fn program(bytes: u64) -> Program {
         submission_entries: 1,
         grids: Vec::new(),
         last_sent: Vec::new(),
+        costs: Vec::new(),
     }
 }

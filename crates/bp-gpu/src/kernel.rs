@@ -35,11 +35,17 @@ pub enum Kernel {
     UpdateMessages,
     /// Labels.
     SelectLabels,
+    /// The label sets of a grid.
+    LabelSets,
+    /// The data costs of label sets.
+    RestrictCosts,
+    /// Messages with values for all labels, from those of label sets.
+    ExtendMessages,
 }
 
 impl Kernel {
     /// All kernels.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::Features,
         Self::Greys,
         Self::MatchCost,
@@ -48,6 +54,9 @@ impl Kernel {
         Self::Refine,
         Self::UpdateMessages,
         Self::SelectLabels,
+        Self::LabelSets,
+        Self::RestrictCosts,
+        Self::ExtendMessages,
     ];
 
     /// The name of the kernel, of its file and of its entry point.
@@ -62,6 +71,9 @@ impl Kernel {
             Self::Refine => "refine",
             Self::UpdateMessages => "update_messages",
             Self::SelectLabels => "select_labels",
+            Self::LabelSets => "label_sets",
+            Self::RestrictCosts => "restrict_costs",
+            Self::ExtendMessages => "extend_messages",
         }
     }
 
@@ -77,12 +89,16 @@ impl Kernel {
             Self::Refine => bp_shaders::REFINE,
             Self::UpdateMessages => bp_shaders::UPDATE_MESSAGES,
             Self::SelectLabels => bp_shaders::SELECT_LABELS,
+            Self::LabelSets => bp_shaders::LABEL_SETS,
+            Self::RestrictCosts => bp_shaders::RESTRICT_COSTS,
+            Self::ExtendMessages => bp_shaders::EXTEND_MESSAGES,
         };
         let of_several = match self {
             Self::Features | Self::Greys => [bp_shaders::IMAGE, ""],
             Self::MatchCost | Self::Coarsen => [bp_shaders::COSTS, ""],
             Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::WEAK_EDGES],
             Self::CoarsenGreys | Self::Refine => ["", ""],
+            Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => [bp_shaders::SETS, ""],
         };
         [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
     }
@@ -93,9 +109,10 @@ impl Kernel {
     pub fn bindings(self) -> &'static [Access] {
         match self {
             Self::Features | Self::Greys | Self::CoarsenGreys => &[Read, Write],
+            Self::LabelSets | Self::ExtendMessages => &[Write, Read],
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
-            Self::Refine => &[Write, Read, Read],
+            Self::Refine | Self::RestrictCosts => &[Write, Read, Read],
             Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read],
             Self::SelectLabels => &[Read, Read, Read, Read, Read, Write, Read],
         }

@@ -61,7 +61,9 @@ parameters! {
     sends: u32,
     /// 1 if the rows above have labels, under the schedule `sweep`.
     labels_above: u32,
-    /// The one side whose messages are refined.
+    /// 1 if label sets are those of seams, 0 if they are those of bands.
+    seams: u32,
+    /// The one side whose messages are refined or extended.
     side: u32,
     /// Columns of the grid that is read.
     other_width: u32,

@@ -112,6 +112,8 @@ pub struct Program {
     pub(crate) grids: Vec<Grid>,
     /// Indices of the buffers with the last messages of grid 0, `[strip][side][colour]`.
     pub(crate) last_sent: Vec<[[usize; 2]; 4]>,
+    /// Indices of the buffers with the data costs of grid 0, `[strip][colour]`.
+    pub(crate) costs: Vec<[usize; 2]>,
 }
 
 /// A part of a program: the work of one kernel call of the driver, or of one step within such a call.

@@ -2,7 +2,7 @@
 
 use bp_core::{Algorithm, Cut, MessageStart, Model, Profile, Schedule, Settings, Size, StereoPair};
 
-use crate::{Case, noise_pair};
+use crate::{Case, noise_pair, stepped_pair};
 
 /// All cases. They cover every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few
 /// and many labels, with weak edges, and with the smoothness that strains 8 bits most. Strips of a higher image with
@@ -27,7 +27,29 @@ pub fn cases() -> impl Iterator<Item = Case> {
         let pair = noise_pair(width, height, model.labels() as u64);
         settings(pair.size()).into_iter().filter_map(move |settings| case(&pair, model, settings))
     });
-    whole.chain(strips())
+    whole.chain(strips()).chain(label_sets())
+}
+
+/// Plans whose label sets differ between patches, bands and seams, on both grids that have any.
+fn label_sets() -> impl Iterator<Item = Case> {
+    let plain = |profile, labels| Model::new(profile, labels);
+    let weak = |profile, slope, truncation| {
+        Ok(plain(profile, 30)?.with_smoothness(slope, truncation)?.with_weak_edges(Some(30)))
+    };
+    let models = [
+        ((131, 70), plain(Profile::Census, 40)),
+        ((65, 135), weak(Profile::Census, 4, 15)),
+        ((200, 40), plain(Profile::Gradient, 33)),
+        ((135, 9), weak(Profile::Mrf, 3, 63)),
+    ];
+    models.into_iter().filter_map(|(size, model)| Some((size, model.ok()?))).flat_map(|((width, height), model)| {
+        let pair = stepped_pair(width, height, model.labels());
+        let ours = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+        let settings = [(3, 1, true), (4, 2, false)];
+        settings.into_iter().filter_map(move |(grids, steps, coarse_clip)| {
+            case(&pair, model, Settings { grids, steps, coarse_clip, label_sets: true, ..ours })
+        })
+    })
 }
 
 /// Strips of one pair with no, one or several known rows above and below, for each profile.
@@ -77,16 +99,18 @@ fn settings(size: Size) -> Vec<Settings> {
     all
 }
 
-/// Settings for the schedule `sweep`: one and two loops, one and several grids, clipped and not, cuts on and beside a
-/// seam.
+/// Settings for the schedule `sweep`: one and two loops, one and several grids, clipped and not, with label sets and
+/// without, cuts on and beside a seam.
 fn sweeps(size: Size) -> impl Iterator<Item = Settings> {
     let ours = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
     let grids = [(1, 1), (1, 2), (2, 1), (3, 2)].map(|(grids, steps)| Settings { grids, steps, ..ours });
+    let restricted =
+        [(3, 1), (3, 2), (4, 1), (5, 3)].map(|(grids, steps)| Settings { grids, steps, label_sets: true, ..ours });
     let unclipped = grids.map(|settings| Settings { coarse_clip: false, ..settings });
     let cuts =
         [(0, 1), (20, 1), (26, 2), (31, 1), (31, 2), (32, 1), (32, 2), (33, 1), (33, 2), (36, 1)].map(|(y, steps)| {
             let cut = Cut { x: size.width / 2, y, seed_start: false };
             Settings { cut: Some(cut), grids: 1, steps, ..ours }
         });
-    std::iter::once(ours).chain(grids).chain(unclipped).chain(cuts)
+    std::iter::once(ours).chain(grids).chain(unclipped).chain(restricted).chain(cuts)
 }

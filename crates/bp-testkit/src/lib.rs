@@ -28,7 +28,7 @@ mod videos;
 pub use case::{Answer, Case, solve};
 pub use cases::cases;
 pub use difference::{Difference, Fault};
-pub use noise::noise_pair;
+pub use noise::{noise_pair, stepped_pair};
 pub use oracle::Oracle;
 pub use random::random_case;
 pub use suite::{compare, compare_at_random, conform, conform_every};

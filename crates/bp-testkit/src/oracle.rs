@@ -1,6 +1,7 @@
 //! The same model computed the obvious way: in wide integers, with messages by their definition, and clipped only where
 //! the definition says so.
 
+mod label_sets;
 mod state;
 mod sweep;
 
@@ -111,6 +112,9 @@ impl Solver for State {
                 self.sweep(grid);
                 if step + 1 == self.plan.settings().steps {
                     self.forget_downward(grid);
+                    if self.plan.decides_labels(grid) {
+                        self.decide_labels(grid);
+                    }
                 }
             }
         });
@@ -119,7 +123,7 @@ impl Solver for State {
 
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
-            self.decode(labels);
+            labels.copy_from_slice(&self.grids[0].decided);
             return Ok(());
         }
         let Grid { costs, received, .. } = &self.grids[0];
@@ -134,8 +138,12 @@ impl Solver for State {
     }
 
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
-        let all = self.grids[0].received.iter().flat_map(|received| &received[side as usize]);
-        for (out, &message) in messages.iter_mut().zip(all) {
+        let Grid { received, sets, .. } = &self.grids[0];
+        let all = received.iter().zip(sets).flat_map(|(received, set)| {
+            let values = received[side as usize].iter().enumerate();
+            values.map(|(label, &value)| if set.contains(label) { value } else { 0 })
+        });
+        for (out, message) in messages.iter_mut().zip(all) {
             // A value out of range would disprove `bp_core::exactness`. Show it as a value that no message has.
             *out = u8::try_from(message).unwrap_or(u8::MAX);
         }

@@ -73,6 +73,7 @@ fn settings(random: &mut Rng, width: usize, height: usize) -> Settings {
         message_start: if sweep { MessageStart::Receiver } else { start },
         cut: is_cut.then_some(cut),
         coarse_clip: random.bool(),
+        label_sets: sweep && random.bool(),
     }
 }
 
@@ -105,6 +106,7 @@ mod tests {
         assert!([1, 2, 3, 4, 5, 13, 25].iter().all(|&grids| any(&|settings| settings.grids == grids)));
         assert!(any(&|settings| settings.message_start == MessageStart::Sender && settings.grids > 1));
         assert!(any(&|settings| settings.coarse_clip && settings.grids > 1));
+        assert!(any(&|settings| settings.label_sets && settings.grids > 2));
         assert!([true, false].iter().all(|&seed| any(&|s| s.cut.is_some_and(|cut| cut.seed_start == seed))));
         assert!(any_size(&|size| size.width == 1100 && size.height > 1));
         assert!(any_size(&|size| size.width < 20 && size.height > 64));

@@ -1,6 +1,6 @@
 //! The buffers of a program.
 
-use bp_core::{Plan, Schedule};
+use bp_core::{BAND_ROWS, Patch, Plan, Schedule, Size};
 
 use crate::{
     Buffer, Memory,
@@ -29,7 +29,10 @@ pub(crate) struct Buffers {
     /// The features of both images.
     pub(crate) features: [usize; 2],
     pub(crate) seed: usize,
-    pub(crate) labels: usize,
+    /// The labels of grids 0, 1 and 2, where they are decided.
+    pub(crate) labels: Vec<usize>,
+    /// The label sets of a grid, if any has some.
+    pub(crate) label_sets: Option<usize>,
     /// Bound in place of sums that are not kept: one buffer to read, one to write.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
@@ -57,7 +60,11 @@ impl Buffers {
             images: [(); 2].map(|()| device("images", image_bytes(size))),
             features: [(); 2].map(|()| device("features", features)),
             seed: device("seed", SEED_BYTES),
-            labels: device("labels", label_bytes(size)),
+            labels: (0..plan.grids().min(3))
+                .filter(|&grid| plan.decides_labels(grid))
+                .map(|grid| device("labels", label_bytes(plan.size(grid))))
+                .collect(),
+            label_sets: plan.has_label_sets(0).then(|| device("label sets", label_set_bytes(plan))),
             unused: device("unused", 16),
             unused_written: device("unused", 16),
             greys: plan
@@ -68,6 +75,18 @@ impl Buffers {
             list,
         }
     }
+}
+
+/// The 32-bit words of a label set.
+pub(super) fn label_set_words(plan: &Plan) -> usize {
+    plan.model().labels().div_ceil(32)
+}
+
+/// The bytes of the label sets of all bands of grid 0.
+fn label_set_bytes(plan: &Plan) -> u64 {
+    let Size { width, height } = plan.image_size();
+    let patches = width.div_ceil(Patch::COLUMNS) * height.div_ceil(BAND_ROWS);
+    (patches * label_set_words(plan) * size_of::<u32>()) as u64
 }
 
 fn strips(plan: &Plan, grid: &Grid, device: &mut impl FnMut(&'static str, u64) -> usize) -> Vec<StripBuffers> {

@@ -40,6 +40,8 @@ impl Composer<'_> {
     /// 1 if a stored data cost plus this many messages plus `more` may exceed 255, otherwise 0.
     fn saturates(&self, messages: u32, more: u8) -> u32 {
         let (clip, truncation) = (self.plan.model().clip(), self.plan.model().truncation());
+        // The labels that a set lacks cost 255.
+        let clip = if self.buffers.label_sets.is_some() { u8::MAX } else { clip };
         (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()
     }
 
@@ -51,8 +53,12 @@ impl Composer<'_> {
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);
         let received = strip.sent[set].map(|side| side[1 - nodes.colour]);
-        let bound =
-            [&[strip.cost[nodes.colour]], received.as_slice(), &[self.buffers.labels, self.greys_read(nodes)]].concat();
+        let bound = [
+            &[strip.cost[nodes.colour]],
+            received.as_slice(),
+            &[self.buffers.labels[nodes.grid], self.greys_read(nodes)],
+        ]
+        .concat();
         self.dispatch(part, pipeline, bound, work);
     }
 }

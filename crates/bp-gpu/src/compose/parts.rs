@@ -110,7 +110,7 @@ impl Composer<'_> {
     }
 
     /// The same work, reading a strip of another grid.
-    fn reading(&self, work: Work, grid: usize, strip: Strip) -> Work {
+    pub(super) fn reading(&self, work: Work, grid: usize, strip: Strip) -> Work {
         let other = &self.grids[grid];
         let parameters = Parameters {
             other_width: other.size.width as u32,
@@ -136,6 +136,7 @@ impl Composer<'_> {
         if self.plan.settings().schedule == Schedule::Sweep {
             part.push_short(Command::Barrier);
             self.prepare_seams(part, grid);
+            self.restrict_bands(part, grid);
         }
     }
 
@@ -223,13 +224,13 @@ impl Composer<'_> {
 
     pub(super) fn select_labels(&mut self, part: &mut PartRecorder) {
         if self.plan.settings().schedule == Schedule::Sweep {
-            self.decode(part);
+            self.decode(part, 0);
         } else {
             for nodes in self.nodes(0) {
                 self.select(part, nodes, self.all_rows(nodes));
             }
         }
-        let (from, bytes) = (self.buffers.labels, label_bytes(self.plan.image_size()));
+        let (from, bytes) = (self.buffers.labels[0], label_bytes(self.plan.image_size()));
         part.push_short(Command::Barrier);
         part.push_short(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
     }

@@ -18,7 +18,7 @@ const BACKWARD: [Side; 3] = [Side::Left, Side::Right, Side::Up];
 
 /// Which bands take part.
 #[derive(Clone, Copy)]
-enum Bands {
+pub(super) enum Bands {
     All,
     /// Those with a seam above.
     BelowSeams,
@@ -28,12 +28,12 @@ enum Bands {
 
 /// The nodes of one colour in the same row of some bands of a grid.
 #[derive(Clone, Copy)]
-struct BandRow {
-    grid: usize,
-    bands: Bands,
-    colour: usize,
+pub(super) struct BandRow {
+    pub(super) grid: usize,
+    pub(super) bands: Bands,
+    pub(super) colour: usize,
     /// Counted from the first row of the band.
-    row: usize,
+    pub(super) row: usize,
 }
 
 impl Composer<'_> {
@@ -48,6 +48,10 @@ impl Composer<'_> {
             self.backward(part, grid, bands, row);
         }
         self.send(part, BandRow { grid, bands, colour: ODD, row: 0 }, &HORIZONTAL);
+        if grid > 0 && self.plan.decides_labels(grid) {
+            self.decode(part, grid);
+        }
+        self.extend_bands(part, grid);
         // The finer grid's first messages are interpolated between rows, also across strips.
         self.join_strips(part, grid, 0, &[Side::Left, Side::Right, Side::Up]);
     }
@@ -59,6 +63,7 @@ impl Composer<'_> {
         if Seam::all(self.grids[grid].size.height).len() == 0 {
             return;
         }
+        self.restrict_seams(part, grid);
         let last_below = Seam::ROWS_BELOW - 1;
         let labelled = BAND_ROWS - Seam::LABEL_ROWS..BAND_ROWS;
         for row in BAND_ROWS - Seam::ROWS_ABOVE..BAND_ROWS {
@@ -75,16 +80,17 @@ impl Composer<'_> {
         }
         self.join_strips(part, grid, 0, &[Side::Up]);
         part.push_short(Command::Barrier);
-        if grid == 0 {
+        if self.plan.decides_labels(grid) {
             for row in labelled.clone().rev() {
                 self.backward(part, grid, Bands::AboveSeams, row);
             }
-            self.decode_rows(part, Bands::AboveSeams, labelled.clone());
+            self.decode_rows(part, grid, labelled.clone());
             labelled.for_each(|row| self.refine_again(part, grid, Bands::AboveSeams, row, &BACKWARD));
         }
         self.refine_again(part, grid, Bands::BelowSeams, 0, &HORIZONTAL);
         (1..Seam::ROWS_BELOW).for_each(|row| self.refine_again(part, grid, Bands::BelowSeams, row, &BACKWARD));
         part.push_short(Command::Barrier);
+        self.extend_seams(part, grid);
     }
 
     fn refine_again(&mut self, part: &mut PartRecorder, grid: usize, bands: Bands, row: usize, sides: &[Side]) {
@@ -120,23 +126,23 @@ impl Composer<'_> {
     }
 
     /// Records the labels of every band. Above its first row are the labels that were decided for the seam.
-    pub(super) fn decode(&mut self, part: &mut PartRecorder) {
+    pub(super) fn decode(&mut self, part: &mut PartRecorder, grid: usize) {
         for row in 0..BAND_ROWS {
-            self.decode_row(part, Bands::All, row, true);
+            self.decode_row(part, grid, Bands::All, row, true);
         }
     }
 
-    /// Records the labels of these rows, which have no labels above them.
-    fn decode_rows(&mut self, part: &mut PartRecorder, bands: Bands, rows: Range<usize>) {
+    /// Records the labels of these rows above seams, which have no labels above them.
+    fn decode_rows(&mut self, part: &mut PartRecorder, grid: usize, rows: Range<usize>) {
         for row in rows.clone() {
-            self.decode_row(part, bands, row, row > rows.start);
+            self.decode_row(part, grid, Bands::AboveSeams, row, row > rows.start);
         }
     }
 
     /// Records the labels of a row, first for its even nodes.
-    fn decode_row(&mut self, part: &mut PartRecorder, bands: Bands, row: usize, labels_above: bool) {
+    fn decode_row(&mut self, part: &mut PartRecorder, grid: usize, bands: Bands, row: usize, labels_above: bool) {
         for colour in [EVEN, ODD] {
-            for (nodes, rows) in self.band_rows(BandRow { grid: 0, bands, colour, row }) {
+            for (nodes, rows) in self.band_rows(BandRow { grid, bands, colour, row }) {
                 let mut work = self.work(nodes, rows);
                 work.parameters.labels_above = labels_above.into();
                 self.select(part, nodes, work);
@@ -146,7 +152,7 @@ impl Composer<'_> {
     }
 
     /// The nodes and rows of a [`BandRow`] in each strip that has any. Strips begin with a band.
-    fn band_rows(&self, at: BandRow) -> Vec<(Nodes, Rows)> {
+    pub(super) fn band_rows(&self, at: BandRow) -> Vec<(Nodes, Rows)> {
         let BandRow { grid, bands, colour, row } = at;
         let seams = Seam::all(self.grids[grid].size.height).len();
         let strips = self.grids[grid].strips.iter().enumerate();

@@ -1,6 +1,9 @@
 //! The state of the oracle between two kernels, and the message as defined.
 
-use bp_core::{Node, Plan, Side};
+use bp_core::{LabelSet, Node, Plan, Side};
+
+/// The data cost of a label that a node's set lacks.
+const IMPOSSIBLE: i64 = 1 << 40;
 
 type Messages = Vec<[Vec<i64>; 4]>;
 
@@ -11,13 +14,17 @@ pub(super) struct Grid {
     pub(super) sums: Vec<Vec<i64>>,
     pub(super) costs: Vec<Vec<i64>>,
     pub(super) received: Messages,
+    /// The label sets of all nodes, as they are used at present.
+    pub(super) sets: Vec<LabelSet>,
+    /// The labels of all nodes, if they are decided.
+    pub(super) decided: Vec<u16>,
 }
 
 /// The values of all grids of a plan.
 pub(super) struct State {
     pub(super) plan: Plan,
     pub(super) grids: Vec<Grid>,
-    /// The labels that were decided for the rows above seams, `[height][width]`.
+    /// The labels that were decided for the rows above seams, `[height][width]` of any grid.
     pub(super) above_seams: Vec<u16>,
 }
 
@@ -32,6 +39,8 @@ impl State {
                 [const { Vec::new() }; 4].map(|_: Vec<i64>| vec![0; plan.model().labels()]);
                 plan.size(grid).pixels()
             ],
+            sets: vec![LabelSet::all(plan.model().labels()); plan.size(grid).pixels()],
+            decided: vec![0; plan.size(grid).pixels()],
         };
         let above_seams = vec![0; plan.image_size().pixels()];
         Self { grids: (0..plan.grids()).map(grid).collect(), above_seams, plan: plan.clone() }
@@ -46,11 +55,15 @@ impl State {
     pub(super) fn set_costs(&mut self, grid: usize) {
         let clips = grid > 0 && self.plan.settings().coarse_clip;
         let truncation = i64::from(self.plan.model().truncation());
-        let Grid { sums, costs, .. } = &mut self.grids[grid];
+        let Grid { sums, costs, sets, .. } = &mut self.grids[grid];
         costs.clone_from(sums);
-        for costs in costs.iter_mut().filter(|_| clips) {
-            let least = costs.iter().copied().min().unwrap_or(0);
-            costs.iter_mut().for_each(|cost| *cost = (*cost - least).min(truncation + truncation / 2));
+        for (costs, set) in costs.iter_mut().zip(sets) {
+            let least = set.labels().map(|label| costs[label]).min().unwrap_or(0);
+            costs
+                .iter_mut()
+                .filter(|_| clips)
+                .for_each(|cost| *cost = (*cost - least).min(truncation + truncation / 2));
+            (0..costs.len()).filter(|&label| !set.contains(label)).for_each(|label| costs[label] = IMPOSSIBLE);
         }
     }
 

@@ -19,26 +19,29 @@ impl State {
     pub(super) fn prepare_seams(&mut self, grid: usize) {
         for seam in Seam::all(self.plan.size(grid).height) {
             let first_messages = self.grids[grid].received.clone();
+            self.restrict(grid, seam.rows());
             self.forward(grid, seam.rows());
             let down = self.row(grid, seam.below, Side::Up);
             self.backward(grid, seam.rows_below(), Some(Side::Up));
             let up = self.row(grid, seam.below - 1, Side::Down);
-            if grid == 0 {
+            if self.plan.decides_labels(grid) {
                 self.backward(grid, seam.label_rows(), Some(Side::Up));
                 let mut labels = std::mem::take(&mut self.above_seams);
-                self.decide_rows(seam.label_rows(), false, &mut labels);
+                self.decide_rows(grid, seam.label_rows(), false, &mut labels);
                 self.above_seams = labels;
             }
             self.grids[grid].received = first_messages;
             self.set_row(grid, seam.below, Side::Up, down);
             self.set_row(grid, seam.below - 1, Side::Down, up);
         }
+        self.bands(grid).into_iter().for_each(|rows| self.restrict(grid, rows));
     }
 
     /// The messages that row y received from a side.
     fn row(&self, grid: usize, y: usize, side: Side) -> Vec<Vec<i64>> {
-        let nodes = (0..self.plan.size(grid).width).map(|x| self.index(grid, Node { x, y }));
-        nodes.map(|node| self.grids[grid].received[node][side as usize].clone()).collect()
+        let nodes = (0..self.plan.size(grid).width).map(|x| Node { x, y });
+        let message = |node| &self.grids[grid].received[self.index(grid, node)][side as usize];
+        nodes.map(|node| self.extended(grid, node, message(node))).collect()
     }
 
     fn set_row(&mut self, grid: usize, y: usize, side: Side, messages: Vec<Vec<i64>>) {
@@ -144,50 +147,50 @@ impl State {
             Side::Up | Side::Down => Some(self.plan.neighbour(grid, node, side).map(|_| node)?),
         };
         let zeros = || vec![0; self.plan.model().labels()];
-        Some(
-            receiver
-                .map_or_else(zeros, |node| self.grids[grid].received[self.index(grid, node)][side as usize].clone()),
-        )
+        Some(receiver.map_or_else(zeros, |node| {
+            self.extended(grid, node, &self.grids[grid].received[self.index(grid, node)][side as usize])
+        }))
     }
 
-    /// Decides labels one after another.
-    pub(super) fn decode(&self, labels: &mut [u16]) {
-        let width = self.plan.image_size().width;
-        for rows in self.bands(0) {
+    /// Decides the labels of a grid one after another.
+    pub(super) fn decide_labels(&mut self, grid: usize) {
+        let (width, mut labels) = (self.plan.size(grid).width, std::mem::take(&mut self.grids[grid].decided));
+        for rows in self.bands(grid) {
             let above = rows.start.saturating_sub(1) * width..rows.start * width;
             let decided = labels[above.clone()].to_vec();
             labels[above.clone()].copy_from_slice(&self.above_seams[above.clone()]);
-            self.decide_rows(rows, true, labels);
+            self.decide_rows(grid, rows, true, &mut labels);
             labels[above].copy_from_slice(&decided);
         }
+        self.grids[grid].decided = labels;
     }
 
     /// Decides the labels of rows, which may have decided labels above them.
-    fn decide_rows(&self, rows: Range<usize>, has_above: bool, labels: &mut [u16]) {
+    fn decide_rows(&self, grid: usize, rows: Range<usize>, has_above: bool, labels: &mut [u16]) {
         for y in rows.clone() {
             for parity in [EVEN, ODD] {
-                for node in row_nodes(self.plan.image_size().width, y, parity) {
-                    labels[self.index(0, node)] = self.decide(node, has_above || y > rows.start, labels);
+                for node in row_nodes(self.plan.size(grid).width, y, parity) {
+                    labels[self.index(grid, node)] = self.decide(grid, node, has_above || y > rows.start, labels);
                 }
             }
         }
     }
 
     /// The smallest best label of a node, given the labels decided before.
-    fn decide(&self, node: Node, has_above: bool, labels: &[u16]) -> u16 {
+    fn decide(&self, grid: usize, node: Node, has_above: bool, labels: &[u16]) -> u16 {
         let even = node.is_even();
         let messages: &[Side] = if even { &[Side::Left, Side::Right, Side::Down] } else { &[Side::Down] };
         let decided: &[Side] = if even { &[Side::Up] } else { &[Side::Up, Side::Left, Side::Right] };
-        let index = self.index(0, node);
+        let index = self.index(grid, node);
         let sum = |d: &u16| {
-            let mut sum = self.grids[0].costs[index][usize::from(*d)];
+            let mut sum = self.grids[grid].costs[index][usize::from(*d)];
             for &side in messages {
-                sum += self.grids[0].received[index][side as usize][usize::from(*d)];
+                sum += self.grids[grid].received[index][side as usize][usize::from(*d)];
             }
             for &side in decided.iter().filter(|&&side| has_above || side != Side::Up) {
-                if let Some(other) = self.plan.neighbour(0, node, side) {
-                    let other = usize::from(labels[self.index(0, other)]);
-                    sum += self.smoothness(0, node, side)(usize::from(*d), other);
+                if let Some(other) = self.plan.neighbour(grid, node, side) {
+                    let other = usize::from(labels[self.index(grid, other)]);
+                    sum += self.smoothness(grid, node, side)(usize::from(*d), other);
                 }
             }
             sum

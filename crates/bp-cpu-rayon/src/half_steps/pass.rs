@@ -1,31 +1,20 @@
-//! The work of the nodes of a plane in a row in one step, under every schedule.
+//! The work of the nodes of a plane in a row in one half-step.
 
-use bp_core::{Plan, Side};
+use bp_core::Plan;
 use fearless_simd::Level;
 
-use crate::{
+use super::{
     edges,
-    greys::Around,
-    layout::Layout,
     refine::{Coarser, refine},
-    shape::PlaneRow,
-    update_messages::{Nodes, Sends, update_messages},
+    update_messages::{Nodes, update_messages},
 };
-
-/// The direction of a pass over the rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
-    Down,
-    Up,
-}
+use crate::{layout::Layout, shape::PlaneRow};
 
 /// Everything that updating the messages of a grid needs besides the messages.
 pub(crate) struct Pass<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
     pub(crate) layout: &'a Layout,
-    /// The first row of `costs`.
-    pub(crate) first: usize,
     pub(crate) costs: &'a [u8],
     pub(crate) coarser: Option<Coarser<'a>>,
     /// Whether the grid starts with the messages that it already holds, instead of those of the coarser grid.
@@ -34,27 +23,22 @@ pub(crate) struct Pass<'a> {
 
 impl Pass<'_> {
     /// Writes the first messages of the nodes of a plane in a row. `rows` start with that row.
-    pub(crate) fn refine(&self, at: PlaneRow, sides: &[Side], rows: &mut [u8]) {
+    pub(crate) fn refine(&self, at: PlaneRow, rows: &mut [u8]) {
         let mut slots = edges::slots(self.layout, rows, at.plane);
-        refine(self.level, self.plan, self.layout, self.coarser, at, sides, &mut slots);
+        refine(self.level, self.plan, self.layout, self.coarser, at, &mut slots);
     }
 
-    /// Sends the messages of the nodes of a plane in a row, in a pass in direction `way`. `rows` start with that row.
-    pub(crate) fn send(&self, way: Way, at: PlaneRow, sends: Sends, rows: &mut [u8]) {
+    /// Sends the messages of the nodes of a plane in a row. `rows` start with that row.
+    pub(crate) fn send(&self, at: PlaneRow, rows: &mut [u8]) {
         let mut slots = edges::slots(self.layout, rows, at.plane);
         self.drop_missing(at.y, &mut slots);
-        let mut nodes = self.nodes(at);
-        if way == Way::Up {
-            slots.swap(2, 3);
-            nodes.around = nodes.around.map(Around::upwards);
-        }
-        update_messages(self.level, sends, &nodes, slots);
+        update_messages(self.level, &self.nodes(at), slots);
     }
 
     fn nodes(&self, PlaneRow { plane, y }: PlaneRow) -> Nodes<'_> {
         let (layout, model) = (self.layout, self.plan.model());
         Nodes {
-            costs: &self.costs[(y - self.first) * layout.row() + plane * layout.plane()..][..layout.plane()],
+            costs: &self.costs[y * layout.row() + plane * layout.plane()..][..layout.plane()],
             masks: layout.masks(plane),
             nodes: layout.nodes(plane),
             lanes: layout.lanes,

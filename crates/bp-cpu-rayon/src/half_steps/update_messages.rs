@@ -20,19 +20,6 @@ use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
 
 use crate::greys::Around;
 
-/// Which messages a node sends. The others keep their values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sends {
-    /// All four.
-    All,
-    /// Those to the left and right.
-    Sides,
-    /// Those to the left and right, and the one forward in the direction of the pass.
-    SidesAndOn,
-    /// Only the one forward.
-    On,
-}
-
 /// The nodes of one plane in one row, with everything that their messages depend on.
 pub(crate) struct Nodes<'a> {
     /// Data costs `[label][lane]`.
@@ -76,47 +63,33 @@ impl Nodes<'_> {
     }
 }
 
-/// Sends messages in place: each overwrites the message that came over the same edge. The last slot is the one forward
-/// in the direction of the pass, so callers swap the last two slots for an upward pass.
-pub(crate) fn update_messages(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
+/// Sends messages in place: each overwrites the message that came over the same edge.
+pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     if nodes.around.is_some() {
-        send::<true>(level, sends, nodes, slots)
+        dispatch!(level, simd => row::<_, true>(simd, nodes, slots));
     } else {
-        send::<false>(level, sends, nodes, slots)
-    }
-}
-
-fn send<const WEAK: bool>(level: Level, sends: Sends, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
-    match sends {
-        Sends::All => dispatch!(level, simd => row::<_, WEAK, true, true, true>(simd, nodes, slots)),
-        Sends::Sides => dispatch!(level, simd => row::<_, WEAK, true, false, false>(simd, nodes, slots)),
-        Sends::SidesAndOn => dispatch!(level, simd => row::<_, WEAK, true, false, true>(simd, nodes, slots)),
-        Sends::On => dispatch!(level, simd => row::<_, WEAK, false, false, true>(simd, nodes, slots)),
+        dispatch!(level, simd => row::<_, false>(simd, nodes, slots));
     }
 }
 
 /// Processes a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
 #[inline(always)]
-fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    slots: [&mut [u8]; 4],
-) {
+fn row<S: Simd, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     let [same, next, up, down] = slots;
     // Slices of one known length let the compiler drop the bounds checks in the loops.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
     while at + 2 * S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 2, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 2, WEAK>(simd, nodes, &mut slots, at);
         at += 2 * S::u8s::LEN;
     }
     while at + S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 1, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 1, WEAK>(simd, nodes, &mut slots, at);
         at += S::u8s::LEN;
     }
     while at < nodes.nodes {
-        vectors::<S, u8x16<S>, 1, WEAK, SIDES, UP, ON>(simd, nodes, &mut slots, at);
+        vectors::<S, u8x16<S>, 1, WEAK>(simd, nodes, &mut slots, at);
         at += u8x16::<S>::LEN;
     }
 }
@@ -125,18 +98,13 @@ fn row<S: Simd, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: b
 /// envelope; a pass down finishes it (Felzenszwalb and Huttenlocher 2006). Between the two passes, the slots hold the
 /// envelope.
 #[inline(always)]
-fn vectors<S, V, const W: usize, const WEAK: bool, const SIDES: bool, const UP: bool, const ON: bool>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    slots: &mut [&mut [u8]; 4],
-    at: usize,
-) where
+fn vectors<S, V, const W: usize, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
+where
     S: Simd,
     V: SimdInt<S, Element = u8>,
 {
-    let sent = [SIDES, SIDES, UP, ON];
-    let least = pass_up::<S, V, W, WEAK>(simd, nodes, sent, slots, at);
-    pass_down::<S, V, W, WEAK>(simd, nodes, sent, slots, at, least);
+    let least = pass_up::<S, V, W, WEAK>(simd, nodes, slots, at);
+    pass_down::<S, V, W, WEAK>(simd, nodes, slots, at, least);
 }
 
 /// Writes the upward envelopes to the slots and returns the least entry of each side's h.
@@ -145,7 +113,6 @@ fn vectors<S, V, const W: usize, const WEAK: bool, const SIDES: bool, const UP: 
 fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
     nodes: &Nodes<'_>,
-    sent: [bool; 4],
     slots: &mut [&mut [u8]; 4],
     at: usize,
 ) -> [[V; 4]; W] {
@@ -162,18 +129,14 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: boo
         for w in 0..W {
             let h = gather::<S, V>(simd, nodes, masks[w], slots, start + w * V::LEN);
             for side in 0..4 {
-                if sent[side] {
-                    envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(h[side]);
-                    least[w][side] = least[w][side].min(envelope[w][side]);
-                }
+                envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(h[side]);
+                least[w][side] = least[w][side].min(envelope[w][side]);
             }
         }
         for w in 0..W {
             let from = start + w * V::LEN;
             for side in 0..4 {
-                if sent[side] {
-                    envelope[w][side].store_slice(&mut slots[side][from..from + V::LEN]);
-                }
+                envelope[w][side].store_slice(&mut slots[side][from..from + V::LEN]);
             }
         }
         start += nodes.lanes;
@@ -186,7 +149,6 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: boo
 fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
     simd: S,
     nodes: &Nodes<'_>,
-    sent: [bool; 4],
     slots: &mut [&mut [u8]; 4],
     at: usize,
     least: [[V; 4]; W],
@@ -202,19 +164,15 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: b
         for w in 0..W {
             let from = start + w * V::LEN;
             for side in 0..4 {
-                if sent[side] {
-                    let half = V::from_slice(simd, &slots[side][from..from + V::LEN]);
-                    envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(half);
-                }
+                let half = V::from_slice(simd, &slots[side][from..from + V::LEN]);
+                envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(half);
             }
         }
         for w in 0..W {
             let from = start + w * V::LEN;
             for side in 0..4 {
-                if sent[side] {
-                    let message = (envelope[w][side] - least[w][side]).min(truncation[w][side]);
-                    message.store_slice(&mut slots[side][from..from + V::LEN]);
-                }
+                let message = (envelope[w][side] - least[w][side]).min(truncation[w][side]);
+                message.store_slice(&mut slots[side][from..from + V::LEN]);
             }
         }
     }

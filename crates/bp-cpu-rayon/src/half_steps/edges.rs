@@ -1,7 +1,6 @@
 //! Messages, one per edge.
 
 use bp_core::{Error, Plan, Side, memory};
-use rayon::{prelude::*, slice::ChunksMut};
 
 use crate::{
     layout::Layout,
@@ -32,13 +31,7 @@ impl Edges {
 
     /// The rows of a grid.
     pub(crate) fn rows<'a>(&'a self, layout: &'a Layout) -> Rows<'a> {
-        Rows { layout, first: 0, values: self.values.get(..bytes(layout)).unwrap_or_default() }
-    }
-
-    /// For every band of `rows` rows, the edges inside and down from its rows, ordered as in [`inside_and_down`].
-    pub(crate) fn bands_mut(&mut self, layout: &Layout, rows: usize) -> ChunksMut<'_, u8> {
-        let all = layout.size.height * row_bytes(layout);
-        self.rows_mut(layout)[up_bytes(layout)..][..all].par_chunks_mut(rows * row_bytes(layout))
+        Rows { layout, values: self.values.get(..bytes(layout)).unwrap_or_default() }
     }
 
     /// The rows of a grid, which threads can split by [`row_bytes`].
@@ -50,21 +43,6 @@ impl Edges {
     pub(crate) fn bytes(&self) -> u64 {
         memory::bytes(&self.values)
     }
-}
-
-/// All edges of these rows except those up from the first row.
-pub(crate) fn inside_and_down<'a>(shape: &Shape, rows: &'a [u8]) -> &'a [u8] {
-    &rows[up_bytes(shape)..]
-}
-
-/// The edges up from the first row.
-pub(crate) fn up<'a>(shape: &Shape, rows: &'a mut [u8]) -> &'a mut [u8] {
-    &mut rows[..up_bytes(shape)]
-}
-
-/// Bytes of the edges up from a row.
-pub(crate) fn up_bytes(shape: &Shape) -> usize {
-    2 * plane(shape)
 }
 
 /// Bytes that the edges of a grid need.
@@ -87,17 +65,10 @@ fn plane(shape: &Shape) -> usize {
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'a> {
     layout: &'a Layout,
-    /// The row that the values start with.
-    first: usize,
     values: &'a [u8],
 }
 
 impl<'a> Rows<'a> {
-    /// Rows of edges that start at row `first`.
-    pub(crate) fn new(layout: &'a Layout, first: usize, values: &'a [u8]) -> Self {
-        Self { layout, first, values }
-    }
-
     /// The messages that the nodes of `plane` in row `y` received from `side`, `[label][lane]`. `None` if the row has no
     /// neighbours on that side. Lanes without a neighbour hold arbitrary values.
     pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<&'a [u8]> {
@@ -115,7 +86,7 @@ impl<'a> Rows<'a> {
         };
         let bytes = self::plane(self.layout);
         let joined = matches!(side, Side::Left | Side::Right) || self.layout.joined_above(row);
-        let start = (PLANES * (row - self.first) + index) * bytes + shift;
+        let start = (PLANES * row + index) * bytes + shift;
         let start = start.checked_add_signed(moved).filter(|_| joined)?;
         Some(&self.values[start..(start + bytes).min(self.values.len())])
     }

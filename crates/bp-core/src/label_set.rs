@@ -1,0 +1,181 @@
+//! Label sets: the few labels that nodes of the two finest grids may take.
+
+use std::{array, ops::Range};
+
+use crate::{MAX_LABELS, Node, Plan, Size};
+
+/// Up to 64 columns of rows that are passed together: those of a band, or those around a seam. Under
+/// [`Settings::label_sets`](crate::Settings::label_sets) its nodes share a [`LabelSet`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Patch {
+    /// Its columns.
+    pub columns: Range<usize>,
+    /// Its rows.
+    pub rows: Range<usize>,
+}
+
+impl Patch {
+    /// The columns of a patch; the last one of a row may have fewer.
+    pub const COLUMNS: usize = 64;
+
+    /// How many nodes of the coarser grid are looked at beyond the parents, on every side.
+    const MARGIN: usize = 2;
+
+    /// The patches of these rows, from left to right.
+    pub fn all(width: usize, rows: Range<usize>) -> impl ExactSizeIterator<Item = Self> {
+        (0..width.div_ceil(Self::COLUMNS)).map(move |index| {
+            let first = index * Self::COLUMNS;
+            Self { columns: first..width.min(first + Self::COLUMNS), rows: rows.clone() }
+        })
+    }
+
+    /// Its nodes, row by row.
+    pub fn nodes(&self) -> impl Iterator<Item = Node> + use<> {
+        let columns = self.columns.clone();
+        self.rows.clone().flat_map(move |y| columns.clone().map(move |x| Node { x, y }))
+    }
+
+    /// The patch of the next coarser grid, of size `coarser`, whose labels decide the set: the parents and two more nodes on
+    /// every side, where there are any.
+    #[must_use]
+    pub fn region(&self, coarser: Size) -> Self {
+        let around = |range: &Range<usize>, end: usize| {
+            (range.start / 2).saturating_sub(Self::MARGIN)..end.min((range.end - 1) / 2 + 1 + Self::MARGIN)
+        };
+        Self { columns: around(&self.columns, coarser.width), rows: around(&self.rows, coarser.height) }
+    }
+}
+
+/// Some of a plan's labels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LabelSet {
+    words: [u64; MAX_LABELS / 64],
+}
+
+impl LabelSet {
+    /// How far a label may lie from a coarser label.
+    const REACH: usize = 2;
+
+    /// All labels below `labels`, which is at most [`MAX_LABELS`].
+    #[must_use]
+    pub fn all(labels: usize) -> Self {
+        let word = |i: usize| match labels.saturating_sub(64 * i) {
+            0 => 0,
+            more => u64::MAX >> (64 - more.min(64)),
+        };
+        Self { words: array::from_fn(word) }
+    }
+
+    /// The set of a patch of `grid`: the labels of `plan` that differ by at most 2 from that of a node of
+    /// [`Patch::region`]. `coarser` are the labels decided on the next coarser grid, `[height][width]`. On a grid without
+    /// label sets, all labels.
+    ///
+    /// # Panics
+    /// If `coarser` is shorter than that grid.
+    #[must_use]
+    pub fn of(plan: &Plan, grid: usize, patch: &Patch, coarser: &[u16]) -> Self {
+        let labels = plan.model().labels();
+        if !plan.has_label_sets(grid) {
+            return Self::all(labels);
+        }
+        let size = plan.size(grid + 1);
+        let region = patch.region(size);
+        let mut set = Self { words: [0; MAX_LABELS / 64] };
+        for y in region.rows {
+            coarser[y * size.width..][region.columns.clone()].iter().for_each(|&label| set.insert(label.into()));
+        }
+        (0..Self::REACH).for_each(|_| set.spread());
+        Self { words: array::from_fn(|i| set.words[i] & Self::all(labels).words[i]) }
+    }
+
+    /// Adds the labels next to those that it holds.
+    fn spread(&mut self) {
+        let before = self.words;
+        for (i, word) in self.words.iter_mut().enumerate() {
+            let lower = i.checked_sub(1).map_or(0, |i| before[i]);
+            let upper = before.get(i + 1).copied().unwrap_or(0);
+            *word |= *word << 1 | lower >> 63 | *word >> 1 | upper << 63;
+        }
+    }
+
+    fn insert(&mut self, label: usize) {
+        self.words[label / 64] |= 1 << (label % 64);
+    }
+
+    /// Whether it holds a label.
+    #[must_use]
+    pub fn contains(&self, label: usize) -> bool {
+        self.words.get(label / 64).is_some_and(|word| word >> (label % 64) & 1 == 1)
+    }
+
+    /// The number of its labels.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Its labels, from the smallest to the largest.
+    pub fn labels(&self) -> impl Iterator<Item = usize> + use<> {
+        let words = self.words;
+        (0..).step_by(64).zip(words).flat_map(|(first, mut word)| {
+            std::iter::from_fn(move || {
+                let lowest = (word != 0).then(|| first + word.trailing_zeros() as usize);
+                word &= word.wrapping_sub(1);
+                lowest
+            })
+        })
+    }
+
+    /// Its labels as bits, the lowest first.
+    #[must_use]
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Algorithm, Model, Profile, Schedule, Settings};
+
+    fn plan(label_sets: bool) -> Plan {
+        let size = Size { width: 150, height: 70 };
+        let settings = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
+        Plan::new(size, Model::new(Profile::Census, 70).unwrap(), Settings { label_sets, ..settings }).unwrap()
+    }
+
+    #[test]
+    fn patches_cover_their_rows_and_look_two_nodes_beyond_the_parents() {
+        let patches: Vec<_> = Patch::all(150, 32..64).collect();
+        assert_eq!(patches.len(), 3);
+        assert_eq!(patches[2], Patch { columns: 128..150, rows: 32..64 });
+        let coarser = plan(true).size(1);
+        assert_eq!(patches[1].region(coarser), Patch { columns: 30..66, rows: 14..34 });
+        assert_eq!(patches[2].region(coarser), Patch { columns: 62..75, rows: 14..34 });
+        let edge = Patch { columns: 0..64, rows: 52..68 };
+        assert_eq!(edge.region(coarser), Patch { columns: 0..34, rows: 24..35 });
+        assert_eq!(patches[0].nodes().count(), 64 * 32);
+    }
+
+    #[test]
+    fn a_set_reaches_two_labels_from_every_coarser_one() {
+        let (plan, patch) = (plan(true), Patch { columns: 0..64, rows: 0..32 });
+        let mut coarser = vec![40; plan.size(1).pixels()];
+        coarser[0] = 1;
+        coarser[33] = 69;
+        coarser[34] = 20;
+        let set = LabelSet::of(&plan, 0, &patch, &coarser);
+        assert_eq!(set.labels().collect::<Vec<_>>(), [0, 1, 2, 3, 38, 39, 40, 41, 42, 67, 68, 69]);
+        assert_eq!((set.count(), set.contains(3), set.contains(4), set.contains(5000)), (12, true, false, false));
+    }
+
+    #[test]
+    fn other_grids_keep_all_labels() {
+        let patch = Patch { columns: 0..64, rows: 0..32 };
+        let coarser = vec![5; plan(true).size(1).pixels()];
+        assert_eq!(LabelSet::of(&plan(true), 2, &patch, &coarser), LabelSet::all(70));
+        assert_eq!(LabelSet::of(&plan(false), 0, &patch, &coarser), LabelSet::all(70));
+        assert_eq!(LabelSet::all(70).count(), 70);
+        assert_eq!([0, 1, 2].map(|grid| plan(true).has_label_sets(grid)), [true, true, false]);
+    }
+}

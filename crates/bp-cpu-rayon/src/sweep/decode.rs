@@ -1,0 +1,214 @@
+//! Labels of swept rows, decided one after another; see [`bp_core::Schedule::Sweep`].
+//!
+//! In the terms of `bp-cpu-scalar`, the kernel computes for every node:
+//!
+//! ```text
+//! for each label d of the node's list:
+//!     sum(d) = cost(d) + messages from the sides without a decided label (d)
+//!                      + smoothness(d, label decided there) for the other sides
+//! label = the smallest d with the lowest sum
+//! ```
+
+use std::ops::Range;
+
+use bp_core::{MAX_TRUNCATION, Model, Smoothness};
+use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
+
+use super::{
+    block::{Block, Bytes, LANES, Padded},
+    lists::List,
+    messages::Place,
+    pass::Pass,
+};
+use crate::greys::Around;
+
+/// A distance of labels that costs the truncation for every slope but 0.
+const FAR: usize = MAX_TRUNCATION as usize + 1;
+
+/// The labels compared at a time span less than this. Decided labels are clamped to [`FAR`] beyond either end of such a chunk,
+/// so distances to them stay within 8 bits.
+const CHUNK: usize = 256 - 2 * FAR;
+
+/// The labels of the nodes of a block.
+type Labels = [u16; LANES];
+
+impl Pass<'_> {
+    /// Decides the labels of these rows, `[row][width]`, given those of the row above, if there are any.
+    pub(crate) fn decode(&self, rows: Range<usize>, above: Option<&[u16]>, labels: &mut [u16]) {
+        let mut above = above;
+        for (row, y) in labels.chunks_exact_mut(self.sweep.layout.size.width).zip(rows) {
+            let joined = above.filter(|_| self.sweep.layout.joined_above(y));
+            (0..self.lists.patches()).for_each(|patch| self.decide(patch, y % 2, y, joined, row));
+            (0..self.lists.patches()).for_each(|patch| self.decide(patch, 1 - y % 2, y, joined, row));
+            above = Some(row);
+        }
+    }
+
+    /// Decides the labels of the nodes of a plane of a patch. Those of the other plane are known if the nodes are odd.
+    fn decide(&self, patch: usize, plane: usize, y: usize, above: Option<&[u16]>, row: &mut [u16]) {
+        let (entries, range, at) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
+        let messages = self.messages.at(Place { entries, row: at, plane, range: &range });
+        let is_odd = plane != y % 2;
+        let first = (2 * LANES * patch + plane) as isize;
+        let [left, right] = if is_odd { [first - 1, first + 1].map(|x| every_second(row, x)) } else { [[0; LANES]; 2] };
+        // By slot: the neighbour in the same pair of columns, that in the next pair, and that above.
+        let [same, next] = if plane == 0 { [right, left] } else { [left, right] };
+        let known = [same, next, every_second(above.unwrap_or_default(), first)];
+        let undecided = Undecided {
+            plane,
+            list: self.lists.list(patch),
+            costs: &self.work.costs[(2 * at + plane) * entries..][range.clone()],
+            same: messages.same,
+            next: messages.next,
+            below: messages.below,
+            model: self.sweep.plan.model(),
+            lane: LANES * patch,
+            masks: self.masks(plane, above.is_some()),
+            greys: self.sweep.layout.around(plane, y),
+        };
+        let level = self.sweep.level;
+        let labels = match (is_odd, undecided.greys.is_some()) {
+            (false, false) => dispatch!(level, simd => undecided.decide::<_, false, false>(simd, &known)),
+            (false, true) => dispatch!(level, simd => undecided.decide::<_, false, true>(simd, &known)),
+            (true, false) => dispatch!(level, simd => undecided.decide::<_, true, false>(simd, &known)),
+            (true, true) => dispatch!(level, simd => undecided.decide::<_, true, true>(simd, &known)),
+        };
+        row.iter_mut().skip(first as usize).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
+    }
+
+    /// By slot, 255 where a node has a neighbour, `[lane]`.
+    fn masks(&self, plane: usize, has_above: bool) -> [&[u8]; 3] {
+        let [same, next] = self.sweep.layout.masks(plane);
+        [same, next, self.sweep.layout.none_and_all()[usize::from(has_above)]]
+    }
+}
+
+/// The labels of every second column from x on; 0 outside the image.
+fn every_second(row: &[u16], x: isize) -> Labels {
+    let mut labels = [0; LANES];
+    let first = usize::from(x < 0);
+    let columns = row.get((x + 2 * first as isize) as usize..).unwrap_or_default();
+    labels[first..].iter_mut().zip(columns.iter().step_by(2)).for_each(|(label, &decided)| *label = decided);
+    labels
+}
+
+/// The nodes of a block.
+struct Undecided<'a> {
+    plane: usize,
+    list: List<'a>,
+    costs: &'a [Block],
+    same: &'a [Block],
+    next: &'a [Padded],
+    below: &'a [Block],
+    model: &'a Model,
+    /// The first lane of the block, in the arrays that follow.
+    lane: usize,
+    masks: [&'a [u8]; 3],
+    greys: Option<Around<'a>>,
+}
+
+impl Undecided<'_> {
+    /// Decides their labels, one chunk of labels at a time. `known` are the labels beside and above.
+    #[inline(always)]
+    fn decide<S: Simd, const ODD: bool, const WEAK: bool>(&self, simd: S, known: &[Labels; 3]) -> Labels {
+        let mut labels = [0; LANES];
+        let mut best = Bytes::<S>::splat(simd, u8::MAX);
+        let mut entry = 0;
+        while entry < self.list.labels.len() {
+            let from = usize::from(self.list.labels[entry]);
+            let end = entry + self.list.labels[entry..].partition_point(|&label| usize::from(label) < from + CHUNK);
+            let before = best;
+            let index = self.chunk::<S, ODD, WEAK>(simd, entry..end, known, &mut best);
+            let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
+            for lane in 0..LANES {
+                if better[lane] > 0 {
+                    labels[lane] = self.list.labels[entry + usize::from(index[lane])];
+                }
+            }
+            entry = end;
+        }
+        labels
+    }
+
+    /// Compares these entries with the best so far, and returns for each node the best of them, counted from the first.
+    #[inline(always)]
+    fn chunk<S: Simd, const ODD: bool, const WEAK: bool>(
+        &self,
+        simd: S,
+        entries: Range<usize>,
+        known: &[Labels; 3],
+        best: &mut Bytes<S>,
+    ) -> Bytes<S> {
+        let from = usize::from(self.list.labels[entries.start]);
+        let decided = if ODD { 0..3 } else { 2..3 };
+        let near = known.each_ref().map(|labels| near(simd, labels, from));
+        let exist = self.masks.map(|mask| Bytes::from_slice(simd, &mask[self.lane..self.lane + LANES]));
+        let smoothness = Edges::<S>::new::<WEAK>(simd, self.model, self.greys, self.lane);
+        let len = entries.len();
+        let (labels, costs) = (&self.list.labels[entries.clone()], &self.costs[entries.clone()]);
+        let (same, next) = (&self.same[entries.clone()], &self.next[entries.clone()]);
+        let below = &self.below[entries][..len];
+        let mut index = Bytes::splat(simd, 0);
+        for i in 0..len {
+            let here = Bytes::splat(simd, (usize::from(labels[i]) - from + FAR) as u8);
+            let mut sum = below[i].load(simd);
+            if !ODD {
+                let next: Bytes<S> =
+                    if self.plane == 0 { next[i].load::<S, -1>(simd) } else { next[i].load::<S, 0>(simd) };
+                sum = sum + same[i].load(simd) + next;
+            }
+            for side in decided.clone() {
+                let distance = here.saturating_sub(near[side]) | near[side].saturating_sub(here);
+                sum += smoothness.of::<WEAK>(side, distance) & exist[side];
+            }
+            // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
+            let belief = costs[i].load(simd).saturating_add(sum);
+            index = belief.simd_lt(*best).select(Bytes::splat(simd, i as u8), index);
+            *best = best.min(belief);
+        }
+        index
+    }
+}
+
+/// The smoothness costs of the edges of a block's nodes to the neighbours that have labels.
+struct Edges<S: Simd> {
+    far: Bytes<S>,
+    steps: [Bytes<S>; 3],
+    truncations: [Bytes<S>; 3],
+}
+
+impl<S: Simd> Edges<S> {
+    #[inline(always)]
+    fn new<const WEAK: bool>(simd: S, model: &Model, greys: Option<Around<'_>>, lane: usize) -> Self {
+        let usual = model.smoothness();
+        let of_edges = |value: fn(Smoothness) -> u8| match greys.filter(|_| WEAK) {
+            Some(around) => {
+                [0, 1, 2].map(|slot| around.choose(simd, slot, lane, [value(usual), value(usual.weakened())]))
+            }
+            None => [Bytes::splat(simd, value(usual)); 3],
+        };
+        let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
+        let far = if WEAK { far(usual).max(far(usual.weakened())) } else { far(usual) };
+        Self {
+            far: Bytes::splat(simd, far),
+            steps: of_edges(Smoothness::step),
+            truncations: of_edges(|smoothness| smoothness.truncation),
+        }
+    }
+
+    /// The product of [`Self::far`] with a step fits 8 bits, because s div 2 is at least a third of s, or 0.
+    #[inline(always)]
+    fn of<const WEAK: bool>(&self, side: usize, distance: Bytes<S>) -> Bytes<S> {
+        (distance.min(self.far) * self.steps[side]).min(self.truncations[side])
+    }
+}
+
+/// Decided labels relative to a chunk of labels, clamped to [`FAR`] beyond its ends.
+#[inline(always)]
+fn near<S: Simd>(simd: S, labels: &Labels, from: usize) -> Bytes<S> {
+    let relative = labels.map(
+        #[inline(always)]
+        |label| (label + FAR as u16).saturating_sub(from as u16).min(255) as u8,
+    );
+    Bytes::load_array(simd, relative)
+}

@@ -1,0 +1,177 @@
+//! The labels of rows that are passed together: a list for each patch.
+
+use std::ops::Range;
+
+use bp_core::{Error, LabelSet, Patch, Plan, Smoothness, memory};
+
+/// The lists of the patches of some rows, one after another. An *entry* is a label of a list.
+#[derive(Default)]
+pub(crate) struct Lists {
+    /// The label of each entry. They ascend within a patch.
+    labels: Vec<u16>,
+    /// For each patch the steps of its entries, and one more. See [`List::steps`].
+    steps: Vec<[u8; 2]>,
+    /// The first entry of each patch, and the number of entries.
+    starts: Vec<usize>,
+}
+
+/// The list of one patch.
+#[derive(Clone, Copy)]
+pub(crate) struct List<'a> {
+    /// The labels.
+    pub(crate) labels: &'a [u16],
+    /// What the smoothness costs from the entry before to this one, over usual and over weak edges. The first and the last
+    /// value, after the last entry, mean nothing.
+    pub(crate) steps: &'a [[u8; 2]],
+}
+
+/// The bytes of lists with this many patches and entries.
+pub(crate) fn bytes(patches: usize, entries: usize) -> u64 {
+    (entries * (size_of::<u16>() + size_of::<[u8; 2]>())
+        + patches * size_of::<[u8; 2]>()
+        + (patches + 1) * size_of::<usize>()) as u64
+}
+
+impl Lists {
+    /// Makes the lists of these rows of a grid, whose label sets come from the labels `coarser`.
+    pub(crate) fn fill(&mut self, plan: &Plan, grid: usize, rows: Range<usize>, coarser: &[u16]) -> Result<(), Error> {
+        let patches = Patch::all(plan.size(grid).width, rows);
+        self.clear();
+        self.reserve(patches.len(), 0)?;
+        for patch in patches {
+            let set = LabelSet::of(plan, grid, &patch, coarser);
+            self.reserve(0, set.count())?;
+            self.push(plan.model().smoothness(), set);
+        }
+        Ok(())
+    }
+
+    fn clear(&mut self) {
+        self.labels.clear();
+        self.steps.clear();
+        self.starts.clear();
+    }
+
+    /// Makes room for so many more patches and entries.
+    pub(crate) fn reserve(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
+        let needed = bytes(patches, entries);
+        let reserved = self.labels.try_reserve_exact(entries).and_then(|()| {
+            self.steps.try_reserve_exact(entries + patches.max(1))?;
+            self.starts.try_reserve_exact(if patches > 0 { patches + 1 } else { 0 })
+        });
+        reserved.map_err(|_| Error::OutOfMemory { what: "label sets", needed, available: None })
+    }
+
+    fn push(&mut self, smoothness: Smoothness, set: LabelSet) {
+        if self.starts.is_empty() {
+            self.starts.push(0);
+        }
+        let mut before = 0;
+        for label in set.labels() {
+            self.labels.push(label as u16);
+            self.steps.push([smoothness, smoothness.weakened()].map(|s| cost_of(s, label - before)));
+            before = label;
+        }
+        self.steps.push([0; 2]);
+        self.starts.push(self.labels.len());
+    }
+
+    /// The number of patches.
+    pub(crate) fn patches(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// The number of entries.
+    pub(crate) fn entries(&self) -> usize {
+        self.labels.len()
+    }
+
+    /// The entries of a patch.
+    pub(crate) fn range(&self, patch: usize) -> Range<usize> {
+        self.starts[patch]..self.starts[patch + 1]
+    }
+
+    /// The list of a patch.
+    pub(crate) fn list(&self, patch: usize) -> List<'_> {
+        let range = self.range(patch);
+        List { labels: &self.labels[range.clone()], steps: &self.steps[range.start + patch..range.end + patch + 1] }
+    }
+
+    /// The bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.labels) + memory::bytes(&self.steps) + memory::bytes(&self.starts)
+    }
+}
+
+/// What the smoothness costs at this distance of labels, before truncation and at most 255.
+fn cost_of(smoothness: Smoothness, distance: usize) -> u8 {
+    (usize::from(smoothness.slope) * distance).min(usize::from(u8::MAX)) as u8
+}
+
+/// Where the value of a message for a label comes from, if it was computed for another list: the nearest entries below and
+/// above, at these distances of labels. A message rises by at most s from label to label, so farther entries offer no less.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Source {
+    entries: [u16; 2],
+    distances: [u16; 2],
+}
+
+impl Source {
+    pub(crate) const NONE: Self = Self { entries: [0; 2], distances: [0; 2] };
+
+    /// The entry, if the other list has this label.
+    #[inline(always)]
+    pub(crate) fn exact(self) -> Option<usize> {
+        (self.distances == [0; 2]).then_some(usize::from(self.entries[0]))
+    }
+
+    /// Both entries and what the smoothness costs from them.
+    #[inline(always)]
+    pub(crate) fn nearest(self, smoothness: Smoothness) -> [(usize, u8); 2] {
+        [0, 1].map(|i| (usize::from(self.entries[i]), cost_of(smoothness, usize::from(self.distances[i]))))
+    }
+
+    /// The value for this label.
+    #[inline(always)]
+    pub(crate) fn value(self, smoothness: Smoothness, message: impl Fn(usize) -> u8) -> u8 {
+        let [below, above] = self.nearest(smoothness).map(|(entry, cost)| message(entry).saturating_add(cost));
+        below.min(above).min(smoothness.truncation)
+    }
+}
+
+/// The sources of the labels `to` in a list of the labels `from`. Both ascend.
+pub(crate) fn sources(from: &[u16], to: &[u16]) -> impl Iterator<Item = Source> {
+    let mut above = 0;
+    to.iter().map(move |&label| {
+        while above + 1 < from.len() && from[above] < label {
+            above += 1;
+        }
+        let below = if from[above] > label { above.saturating_sub(1) } else { above };
+        let entries = [below, above];
+        Source { entries: entries.map(|i| i as u16), distances: entries.map(|i| from[i].abs_diff(label)) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_are_the_nearest_entries_on_both_sides() {
+        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20]).collect();
+        let source = |entries, distances| Source { entries, distances };
+        let expected = [
+            source([0, 0], [2, 2]),
+            source([0, 0], [0, 0]),
+            source([0, 1], [1, 1]),
+            source([2, 2], [0, 0]),
+            source([2, 2], [1, 1]),
+            source([2, 2], [11, 11]),
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(
+            found.into_iter().map(Source::exact).collect::<Vec<_>>(),
+            [None, Some(0), None, Some(2), None, None]
+        );
+    }
+}

@@ -1,0 +1,288 @@
+//! Passes over rows that are passed together: a band, or those around a seam.
+//!
+//! A row is processed patch by patch, and its second colour one patch behind the first, so that it finds in cache what the
+//! first one wrote.
+
+use std::ops::Range;
+
+use bp_core::{Error, Smoothness, memory};
+use fearless_simd::dispatch;
+
+use super::{
+    Sweep, Work,
+    block::{Block, LANES, Padded},
+    lists::{Lists, Source, sources},
+    messages::{Messages, Place},
+    refine::At,
+    send::{self, Slots, to_sides},
+};
+
+/// The messages that a pass down starts with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Start {
+    /// Those that the edges hold.
+    Held,
+    /// The first messages of all rows.
+    Refined,
+    /// The first messages of all rows. The last row holds those from below already, which came across a seam.
+    RefinedAboveSeam,
+}
+
+/// For each entry, its source in the list of the patch to the left and in that to the right.
+#[derive(Default)]
+pub(crate) struct Crossings {
+    sources: Vec<[Source; 2]>,
+}
+
+impl Crossings {
+    pub(crate) fn fit(&mut self, entries: usize) -> Result<(), Error> {
+        memory::grow("label sets", &mut self.sources, entries, [Source::NONE; 2])
+    }
+
+    /// Finds the sources of all entries.
+    pub(crate) fn find(&mut self, lists: &Lists) {
+        for patch in 0..lists.patches() {
+            let labels = lists.list(patch).labels;
+            let beside = [patch.checked_sub(1), Some(patch + 1).filter(|&next| next < lists.patches())];
+            for (index, other) in beside.into_iter().enumerate() {
+                let Some(other) = other else { continue };
+                let all = self.sources[lists.range(patch)].iter_mut().zip(sources(lists.list(other).labels, labels));
+                all.for_each(|(sources, source)| sources[index] = source);
+            }
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.sources)
+    }
+}
+
+/// The bytes of the [`Crossings`] of so many entries.
+pub(crate) fn crossing_bytes(entries: usize) -> u64 {
+    (entries as u64).saturating_mul(size_of::<[Source; 2]>() as u64)
+}
+
+/// Rows that are passed together.
+pub(crate) struct Pass<'a> {
+    pub(crate) sweep: &'a Sweep<'a>,
+    pub(crate) rows: Range<usize>,
+    pub(crate) lists: &'a Lists,
+    pub(crate) messages: &'a mut Messages,
+    pub(crate) work: &'a mut Work,
+}
+
+/// The direction of a pass over the rows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Down,
+    Up,
+}
+
+/// What the nodes of a block send.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sends {
+    Sides,
+    SidesAndAhead,
+    Ahead,
+}
+
+/// The nodes of a plane of a patch in row y.
+#[derive(Clone, Copy)]
+struct Nodes {
+    patch: usize,
+    plane: usize,
+    y: usize,
+}
+
+impl Pass<'_> {
+    /// Passes down all rows.
+    pub(crate) fn forward(&mut self, start: Start) {
+        self.work.coarse_rows.clear();
+        self.rows.clone().for_each(|y| self.forward_row(y, start));
+    }
+
+    /// Passes up these rows.
+    pub(crate) fn backward(&mut self, rows: Range<usize>) {
+        rows.rev().for_each(|y| self.backward_row(y));
+    }
+
+    /// Even nodes send left, right and down; then odd nodes send down. The last row sends nothing down.
+    fn forward_row(&mut self, y: usize, start: Start) {
+        let onward = y + 1 < self.rows.end && self.sweep.layout.joined_above(y + 1);
+        let (even, odd) = (y % 2, 1 - y % 2);
+        if let Some(coarser) = self.sweep.coarser.filter(|_| start != Start::Held) {
+            self.work.coarse_rows.read(self.sweep.level, coarser, self.lists, y);
+        }
+        for patch in 0..=self.lists.patches() {
+            if patch < self.lists.patches() {
+                if start != Start::Held {
+                    self.first_visit(patch, y, start);
+                }
+                let sends = if onward { Sends::SidesAndAhead } else { Sends::Sides };
+                self.send(Way::Down, Nodes { patch, plane: even, y }, sends);
+                self.close(patch, y);
+                self.cross(patch, even, y);
+            }
+            if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
+                self.send(Way::Down, Nodes { patch, plane: odd, y }, Sends::Ahead);
+            }
+        }
+    }
+
+    /// Odd nodes send left, right and up; then even nodes send up. The first row sends nothing up.
+    fn backward_row(&mut self, y: usize) {
+        let onward = y > self.rows.start && self.sweep.layout.joined_above(y);
+        let (even, odd) = (y % 2, 1 - y % 2);
+        for patch in 0..=self.lists.patches() {
+            if patch < self.lists.patches() {
+                let sends = if onward { Sends::SidesAndAhead } else { Sends::Sides };
+                self.send(Way::Up, Nodes { patch, plane: odd, y }, sends);
+                self.close(patch, y);
+                self.cross(patch, odd, y);
+            }
+            if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
+                self.send(Way::Up, Nodes { patch, plane: even, y }, Sends::Ahead);
+            }
+        }
+    }
+
+    /// The edges up from row y.
+    pub(crate) fn up_mut(&mut self, y: usize) -> &mut [Block] {
+        self.messages.up_mut(self.lists.entries(), y - self.rows.start)
+    }
+
+    /// Computes the costs of a patch in row y, and the first messages that a pass down needs: those of even nodes, and in the
+    /// last row also those that odd nodes hold from below.
+    fn first_visit(&mut self, patch: usize, y: usize, start: Start) {
+        let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
+        let (even, odd) = self.work.costs[2 * row * entries..2 * (row + 1) * entries].split_at_mut(entries);
+        let costs = [&mut even[range.clone()], &mut odd[range.clone()]];
+        self.sweep.costs.fill(self.sweep, patch, y, self.lists.list(patch).labels, costs);
+        let last = y + 1 == self.rows.end;
+        let below = !last || start == Start::Refined;
+        let joined = self.sweep.layout.joined_above(y + 1);
+        for plane in 0..2 {
+            let sides = plane == y % 2;
+            let mut around = self.messages.around(Place { entries, row, plane, range: &range });
+            if let Some(coarser) = self.sweep.coarser {
+                let coarser_height = coarser.layout.size.height;
+                let at = At { lists: self.lists, patch, plane, y, coarser_height };
+                let below = below && (sides || last);
+                self.work.coarse_rows.interpolate(self.sweep.level, &at, sides, below, &mut around);
+            } else {
+                around.same.fill(Block::ZERO);
+                around.next.fill(Padded::ZERO);
+            }
+            if below && self.sweep.coarser.is_none() || !joined {
+                around.below.fill(Block::ZERO);
+            }
+        }
+        self.close(patch, y);
+    }
+
+    fn send(&mut self, way: Way, at: Nodes, sends: Sends) {
+        let Nodes { patch, plane, y } = at;
+        let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
+        let around = self.messages.around(Place { entries, row, plane, range: &range });
+        let greys = self.sweep.layout.around(plane, y);
+        let greys = greys.map(|around| if way == Way::Up { around.upwards() } else { around });
+        let nodes = send::Nodes {
+            plane,
+            list: self.lists.list(patch),
+            costs: &self.work.costs[(2 * row + plane) * entries..][range.clone()],
+            smoothness: self.sweep.plan.model().smoothness(),
+            greys: greys.map(|around| (around, LANES * patch)),
+        };
+        let (behind, ahead) = match way {
+            Way::Down => (around.above, around.below),
+            Way::Up => (around.below, around.above),
+        };
+        let slots = Slots { same: around.same, next: around.next, behind, ahead };
+        let level = self.sweep.level;
+        match (sends, nodes.greys.is_some()) {
+            (Sends::Sides, false) => dispatch!(level, simd => to_sides::<_, false, false>(simd, &nodes, slots)),
+            (Sends::Sides, true) => dispatch!(level, simd => to_sides::<_, true, false>(simd, &nodes, slots)),
+            (Sends::SidesAndAhead, false) => dispatch!(level, simd => to_sides::<_, false, true>(simd, &nodes, slots)),
+            (Sends::SidesAndAhead, true) => dispatch!(level, simd => to_sides::<_, true, true>(simd, &nodes, slots)),
+            (Sends::Ahead, false) => dispatch!(level, simd => send::ahead::<_, false>(simd, &nodes, slots)),
+            (Sends::Ahead, true) => dispatch!(level, simd => send::ahead::<_, true>(simd, &nodes, slots)),
+        }
+    }
+
+    /// Sets the messages of a patch over horizontal edges that do not exist to zeros.
+    fn close(&mut self, patch: usize, y: usize) {
+        let entries = self.lists.entries();
+        let range = self.lists.range(patch);
+        let inside = (y - self.rows.start) * entries;
+        let inside = inside + range.start..inside + range.end;
+        for &Gap { edge, .. } in self.sweep.gaps.iter().filter(|gap| gap.patch == patch) {
+            match edge {
+                Edge::Same(lane) => self.messages.same[inside.clone()].iter_mut().for_each(|block| block.0[lane] = 0),
+                Edge::Next(lane) => {
+                    self.messages.next[inside.clone()].iter_mut().for_each(|block| *block.lane_mut(lane) = 0);
+                }
+            }
+        }
+    }
+
+    /// Carries the messages that the nodes of `plane` sent between this patch and the one before to the other of the two.
+    fn cross(&mut self, patch: usize, plane: usize, y: usize) {
+        let Some(before) = patch.checked_sub(1) else { return };
+        let lane = LANES * patch;
+        let weak = self.sweep.layout.around(0, y).is_some_and(|around| around.is_weak(1, lane));
+        let usual = self.sweep.plan.model().smoothness();
+        let smoothness = if weak { usual.weakened() } else { usual };
+        let inside = (y - self.rows.start) * self.lists.entries();
+        let next = &mut self.messages.next[inside..inside + self.lists.entries()];
+        let (left, right) = next[self.lists.range(before).start..self.lists.range(patch).end]
+            .split_at_mut(self.lists.range(before).len());
+        let end = LANES as isize - 1;
+        if plane == 1 {
+            let sources = &self.work.crossings.sources[self.lists.range(patch)];
+            carry(smoothness, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
+        } else {
+            let sources = &self.work.crossings.sources[self.lists.range(before)];
+            carry(smoothness, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
+        }
+    }
+}
+
+/// Writes the messages of a lane for the labels of another patch.
+fn carry(
+    smoothness: Smoothness,
+    sources: impl Iterator<Item = Source>,
+    (from, from_lane): (&mut [Padded], isize),
+    (to, to_lane): (&mut [Padded], isize),
+) {
+    for (source, out) in sources.zip(to) {
+        *out.lane_mut(to_lane) = source.value(smoothness, |entry| from[entry].lane(from_lane));
+    }
+}
+
+/// A horizontal edge that does not exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Gap {
+    patch: usize,
+    edge: Edge,
+}
+
+/// The slot of an edge in a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Edge {
+    Same(usize),
+    Next(isize),
+}
+
+/// The edges that do not exist in a row of this width: those at both borders, and one at a cut before column `cut`.
+pub(crate) fn gaps(width: usize, cut: Option<usize>) -> [Gap; 4] {
+    let after = |x: usize| {
+        let (patch, lane) = (x / (2 * LANES), x / 2 % LANES);
+        Gap { patch, edge: if x.is_multiple_of(2) { Edge::Same(lane) } else { Edge::Next(lane as isize) } }
+    };
+    let left = Gap { patch: 0, edge: Edge::Next(-1) };
+    let cut = cut.filter(|&x| x > 0);
+    // The edge between two patches belongs to both.
+    let to_cut = cut.filter(|x| x.is_multiple_of(2 * LANES));
+    let to_cut = to_cut.map_or(left, |x| Gap { patch: x / (2 * LANES), edge: Edge::Next(-1) });
+    [left, after(width - 1), cut.map_or(left, |x| after(x - 1)), to_cut]
+}

@@ -1,0 +1,345 @@
+//! First messages of a swept grid: interpolated between those of the coarser grid, see [`bp_core::Schedule::Sweep`].
+//!
+//! The messages of a coarse row are first brought into the order of columns and to the labels of the finer patch. There, lane
+//! i is the parent of lane i of both planes of the finer patch, and lanes -1 and 32 lie beside the parents. Then every first
+//! message is a mean of such lanes. Three coarse rows are kept at a time.
+
+use std::cmp::Ordering;
+
+use bp_core::{BAND_ROWS, Error, MAX_TRUNCATION, Smoothness, memory};
+use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdInt, dispatch, u8x16};
+
+use super::{
+    Band,
+    block::{Block, Bytes, LANES, Padded},
+    lists::{Lists, Source, sources},
+    messages::Around,
+};
+use crate::layout::Layout;
+
+/// The coarse rows that a finer row is interpolated between lie within this number of rows.
+const ROWS: usize = 3;
+
+/// From which side messages come: left, right or below.
+const SIDES: usize = 3;
+const LEFT: usize = 0;
+const RIGHT: usize = 1;
+const BELOW: usize = 2;
+
+/// The messages of a few coarse rows, for the lists of finer rows: `[row mod 3][side][entry]`.
+#[derive(Default)]
+pub(crate) struct CoarseRows {
+    values: Vec<Padded>,
+    /// For each entry its sources in the list of the coarser patch, and in those to its left and right.
+    sources: Vec<[Source; 3]>,
+    /// The coarse rows that are held, and the band that the sources belong to.
+    rows: [Option<usize>; ROWS],
+    band: Option<usize>,
+}
+
+/// The bytes for so many entries.
+pub(crate) fn bytes(entries: usize) -> u64 {
+    (entries as u64).saturating_mul((ROWS * SIDES * size_of::<Padded>() + size_of::<[Source; 3]>()) as u64)
+}
+
+/// The messages of the next coarser grid.
+#[derive(Clone, Copy)]
+pub(crate) struct Coarser<'a> {
+    pub(crate) layout: &'a Layout,
+    pub(crate) bands: &'a [Band],
+    pub(crate) smoothness: Smoothness,
+}
+
+/// A coarse row to be read for one finer patch.
+struct Reading<'a> {
+    band: &'a Band,
+    width: usize,
+    row: usize,
+    y: usize,
+    /// The finer patch.
+    patch: usize,
+}
+
+impl CoarseRows {
+    /// Makes room for so many entries.
+    pub(crate) fn fit(&mut self, entries: usize) -> Result<(), Error> {
+        memory::grow("messages", &mut self.values, (ROWS * SIDES).saturating_mul(entries), Padded::ZERO)?;
+        memory::grow("label sets", &mut self.sources, entries, [Source::NONE; 3])
+    }
+
+    /// Forgets everything, before other rows of a grid.
+    pub(crate) fn clear(&mut self) {
+        (self.rows, self.band) = ([None; ROWS], None);
+    }
+
+    /// The bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        memory::bytes(&self.values) + memory::bytes(&self.sources)
+    }
+
+    /// Reads the coarse rows that a finer row is interpolated between.
+    pub(crate) fn read(&mut self, level: Level, coarser: Coarser<'_>, lists: &Lists, y: usize) {
+        let near = y / 2;
+        for row in [near.checked_sub(1 - y % 2), Some(near + y % 2)].into_iter().flatten() {
+            if row < coarser.layout.size.height && self.rows[row % ROWS] != Some(row) {
+                self.read_row(level, coarser, lists, row);
+                self.rows[row % ROWS] = Some(row);
+            }
+        }
+    }
+
+    fn read_row(&mut self, level: Level, coarser: Coarser<'_>, lists: &Lists, y: usize) {
+        let index = y / BAND_ROWS;
+        let band = &coarser.bands[index];
+        for patch in 0..lists.patches() {
+            if self.band != Some(index) {
+                self.find_sources(band, lists, patch);
+            }
+            let width = coarser.layout.size.width;
+            let reading = Reading { band, width, row: y % BAND_ROWS, y, patch };
+            for side in 0..SIDES {
+                let range = lists.range(patch);
+                let start = ((y % ROWS) * SIDES + side) * lists.entries();
+                let values = &mut self.values[start + range.start..start + range.end];
+                let sources = &self.sources[range];
+                match side {
+                    LEFT => {
+                        dispatch!(level, simd => reading.read::<_, LEFT>(simd, coarser.smoothness, sources, values))
+                    }
+                    RIGHT => {
+                        dispatch!(level, simd => reading.read::<_, RIGHT>(simd, coarser.smoothness, sources, values))
+                    }
+                    _ => dispatch!(level, simd => reading.read::<_, BELOW>(simd, coarser.smoothness, sources, values)),
+                }
+            }
+        }
+        self.band = Some(index);
+    }
+
+    fn find_sources(&mut self, band: &Band, lists: &Lists, patch: usize) {
+        let own = patch / 2;
+        let labels = lists.list(patch).labels;
+        let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
+        for (index, from) in patches.into_iter().enumerate() {
+            let Some(from) = from else { continue };
+            let all = self.sources[lists.range(patch)].iter_mut().zip(sources(band.lists.list(from).labels, labels));
+            all.for_each(|(sources, source)| sources[index] = source);
+        }
+    }
+
+    /// Writes the first messages of the nodes of `plane` of a patch in row y: those from the sides and from below.
+    pub(crate) fn interpolate(&self, level: Level, at: &At<'_>, sides: bool, below: bool, to: &mut Around<'_>) {
+        if at.plane == 0 {
+            dispatch!(level, simd => self.interpolate_of::<_, -1, -1>(simd, at, sides, below, to));
+        } else {
+            dispatch!(level, simd => self.interpolate_of::<_, 1, 0>(simd, at, sides, below, to));
+        }
+    }
+
+    #[inline(always)]
+    fn interpolate_of<S: Simd, const ASIDE: isize, const NEXT: isize>(
+        &self,
+        simd: S,
+        at: &At<'_>,
+        sides: bool,
+        below: bool,
+        to: &mut Around<'_>,
+    ) {
+        let (near, far) = (at.y / 2, if at.y % 2 == 1 { Some(at.y / 2 + 1) } else { (at.y / 2).checked_sub(1) });
+        let height = at.coarser_height;
+        let range = at.lists.range(at.patch);
+        let row = |y: usize, side: usize| {
+            let start = ((y % ROWS) * SIDES + side) * at.lists.entries();
+            &self.values[start + range.start..start + range.end]
+        };
+        let both = |side: usize, rows: usize| {
+            let far = far.filter(|&far| far < rows).unwrap_or(near);
+            row(near, side).iter().zip(row(far, side))
+        };
+        if sides {
+            // The left neighbour of plane 1 and the right one of plane 0 lie in the same pair of columns.
+            let (same, next) = if ASIDE == 1 { (LEFT, RIGHT) } else { (RIGHT, LEFT) };
+            for (out, (near, far)) in to.same.iter_mut().zip(both(same, height)) {
+                out.store(nearer(simd, near.load::<S, 0>(simd), far.load::<S, 0>(simd)));
+            }
+            for (out, (near, far)) in to.next.iter_mut().zip(both(next, height)) {
+                out.store::<S, NEXT>(nearer(simd, near.load::<S, 0>(simd), far.load::<S, 0>(simd)));
+            }
+        }
+        // The last row receives nothing from below.
+        if below && near + 1 < height {
+            for (out, (near, far)) in to.below.iter_mut().zip(both(BELOW, height - 1)) {
+                let own = nearer(simd, near.load::<S, 0>(simd), far.load::<S, 0>(simd));
+                let aside = nearer(simd, near.load::<S, ASIDE>(simd), far.load::<S, ASIDE>(simd));
+                out.store(nearer(simd, own, aside));
+            }
+        } else if below {
+            to.below.fill(Block::ZERO);
+        }
+    }
+}
+
+/// The nodes whose first messages are made.
+pub(crate) struct At<'a> {
+    pub(crate) lists: &'a Lists,
+    pub(crate) patch: usize,
+    pub(crate) plane: usize,
+    pub(crate) y: usize,
+    pub(crate) coarser_height: usize,
+}
+
+impl Reading<'_> {
+    /// Reads the messages from one side, in the order of columns.
+    #[inline(always)]
+    fn read<S: Simd, const SIDE: usize>(
+        &self,
+        simd: S,
+        smoothness: Smoothness,
+        sources: &[[Source; 3]],
+        values: &mut [Padded],
+    ) {
+        let own = self.patch / 2;
+        let first = self.band.lists.range(own).start;
+        for ([source, ..], out) in sources.iter().zip(values.iter_mut()) {
+            let value = match source.exact() {
+                Some(entry) => self.columns::<S, SIDE>(simd, first + entry),
+                None => {
+                    let [below, above] = source.nearest(smoothness).map(|(entry, cost)| {
+                        let value: Bytes<S> = self.columns::<S, SIDE>(simd, first + entry);
+                        value.saturating_add(Bytes::splat(simd, cost))
+                    });
+                    below.min(above).min(Bytes::splat(simd, smoothness.truncation))
+                }
+            };
+            out.store::<S, 0>(value);
+        }
+        self.read_borders::<SIDE>(smoothness, sources, values);
+    }
+
+    /// The messages of the columns of this entry. Those that other patches hold are arbitrary.
+    #[inline(always)]
+    fn columns<S: Simd, const SIDE: usize>(&self, simd: S, entry: usize) -> Bytes<S> {
+        let messages = &self.band.messages;
+        let entries = self.band.lists.entries();
+        let inside = self.row * entries + entry;
+        let half = (self.patch % 2) * (LANES / 2);
+        let block = |block: &Block, first: usize| u8x16::from_slice(simd, &block.0[first..first + LANES / 2]);
+        let padded = |first: isize| u8x16::from_slice(simd, messages.next[inside].half(half as isize + first));
+        let same = &messages.same[inside];
+        let moved = |by: isize| {
+            let first = half as isize + by;
+            let mut lanes = [0; LANES / 2];
+            for (i, lane) in lanes.iter_mut().enumerate() {
+                *lane = same.0[(first + i as isize).clamp(0, LANES as isize - 1) as usize];
+            }
+            u8x16::from_slice(simd, &lanes)
+        };
+        let [even, odd] = match (SIDE, self.y % 2) {
+            (LEFT, 0) => [padded(-1); 2],
+            (LEFT, _) => [moved(-1), block(same, half)],
+            (RIGHT, 0) => [block(same, half), moved(1)],
+            (RIGHT, _) => [padded(0); 2],
+            _ => [0, 1].map(|plane| block(&messages.vertical[(2 * self.row + 2 + plane) * entries + entry], half)),
+        };
+        even.zip_low(odd).combine(even.zip_high(odd))
+    }
+
+    /// Reads the columns that the patches beside the coarse one hold. Where there is no such column, that at the border takes
+    /// its place in messages from below, and others are zeros.
+    #[inline(always)]
+    fn read_borders<const SIDE: usize>(&self, smoothness: Smoothness, sources: &[[Source; 3]], values: &mut [Padded]) {
+        let first = LANES * self.patch;
+        // Of messages from the side, only the sides' own columns can lie in another patch.
+        let columns: [isize; 2] = match (SIDE, self.y % 2) {
+            (BELOW, _) => [-1, LANES as isize],
+            (LEFT, 1) => [0, 0],
+            (RIGHT, 0) => [LANES as isize - 1; 2],
+            _ => [0, -1],
+        };
+        let wanted = if SIDE == BELOW { &columns[..] } else { &columns[..usize::from(columns[0] == columns[1])] };
+        for &column in wanted {
+            let holder = usize::try_from(first as isize + column).ok().and_then(|x| self.holder::<SIDE>(x));
+            match holder {
+                Some(x) => self.read_column::<SIDE>(smoothness, sources, x, column, values),
+                None => values.iter_mut().for_each(|out| *out.lane_mut(column) = 0),
+            }
+        }
+        let last = self.width as isize - 1 - first as isize;
+        for out in values {
+            if SIDE == BELOW && first == 0 {
+                *out.lane_mut(-1) = out.lane(0);
+            }
+            if SIDE == BELOW && (-1..LANES as isize).contains(&last) {
+                *out.lane_mut(last + 1) = out.lane(last);
+            }
+            // The last column of odd nodes has no neighbour that could have received anything.
+            if SIDE == RIGHT && (0..LANES as isize).contains(&last) && (self.width - 1 + self.y) % 2 == 1 {
+                *out.lane_mut(last) = 0;
+            }
+        }
+    }
+
+    /// The column of the node that holds the message from a side of coarse column x, if there are both.
+    fn holder<const SIDE: usize>(&self, x: usize) -> Option<usize> {
+        let is_odd = (x + self.y) % 2 == 1;
+        let holder = match SIDE {
+            LEFT if is_odd => x.checked_sub(1)?,
+            RIGHT if is_odd => x + 1,
+            _ => x,
+        };
+        (x < self.width && holder < self.width).then_some(holder)
+    }
+
+    /// Writes the messages that column x holds, which may belong to any patch, to a lane.
+    fn read_column<const SIDE: usize>(
+        &self,
+        smoothness: Smoothness,
+        sources: &[[Source; 3]],
+        x: usize,
+        lane: isize,
+        values: &mut [Padded],
+    ) {
+        let (own, patch) = (self.patch / 2, x / (2 * LANES));
+        let index = match patch.cmp(&own) {
+            Ordering::Equal => 0,
+            Ordering::Less => 1,
+            Ordering::Greater => 2,
+        };
+        let (lists, messages) = (&self.band.lists, &self.band.messages);
+        let (entries, range) = (lists.entries(), lists.range(patch));
+        let inside = self.row * entries + range.start..self.row * entries + range.end;
+        let (plane, from) = (x % 2, x / 2 % LANES);
+        let out = sources.iter().map(|sources| sources[index]).zip(values.iter_mut().map(|out| out.lane_mut(lane)));
+        let in_pair = (SIDE == LEFT) == (plane == 1);
+        if SIDE == BELOW {
+            let below = &messages.vertical[(2 * self.row + 2 + plane) * entries..][range];
+            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| below[entry].0[from]));
+        } else if in_pair {
+            let same = &messages.same[inside];
+            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| same[entry].0[from]));
+        } else {
+            let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
+            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| next[entry].lane(from)));
+        }
+    }
+}
+
+/// Three quarters of `near` and one of `far`, as two means that are rounded up.
+#[inline(always)]
+fn nearer<S: Simd>(simd: S, near: Bytes<S>, far: Bytes<S>) -> Bytes<S> {
+    // No message exceeds this. But an operation on whole vectors keeps the compiler from gathering single bytes of many
+    // entries into a vector.
+    mean(simd, mean(simd, near, far), near).min(Bytes::splat(simd, MAX_TRUNCATION))
+}
+
+/// The mean, rounded up.
+#[inline(always)]
+fn mean<S: Simd>(simd: S, a: Bytes<S>, b: Bytes<S>) -> Bytes<S> {
+    let (a, b) = (a.as_slice(), b.as_slice());
+    // Compilers know this as one instruction.
+    Bytes::from_fn(
+        simd,
+        #[inline(always)]
+        |i| ((u16::from(a[i]) + u16::from(b[i]) + 1) >> 1) as u8,
+    )
+}

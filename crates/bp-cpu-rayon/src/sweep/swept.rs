@@ -1,0 +1,153 @@
+//! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
+
+use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Side, memory};
+use fearless_simd::Level;
+
+use super::{
+    Band, CostSource, Sweep, Windows, band_bytes,
+    pass::gaps,
+    refine::Coarser,
+    seams::{self, Prepared},
+    windows,
+};
+use crate::layout::Layout;
+
+/// What is kept of swept grids.
+#[derive(Default)]
+pub(crate) struct Swept {
+    windows: Windows,
+    seams: Vec<Prepared>,
+    /// The bands of grids of even index from 2 on and of odd index: only a grid and the next coarser one are needed at the
+    /// same time.
+    bands: [Vec<Band>; 2],
+    /// The labels of grids 0, 1 and 2, where they are decided.
+    labels: [Vec<u16>; 3],
+}
+
+/// A grid that is swept.
+pub(crate) struct Grid<'a> {
+    pub(crate) level: Level,
+    pub(crate) plan: &'a Plan,
+    pub(crate) index: usize,
+    pub(crate) layouts: &'a [Layout],
+    pub(crate) costs: CostSource<'a>,
+}
+
+/// The patches of a row of a grid, and the most entries that they may have.
+fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
+    let patches = Patch::all(plan.size(grid).width, 0..1).len();
+    [patches, patches.saturating_mul(plan.model().labels())]
+}
+
+/// The grids whose bands are the largest of those of even and of odd index that keep any, under `sweep`.
+fn kept(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
+    let swept = plan.settings().schedule == Schedule::Sweep;
+    let grids = plan.grids();
+    [1, 2].into_iter().filter(move |&grid| swept && grid < grids)
+}
+
+/// The rows of the bands of a grid.
+fn band_rows(plan: &Plan, grid: usize) -> impl Iterator<Item = usize> + use<> {
+    let height = plan.size(grid).height;
+    (0..height).step_by(BAND_ROWS).map(move |first| BAND_ROWS.min(height - first))
+}
+
+/// The number of labels of a grid that are decided and kept.
+fn decided(plan: &Plan, grid: usize) -> usize {
+    let swept = plan.settings().schedule == Schedule::Sweep;
+    if swept && grid < plan.grids() && plan.decides_labels(grid) { plan.size(grid).pixels() } else { 0 }
+}
+
+/// The most bytes that [`Swept`] will hold.
+pub(crate) fn bytes(plan: &Plan) -> u64 {
+    let [patches, entries] = most_entries(plan, 0);
+    let bands = kept(plan).flat_map(|grid| {
+        let [patches, entries] = most_entries(plan, grid);
+        band_rows(plan, grid).map(move |rows| band_bytes(rows, patches, entries))
+    });
+    let labels = (0..3).map(|grid| (decided(plan, grid) * size_of::<u16>()) as u64);
+    let windows = windows::bytes(plan, patches, entries);
+    let seams = seams::bytes(plan, patches, entries);
+    bands.chain(labels).chain([windows, seams]).fold(0, u64::saturating_add)
+}
+
+impl Swept {
+    /// Allocates everything, except for what label sets make shorter.
+    pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
+        let labels = |grid| memory::filled("labels", decided(plan, grid), 0);
+        let mut bands = [Vec::new(), Vec::new()];
+        for grid in kept(plan) {
+            let [patches, entries] = most_entries(plan, grid);
+            let restricted = plan.has_label_sets(grid);
+            let band = |rows| if restricted { Ok(Band::default()) } else { Band::new(rows, patches, entries) };
+            bands[grid % 2] = band_rows(plan, grid).map(band).collect::<Result<_, _>>()?;
+        }
+        let mut windows = Windows::new(plan);
+        let mut seams = seams::prepared(plan)?;
+        // With label sets, grid 2 is the first that needs room for all labels.
+        let [patches, entries] = most_entries(plan, if plan.has_label_sets(0) { 2 } else { 0 });
+        windows.fit(plan, patches, entries)?;
+        seams.iter_mut().try_for_each(|seam| seam.fit(patches, entries))?;
+        Ok(Self { windows, seams, bands, labels: [labels(0)?, labels(1)?, labels(2)?] })
+    }
+
+    /// Runs all loops on a grid. Keeps the messages of grids from 1 on, and decides labels where they are needed.
+    pub(crate) fn run(&mut self, grid: &Grid<'_>) -> Result<(), Error> {
+        let mut seams = std::mem::take(&mut self.seams);
+        let mut bands = if grid.index > 0 { std::mem::take(&mut self.bands[grid.index % 2]) } else { Vec::new() };
+        let mut labels = self.labels.get_mut(grid.index).map(std::mem::take).unwrap_or_default();
+        let sweep = self.sweep(grid);
+        let result = sweep.prepare(&mut seams).and_then(|()| match grid.index {
+            0 => sweep.decode(&seams, &mut labels),
+            _ => sweep.keep(&seams, &mut bands, &mut labels),
+        });
+        self.seams = seams;
+        if grid.index > 0 {
+            self.bands[grid.index % 2] = bands;
+        }
+        if let Some(kept) = self.labels.get_mut(grid.index) {
+            *kept = labels;
+        }
+        result
+    }
+
+    fn sweep<'a>(&'a self, grid: &'a Grid<'a>) -> Sweep<'a> {
+        let Grid { level, plan, index, layouts, costs } = grid;
+        let smoothness = plan.model().smoothness();
+        let coarser = layouts.get(index + 1);
+        let cut = plan.settings().cut.map(|cut| cut.x);
+        Sweep {
+            level: *level,
+            plan,
+            grid: *index,
+            layout: &layouts[*index],
+            costs,
+            coarser: coarser.map(|layout| Coarser { layout, bands: &self.bands[(index + 1) % 2], smoothness }),
+            coarser_labels: self.labels.get(index + 1).map_or(&[], Vec::as_slice),
+            windows: &self.windows,
+            gaps: gaps(plan.size(*index).width, cut),
+        }
+    }
+
+    /// Memory for each thread.
+    pub(crate) fn windows(&self) -> &Windows {
+        &self.windows
+    }
+
+    /// The labels of the image.
+    pub(crate) fn labels(&self) -> &[u16] {
+        &self.labels[0]
+    }
+
+    /// Sweeps grid 0 again and copies the messages received from `side`, `[height][width][labels]`.
+    pub(crate) fn read_messages(&self, grid: &Grid<'_>, side: Side, messages: &mut [u8]) -> Result<(), Error> {
+        self.sweep(grid).read_messages(&self.seams, side, messages)
+    }
+
+    /// The bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bands: u64 = self.bands.iter().flatten().map(Band::bytes).sum();
+        let seams: u64 = self.seams.iter().map(Prepared::bytes).sum();
+        self.windows.bytes() + bands + seams + self.labels.iter().map(memory::bytes).sum::<u64>()
+    }
+}

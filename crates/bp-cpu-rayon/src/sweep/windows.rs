@@ -1,0 +1,108 @@
+//! Memory for the rows that threads pass at the same time.
+
+use std::sync::{Mutex, PoisonError};
+
+use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
+
+use super::{
+    block::Block,
+    lists::{self, Lists},
+    messages::{self, Messages},
+    pass::{self, Crossings},
+    refine::{self, CoarseRows},
+};
+
+/// The memory in which one thread passes messages.
+#[derive(Default)]
+pub(crate) struct Window {
+    /// The labels and messages of rows that keep none of their own.
+    pub(crate) lists: Lists,
+    pub(crate) messages: Messages,
+    pub(crate) work: Work,
+}
+
+/// What a pass needs besides labels and messages.
+#[derive(Default)]
+pub(crate) struct Work {
+    /// Data costs, `[row][plane][entry]`.
+    pub(crate) costs: Vec<Block>,
+    pub(crate) coarse_rows: CoarseRows,
+    pub(crate) crossings: Crossings,
+}
+
+/// The costs of so many rows, for each entry. Coarsening needs those of two patches, with both planes.
+fn costs(rows: usize) -> usize {
+    2 * rows.max(2)
+}
+
+impl Work {
+    /// Makes room for so many rows with so many entries each.
+    pub(crate) fn fit(&mut self, rows: usize, entries: usize) -> Result<(), Error> {
+        memory::grow("data cost", &mut self.costs, costs(rows).saturating_mul(entries), Block::ZERO)?;
+        self.coarse_rows.fit(entries)?;
+        self.crossings.fit(entries)
+    }
+
+    fn bytes(&self) -> u64 {
+        memory::bytes(&self.costs) + self.coarse_rows.bytes() + self.crossings.bytes()
+    }
+}
+
+/// A window for every thread that may sweep at the same time.
+#[derive(Default)]
+pub(crate) struct Windows {
+    windows: Vec<Mutex<Window>>,
+}
+
+/// The number of windows: one for each thread of the pool, but no more than there are bands, and none under other
+/// schedules.
+fn windows(plan: &Plan) -> usize {
+    let bands = plan.image_size().height.div_ceil(BAND_ROWS);
+    if plan.settings().schedule == Schedule::Sweep { rayon::current_num_threads().min(bands) } else { 0 }
+}
+
+/// The bytes that [`Windows`] with so many patches and entries hold.
+pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
+    let rows = BAND_ROWS.min(plan.image_size().height);
+    let costs = ((costs(rows) * size_of::<Block>()) as u64).saturating_mul(entries as u64);
+    let work = costs + refine::bytes(entries) + pass::crossing_bytes(entries);
+    let window = work.saturating_add(messages::bytes(rows, entries)).saturating_add(lists::bytes(patches, entries));
+    (windows(plan) as u64).saturating_mul(window)
+}
+
+impl Windows {
+    /// Makes windows for the threads of the current pool.
+    pub(crate) fn new(plan: &Plan) -> Self {
+        Self { windows: (0..windows(plan)).map(|_| Mutex::default()).collect() }
+    }
+
+    /// Makes room in all windows for rows with so many patches and entries.
+    pub(crate) fn fit(&mut self, plan: &Plan, patches: usize, entries: usize) -> Result<(), Error> {
+        let rows = BAND_ROWS.min(plan.image_size().height);
+        self.windows.iter_mut().try_for_each(|window| {
+            let window = window.get_mut().unwrap_or_else(PoisonError::into_inner);
+            window.lists.reserve(patches, entries)?;
+            window.messages.fit(rows, entries)?;
+            window.work.fit(rows, entries)
+        })
+    }
+
+    /// Calls `work` with a free window. A thread waits only if more threads than windows need one at the same time.
+    pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
+        let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();
+        let (before, after) = self.windows.split_at(own);
+        let free = after.iter().chain(before).find_map(|window| window.try_lock().ok());
+        // A window holds nothing that outlives its rows, so a panic in others does no harm.
+        let mut window = free.unwrap_or_else(|| self.windows[own].lock().unwrap_or_else(PoisonError::into_inner));
+        work(&mut window)
+    }
+
+    /// The bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bytes = |window: &Mutex<Window>| {
+            let Window { lists, messages, work } = &*window.lock().unwrap_or_else(PoisonError::into_inner);
+            lists.bytes() + messages.bytes() + work.bytes()
+        };
+        self.windows.iter().map(bytes).sum()
+    }
+}
