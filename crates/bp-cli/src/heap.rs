@@ -3,7 +3,7 @@
 /// Buffers of at least this many bytes go back to the system as soon as they are freed. Mapping their pages anew costs
 /// little compared with the work on them. Smaller buffers are too small to matter.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-const LARGE: i32 = 4 << 20;
+const LARGE: i32 = 64 << 10;
 
 /// Makes freed memory go back to the system. By default, glibc keeps buffers of up to 32 MiB once it has seen one
 /// freed, so the program would exceed its memory limit. It also reserves 64 MiB of addresses for every thread, which count

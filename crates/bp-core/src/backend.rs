@@ -117,7 +117,8 @@ pub trait Device: Send + Sync {
     }
 }
 
-/// The five kernels, and the buffers of one plan. It allocates nothing after [`Device::prepare`].
+/// The five kernels, and the buffers of one plan. It allocates nothing after [`Device::prepare`], except that
+/// with label sets it may allocate what they need when they are known.
 ///
 /// A kernel may only enqueue its work, in the order of the calls; [`Solver::select_labels`] then waits for all of it.
 /// Such a device reports the actual time of each stage through [`Solver::device_times`].
@@ -185,6 +186,11 @@ pub trait Solver: Send {
     /// The minimum number of bytes that each stage has read and written since the last [`Solver::match_cost`], in the
     /// order of [`Stage::ALL`]. Each value counts once per step. `None` if the device does not count.
     fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
+        None
+    }
+
+    /// The message entries that the last solve computed, if label sets made them fewer than [`Plan::message_updates`].
+    fn message_updates(&self) -> Option<u64> {
         None
     }
 

@@ -85,6 +85,13 @@ impl Driver {
         self.solver.compile_time()
     }
 
+    /// The message entries that the last solve computed. Fewer than [`Plan::message_updates`] where the device makes use of
+    /// label sets.
+    #[must_use]
+    pub fn message_updates(&self) -> u64 {
+        self.solver.message_updates().unwrap_or_else(|| self.plan.message_updates())
+    }
+
     /// The minimum number of bytes that each stage of the last solve read and wrote, in the order of [`Stage::ALL`], if
     /// the device counts them; see [`Solver::moved_bytes`].
     #[must_use]

@@ -53,6 +53,10 @@ pub struct LabelSet {
 }
 
 impl LabelSet {
+    /// The fewest labels for which [`Algorithm::Sweep`](crate::Algorithm::Sweep) uses label sets unless told otherwise. With
+    /// fewer, they save little time.
+    pub const WORTHWHILE: usize = 32;
+
     /// How far a label may lie from a coarser label.
     const REACH: usize = 2;
 

@@ -1,8 +1,7 @@
 //! The plan: what runs, and how much work and memory it needs. All of this is known in advance.
 
 mod traffic;
-
-use std::ops::Range;
+mod updates;
 
 use crate::{Error, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
 
@@ -121,66 +120,6 @@ impl Plan {
             vertical + if cut.y > 0 { width } else { 0 }
         });
         all - cut
-    }
-
-    /// The message entries that one step on a grid computes. A loop computes every directed message, a half-step half of
-    /// them, and a loop of [`Schedule::Sweep`] all but those across a seam.
-    ///
-    /// # Panics
-    /// If there is no such grid.
-    #[must_use]
-    pub fn updates_per_step(&self, grid: usize) -> u64 {
-        let edges = self.edges(grid);
-        let messages = match self.settings.schedule {
-            Schedule::Sync => 2 * edges,
-            Schedule::Checkerboard => edges,
-            Schedule::Sweep => {
-                let seams = Seam::all(self.sizes[grid].height);
-                2 * (edges - seams.map(|seam| self.edges_above(grid, seam.below)).sum::<u64>())
-            }
-        };
-        messages.saturating_mul(self.model.labels() as u64)
-    }
-
-    /// The message entries that are computed before the first step on a grid: those that prepare the seams of
-    /// [`Schedule::Sweep`], see [`Seam`].
-    ///
-    /// # Panics
-    /// If there is no such grid.
-    #[must_use]
-    pub fn seam_updates(&self, grid: usize) -> u64 {
-        if self.settings.schedule != Schedule::Sweep {
-            return 0;
-        }
-        let cut = u64::from(self.settings.cut.is_some_and(|cut| cut.x > 0));
-        let beside = self.sizes[grid].width as u64 - 1 - cut;
-        let up = |rows: Range<usize>| rows.map(|y| self.edges_above(grid, y)).sum::<u64>();
-        let prepare = |seam: Seam| {
-            let back =
-                if self.decides_labels(grid) { seam.label_rows().start } else { seam.below }..seam.rows_below().end;
-            let rows = (seam.rows().len() + back.len()) as u64;
-            rows * beside + up(seam.rows().start + 1..seam.rows().end) + up(back)
-        };
-        let messages = Seam::all(self.sizes[grid].height).map(prepare).sum::<u64>();
-        messages.saturating_mul(self.model.labels() as u64)
-    }
-
-    /// The number of edges between row `y` and the row above that exchange messages.
-    fn edges_above(&self, grid: usize, y: usize) -> u64 {
-        let joined = self.neighbour(grid, Node { x: 0, y }, Side::Up).is_some();
-        if joined { self.sizes[grid].width as u64 } else { 0 }
-    }
-
-    /// The message entries that the whole plan computes.
-    #[must_use]
-    pub fn message_updates(&self) -> u64 {
-        (0..self.grids()).map(|grid| self.grid_updates(grid)).fold(0, u64::saturating_add)
-    }
-
-    /// The message entries that are computed on a grid.
-    pub(crate) fn grid_updates(&self, grid: usize) -> u64 {
-        let steps = self.updates_per_step(grid).saturating_mul(self.settings.steps.into());
-        steps.saturating_add(self.seam_updates(grid))
     }
 
     /// The value at which stored data costs of a grid are clipped: [`Model::clip`], which never changes a result, or the

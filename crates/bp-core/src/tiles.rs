@@ -19,6 +19,7 @@ pub struct Tiled {
     /// The labels of all tiles; empty if there is only one.
     labels: Vec<u16>,
     most_bytes: u64,
+    updates: u64,
 }
 
 impl Tiled {
@@ -30,7 +31,7 @@ impl Tiled {
     pub fn new(device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
         let pixels = if tiling.is_whole() { 0 } else { tiling.plan().image_size().pixels() };
         let labels = memory::filled("labels", pixels, 0)?;
-        let mut tiled = Self { tiling, driver: None, labels, most_bytes: 0 };
+        let mut tiled = Self { tiling, driver: None, labels, most_bytes: 0, updates: 0 };
         if let Some(tile) = tiled.tiling.tiles().first() {
             tiled.driver = Some(tiled.prepared(device, tile)?);
         }
@@ -47,6 +48,12 @@ impl Tiled {
     #[must_use]
     pub fn plan(&self) -> &Plan {
         self.tiling.plan()
+    }
+
+    /// The message entries that the last solve computed; see [`Driver::message_updates`].
+    #[must_use]
+    pub fn message_updates(&self) -> u64 {
+        self.updates
     }
 
     /// The peak number of bytes allocated so far: for a tile, and for the labels of all tiles.
@@ -71,12 +78,16 @@ impl Tiled {
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
         let start = Instant::now();
+        self.updates = 0;
         let (mut times, mut done, total) = (Times::default(), 0, self.tiling.message_updates());
         for tile in self.tiling.tiles() {
             let mut driver = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
             let solved = self.solve_tile(&mut driver, pair, &tile, observe);
             done += driver.plan().message_updates();
+            // With label sets, a solve may allocate.
+            self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
+            self.updates += driver.message_updates();
             self.driver = Some(driver);
             times += solved?;
         }
@@ -96,7 +107,10 @@ impl Tiled {
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         match self.driver.as_mut().filter(|_| self.tiling.is_whole()) {
-            Some(driver) => driver.solve_warm_observed(pair, observer),
+            Some(driver) => {
+                self.updates = driver.plan().grid_updates(0);
+                driver.solve_warm_observed(pair, observer)
+            }
             None => self.solve_observed(device, pair, observer),
         }
     }

@@ -218,6 +218,10 @@ impl Solver for RayonSolver {
         Some([match_cost, coarsen, 0, update_messages - self.plan.updates_per_step(0), select_labels])
     }
 
+    fn message_updates(&self) -> Option<u64> {
+        self.plan.has_label_sets(0).then(|| self.swept.updates())
+    }
+
     fn allocated_bytes(&self) -> u64 {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();

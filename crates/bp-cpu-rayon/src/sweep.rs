@@ -18,9 +18,12 @@ mod send;
 mod swept;
 mod windows;
 
-use std::ops::Range;
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
-use bp_core::{BAND_ROWS, Error, Plan, Seam, Side};
+use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
@@ -76,6 +79,8 @@ pub(crate) struct Sweep<'a> {
     coarser_labels: &'a [u16],
     windows: &'a Windows,
     gaps: [Gap; 4],
+    /// The message entries computed so far.
+    updates: &'a AtomicU64,
 }
 
 impl Sweep<'_> {
@@ -92,6 +97,9 @@ impl Sweep<'_> {
     fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
         let Window { messages, work, .. } = window;
         self.fill(seam.rows(), &mut prepared.lists, messages, work)?;
+        self.count(&prepared.lists, seam.rows(), |patch, labels| {
+            self.plan.seam_patch_messages(self.grid, seam, patch) * labels
+        });
         let entries = prepared.lists.entries();
         prepared.fit_messages(entries)?;
         let [down, up] = &mut prepared.messages;
@@ -122,6 +130,13 @@ impl Sweep<'_> {
         work.fit(rows.len(), lists.entries())?;
         work.crossings.find(lists);
         Ok(())
+    }
+
+    /// Counts the message entries of rows.
+    fn count(&self, lists: &Lists, rows: Range<usize>, updates: impl Fn(&Patch, u64) -> u64) {
+        let patches = Patch::all(self.layout.size.width, rows).enumerate();
+        let sum = patches.map(|(index, patch)| updates(&patch, lists.range(index).len() as u64)).sum();
+        self.updates.fetch_add(sum, Ordering::Relaxed);
     }
 
     /// Sweeps all bands and keeps their messages. Decides their labels, if `labels` has room for any.
@@ -187,6 +202,7 @@ impl Sweep<'_> {
         let (first, height) = (index * BAND_ROWS, self.layout.size.height);
         let rows = first..height.min(first + BAND_ROWS);
         self.fill(rows.clone(), lists, messages, work)?;
+        self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
         let mut pass = Pass { sweep: self, rows: rows.clone(), lists, messages, work };
         let above = index.checked_sub(1).map(|seam| &seams[seam]);
         match above {

@@ -1,6 +1,6 @@
 //! The algorithms and their options.
 
-use bp_core::{Cut, MessageStart, Schedule, Settings, Size};
+use bp_core::{Cut, LabelSet, MessageStart, Schedule, Settings, Size};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -20,6 +20,10 @@ pub enum Algorithm {
         /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
         #[serde(default = "yes")]
         coarse_clip: bool,
+        /// Whether the two finest grids try only the labels that the coarser ones make likely; see
+        /// [`Settings::label_sets`]. `None` means from 32 labels on.
+        #[serde(default)]
+        label_sets: Option<bool>,
     },
     /// Plain belief propagation on one grid.
     Bp {
@@ -110,11 +114,14 @@ pub struct Hierarchy {
     pub message_start: MessageStart,
     /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
     pub coarse_clip: bool,
+    /// Whether the two finest grids try only the labels that the coarser ones make likely; see [`Settings::label_sets`].
+    /// Needs [`Schedule::Sweep`].
+    pub label_sets: bool,
 }
 
 impl Default for Hierarchy {
     fn default() -> Self {
-        Self { grids: None, message_start: MessageStart::Receiver, coarse_clip: false }
+        Self { grids: None, message_start: MessageStart::Receiver, coarse_clip: false, label_sets: false }
     }
 }
 
@@ -141,7 +148,7 @@ fn yes() -> bool {
 /// [`Algorithm::Sweep`] with its default options.
 impl Default for Algorithm {
     fn default() -> Self {
-        Self::Sweep { grids: None, loops: 1, coarse_clip: true }
+        Self::Sweep { grids: None, loops: 1, coarse_clip: true, label_sets: None }
     }
 }
 
@@ -170,6 +177,9 @@ impl Algorithm {
         if self.hierarchy().is_some_and(|hierarchy| hierarchy.grids.is_some()) && is_total {
             return Err(Error::Options("`grids` needs `loops` that count on each grid".to_owned()));
         }
+        if self.hierarchy().is_some_and(|hierarchy| hierarchy.label_sets) && !self.is_swept() {
+            return Err(Error::Options("`label_sets` needs the schedule `sweep`".to_owned()));
+        }
         if self.z().is_some() && !is_total {
             return Err(Error::Options("`z` divides loops in all, not those on each grid".to_owned()));
         }
@@ -178,7 +188,7 @@ impl Algorithm {
 
     /// The settings of a plan for images of this size and this number of labels.
     pub(crate) fn settings(&self, size: Size, labels: usize) -> Settings {
-        let Some(passing) = self.loops() else { return self.swept(size) };
+        let Some(passing) = self.loops() else { return self.swept(size, labels) };
         let (k, schedule) = (passing.k(labels), passing.schedule());
         let own = self.kind().settings(size, k, self.z().unwrap_or(Z), schedule);
         let hierarchy = self.hierarchy().unwrap_or_default();
@@ -187,16 +197,18 @@ impl Algorithm {
             steps: passing.steps().unwrap_or(own.steps),
             message_start: hierarchy.message_start,
             coarse_clip: hierarchy.coarse_clip,
+            label_sets: hierarchy.label_sets,
             cut: own.cut.map(|cut| Cut { seed_start: self.seed_start(), ..cut }),
             ..own
         }
     }
 
-    fn swept(&self, size: Size) -> Settings {
+    fn swept(&self, size: Size, labels: usize) -> Settings {
         let own = bp_core::Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
         match *self {
-            Self::Sweep { grids, loops, coarse_clip } => {
-                Settings { grids: grids.unwrap_or(own.grids), steps: loops, coarse_clip, ..own }
+            Self::Sweep { grids, loops, coarse_clip, label_sets } => {
+                let label_sets = label_sets.unwrap_or(labels >= LabelSet::WORTHWHILE);
+                Settings { grids: grids.unwrap_or(own.grids), steps: loops, coarse_clip, label_sets, ..own }
             }
             _ => own,
         }

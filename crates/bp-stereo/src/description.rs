@@ -39,14 +39,17 @@ pub struct Settings {
     /// Whether the data costs of grids from 1 on are clipped at K + K div 2. Records from before the option lack it.
     #[serde(default)]
     pub coarse_clip: bool,
+    /// Whether grids 1 and 0 try only the labels that the coarser ones make likely. Records from before the option lack it.
+    #[serde(default)]
+    pub label_sets: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
     /// The operations on the map after matching, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finish: Option<Finish>,
-    /// Predicted number of message entries to compute.
+    /// Predicted number of message entries to compute. With label sets, the most that there may be.
     pub message_updates: u64,
-    /// Predicted bytes on the device, or in general if no device is given.
+    /// Predicted bytes on the device, or in general if no device is given. With label sets, the most that there may be.
     pub planned_bytes: u64,
 }
 
@@ -230,6 +233,7 @@ impl Settings {
             schedule: settings.schedule.name().to_owned(),
             message_start: settings.message_start.name().to_owned(),
             coarse_clip: settings.coarse_clip,
+            label_sets: settings.label_sets,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
             finish: None,
             message_updates: plan.message_updates(),

@@ -67,6 +67,8 @@ pub struct Disparity {
     pub settings: description::Settings,
     /// The tiles; `None` if the pair was matched as a whole.
     pub tiles: Option<Tiles>,
+    /// The message entries that were computed for one image. With label sets, fewer than [`Self::settings`] predict.
+    pub message_updates: u64,
     /// Bytes that the device allocated for the plan.
     pub allocated_bytes: u64,
     /// Predicted peak memory of the program, in bytes.
@@ -179,6 +181,7 @@ impl Matcher {
             energy,
             settings: plan::described(options, ready.tiled.tiling(), opened)?,
             tiles: Tiles::of(ready.tiled.tiling()),
+            message_updates: ready.tiled.message_updates(),
             allocated_bytes: ready.tiled.allocated_bytes(),
             peak_bytes: ready.peak_bytes,
             warnings,

@@ -179,6 +179,7 @@ impl PlanArgs {
                 grids: self.grids.map(u32::from),
                 loops: self.loops.unwrap_or(1),
                 coarse_clip: self.coarse_clip.unwrap_or(true),
+                label_sets: self.label_sets,
             },
             Kind::Bp => Algorithm::Bp { loops },
             Kind::Cfbp => Algorithm::Cfbp { loops, hierarchy },
@@ -203,6 +204,7 @@ impl PlanArgs {
             grids: self.grids.map(u32::from),
             message_start: self.message_start.unwrap_or(MessageStart::Receiver),
             coarse_clip: self.coarse_clip.unwrap_or(false),
+            label_sets: self.label_sets.unwrap_or(false),
         }
     }
 
@@ -233,6 +235,10 @@ impl PlanArgs {
         };
         let (coarse_to_fine, is_swept) = (kind.is_coarse_to_fine(), kind == Kind::Sweep);
         needs(self.grids.is_some(), coarse_to_fine, "--grids", "--algorithm cfbp, cfcsbp or sweep")?;
+        needs(self.label_sets.is_some(), coarse_to_fine, "--label-sets", "--algorithm cfbp, cfcsbp or sweep")?;
+        if self.label_sets == Some(true) && !is_swept && self.schedule != Some(Schedule::Sweep) {
+            return Err(Failure::usage("--label-sets on needs --schedule sweep"));
+        }
         needs(self.coarse_clip.is_some(), coarse_to_fine, "--coarse-clip", "--algorithm cfbp, cfcsbp or sweep")?;
         let has_start = coarse_to_fine && !is_swept;
         needs(self.message_start.is_some(), has_start, "--message-start", "--algorithm cfbp or cfcsbp")?;

@@ -26,6 +26,8 @@ pub(super) struct Report {
     settings: Settings,
     /// `None` if the pair was matched as a whole.
     tiles: Option<Tiles>,
+    /// The message entries that were computed for one image. The settings hold the prediction.
+    message_updates: u64,
     allocated_bytes: u64,
     /// Predicted peak memory of the program.
     peak_bytes: u64,
@@ -71,6 +73,7 @@ impl Report {
             device: matcher.device().into(),
             settings: answer.settings,
             tiles: answer.tiles,
+            message_updates: answer.message_updates,
             allocated_bytes: answer.allocated_bytes,
             peak_bytes: answer.peak_bytes,
             samples_ms: times.iter().map(total_ms).collect(),

@@ -1,5 +1,7 @@
 //! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Side, memory};
 use fearless_simd::Level;
 
@@ -22,6 +24,8 @@ pub(crate) struct Swept {
     bands: [Vec<Band>; 2],
     /// The labels of grids 0, 1 and 2, where they are decided.
     labels: [Vec<u16>; 3],
+    /// The message entries computed so far in a solve.
+    updates: AtomicU64,
 }
 
 /// A grid that is swept.
@@ -88,11 +92,14 @@ impl Swept {
         let [patches, entries] = most_entries(plan, if plan.has_label_sets(0) { 2 } else { 0 });
         windows.fit(plan, patches, entries)?;
         seams.iter_mut().try_for_each(|seam| seam.fit(patches, entries))?;
-        Ok(Self { windows, seams, bands, labels: [labels(0)?, labels(1)?, labels(2)?] })
+        Ok(Self { windows, seams, bands, labels: [labels(0)?, labels(1)?, labels(2)?], updates: AtomicU64::new(0) })
     }
 
     /// Runs all loops on a grid. Keeps the messages of grids from 1 on, and decides labels where they are needed.
     pub(crate) fn run(&mut self, grid: &Grid<'_>) -> Result<(), Error> {
+        if grid.index + 1 == grid.plan.grids() {
+            self.updates.store(0, Ordering::Relaxed);
+        }
         let mut seams = std::mem::take(&mut self.seams);
         let mut bands = if grid.index > 0 { std::mem::take(&mut self.bands[grid.index % 2]) } else { Vec::new() };
         let mut labels = self.labels.get_mut(grid.index).map(std::mem::take).unwrap_or_default();
@@ -126,7 +133,13 @@ impl Swept {
             coarser_labels: self.labels.get(index + 1).map_or(&[], Vec::as_slice),
             windows: &self.windows,
             gaps: gaps(plan.size(*index).width, cut),
+            updates: &self.updates,
         }
+    }
+
+    /// The message entries that the last solve computed.
+    pub(crate) fn updates(&self) -> u64 {
+        self.updates.load(Ordering::Relaxed)
     }
 
     /// Memory for each thread.

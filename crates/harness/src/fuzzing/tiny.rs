@@ -166,7 +166,7 @@ fn settings(from: &mut Unstructured<'_>, size: Size) -> arbitrary::Result<Settin
         message_start: *from.choose(&MessageStart::ALL)?,
         cut: is_cut.then_some(cut),
         coarse_clip: from.arbitrary()?,
-        label_sets: false,
+        label_sets: from.arbitrary()?,
     })
 }
 

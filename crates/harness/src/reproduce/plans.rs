@@ -1,6 +1,6 @@
 //! The plans that run on every scene.
 
-use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
+use bp_core::{Algorithm, Error, LabelSet, Model, Plan, Profile, Schedule, Settings, Size};
 
 /// The default of Z'' and Z''''. The digit is missing in the thesis; this is the most likely one.
 const Z: u32 = 2;
@@ -18,10 +18,13 @@ pub struct Planned {
     schedule: Schedule,
     /// Number of grids and of steps on each, instead of the algorithm's own.
     fixed: Option<(u32, u32)>,
+    /// Whether it uses label sets, from [`LabelSet::WORTHWHILE`] labels on.
+    label_sets: bool,
 }
 
-/// The thesis's five algorithms, CTCSBP also with other digits, which fit its times better; and three plans of ours.
-/// Ours use the census transform as data cost on few grids, with few iterations, many half-steps or one sweep per grid.
+/// The thesis's five algorithms, CTCSBP also with other digits, which fit its times better; and four plans of ours.
+/// Ours use the census transform as data cost on few grids, with few iterations, many half-steps or one sweep per grid, with
+/// label sets and without.
 pub fn all() -> Vec<Planned> {
     let thesis = |name, algorithm: Algorithm, z: u32| Planned {
         name,
@@ -30,6 +33,7 @@ pub fn all() -> Vec<Planned> {
         z: algorithm.divides_loops().then_some(z),
         schedule: Schedule::Sync,
         fixed: None,
+        label_sets: false,
     };
     let mut plans: Vec<_> = Algorithm::THESIS.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
     plans.push(thesis("ctcsbp-z3", Algorithm::Ctcsbp, 3));
@@ -38,7 +42,9 @@ pub fn all() -> Vec<Planned> {
     plans.push(Planned { fixed: Some((5, 2)), ..census(CENSUS, Algorithm::Cfbp) });
     let half_steps = Planned { schedule: Schedule::Checkerboard, ..census("hierarchy", Algorithm::Cfbp) };
     plans.push(Planned { fixed: Some((5, 10)), ..half_steps });
-    plans.push(Planned { schedule: Schedule::Sweep, fixed: Some((5, 1)), ..census("sweep", Algorithm::Sweep) });
+    let sweep = |name| Planned { schedule: Schedule::Sweep, fixed: Some((5, 1)), ..census(name, Algorithm::Sweep) };
+    plans.push(Planned { label_sets: true, ..sweep("sweep") });
+    plans.push(sweep("sweep-all-labels"));
     plans
 }
 
@@ -54,6 +60,7 @@ impl Planned {
             Some((grids, steps)) => Settings { grids, steps, ..settings },
             None => settings,
         };
+        let settings = Settings { label_sets: self.label_sets && labels >= LabelSet::WORTHWHILE, ..settings };
         Plan::new(size, model, settings)
     }
 

@@ -1,6 +1,6 @@
 //! The problems to solve. They need no files and never change, so results of different machines can be compared.
 
-use bp_core::{Algorithm, Error, Image, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+use bp_core::{Algorithm, Error, Image, LabelSet, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
 
 use crate::record::speed::Family;
 
@@ -155,7 +155,9 @@ impl Problem {
             Passing::Loops(loops) => settings(loops, 1, Schedule::Sync),
             Passing::Cfcsbp(loops) => settings(loops, 2, Schedule::Sync),
             Passing::HalfSteps { grids, steps } => Settings { grids, steps, ..settings(1, 1, Schedule::Checkerboard) },
-            Passing::Sweep => settings(1, 1, Schedule::Sweep),
+            Passing::Sweep => {
+                Settings { label_sets: self.labels >= LabelSet::WORTHWHILE, ..settings(1, 1, Schedule::Sweep) }
+            }
         };
         Plan::new(size, Model::new(self.profile, self.labels)?, settings)
     }

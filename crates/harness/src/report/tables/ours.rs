@@ -25,10 +25,13 @@ const HIERARCHY: Named =
 
 const SWEEP: Named = own(9, "sweep", "sweep (ours)", "census costs, 5 grids with 1 sweep each");
 
+const SWEEP_ALL_LABELS: Named =
+    own(10, "sweep-all-labels", "sweep, all labels (ours)", "as sweep, but no grid leaves out unlikely labels");
+
 /// The thesis's plans, and our plans that were run.
 pub(in crate::report) fn all_plans(results: &Results<'_>) -> Vec<Named> {
     let run = |plan: &Named| results.record.cells.iter().any(|cell| cell.plan == plan.plan);
-    thesis_plans().into_iter().chain([CENSUS, HIERARCHY, SWEEP].into_iter().filter(run)).collect()
+    thesis_plans().into_iter().chain([CENSUS, HIERARCHY, SWEEP, SWEEP_ALL_LABELS].into_iter().filter(run)).collect()
 }
 
 /// Means over the scenes for every plan.
