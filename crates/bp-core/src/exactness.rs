@@ -35,6 +35,17 @@
 //! **Interpolated first messages.** Under [`crate::Schedule::Sweep`] they lie between coarse messages, so in 0..=K. Their
 //! least value may exceed 0, but no bound here needs it to be 0.
 //!
+//! **Label sets** ([`crate::Settings::label_sets`]) leave out labels. All of the above holds for the labels of a node's set
+//! alone: the least cost and `h_min` are those over the set, and a label d of the receiver's set gets at most
+//! `h_min + K`, whether the sender's set has it or not. The passes over a set's sorted list add `s (l' - l)`, at most 255,
+//! between the neighbours l and l'; a sum that saturates is above 4K. So a value that skips labels equals the one that the
+//! passes over all labels would carry across them. A backend that keeps all labels may give those outside the set the data
+//! cost 255, which no sum of a label in it reaches.
+//!
+//! **Messages for other labels.** A message M that its receiver holds for the labels S rises by at most s from one label to the
+//! next, times their distance: it is an envelope of slope s, or s div 2 over a weak edge, cut at a constant, or the rounded
+//! mean of such. So the least `M(e) + s |d - e|` over e in S is offered by the nearest label of S below d or above it.
+//!
 //! **Coarser grids.** A coarse node's cost is the sum of its children's. Subtracting a child's least cost first shifts
 //! the sum by a constant, which cancels; clipping a child first would not. So unclipped costs are summed, and the sums
 //! are normalised and clipped. The lower clip of [`crate::Settings::coarse_clip`] changes what is computed, not how:

@@ -160,7 +160,8 @@ pub(crate) fn store<S: Simd, T: Sum>(
     );
 }
 
-/// Calls `raw` twice for every label, because the least cost is known only after a pass over all labels.
+/// Goes over all labels twice, because the least cost is known only after the first time. The second time it calls `raw` again,
+/// unless the costs were kept.
 #[inline(always)]
 fn store_block<T: Sum>(
     shape: &Shape,
@@ -176,15 +177,19 @@ fn store_block<T: Sum>(
         for (least, cost) in least.iter_mut().zip(costs) {
             *least = cost.min(*least);
         }
+        if let Some(keep) = &mut keep {
+            keep[label * shape.lanes + at..][..BLOCK].copy_from_slice(&costs);
+        }
     }
     for label in 0..shape.labels {
-        let costs = raw(label);
         let start = label * shape.lanes + at;
+        let mut costs = [T::default(); BLOCK];
+        match &keep {
+            Some(keep) => costs.copy_from_slice(&keep[start..start + BLOCK]),
+            None => costs = raw(label),
+        }
         for ((stored, cost), least) in stored[start..start + BLOCK].iter_mut().zip(costs).zip(least) {
             *stored = (cost - least).clipped(clip);
-        }
-        if let Some(keep) = &mut keep {
-            keep[start..start + BLOCK].copy_from_slice(&costs);
         }
     }
 }

@@ -20,7 +20,6 @@ use crate::{
     features::Features,
     layout::Layout,
     shape::{BLOCK, BlockStart, Column, STRIP, Strip},
-    sweep::{self, Bytes, LANES},
 };
 
 /// The inputs of the data costs of a pair.
@@ -82,25 +81,8 @@ impl Matching<'_> {
         model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into()
     }
 
-    /// Writes the unclipped costs of a block of nodes in row y, for these labels, or adds them to what `costs` hold.
-    pub(crate) fn block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [sweep::Block], add: bool) {
-        let row = Row { matching: self, y };
-        dispatch!(self.level, simd => row.of_block(simd, at, labels, costs, add));
-    }
-
-    /// As [`Matching::fix`], for a block.
-    pub(crate) fn fix_block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [sweep::Block]) {
-        let Some(seed) = self.seed else { return };
-        for lane in 0..LANES {
-            if seed.touches(2 * (at.lane + lane) + at.plane, y) {
-                let cost = |&label: &u16| if label.abs_diff(seed.label) <= 1 { 0 } else { self.dear() };
-                labels.iter().zip(&mut *costs).for_each(|(label, block)| block.0[lane] = cost(label));
-            }
-        }
-    }
-
     /// The cost of labels far from that of a known match.
-    fn dear(&self) -> u8 {
+    pub(crate) fn dear(&self) -> u8 {
         self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8
     }
 
@@ -215,101 +197,6 @@ impl Row<'_> {
         least
     }
 
-    /// Writes the costs of a block of nodes.
-    #[inline(always)]
-    fn of_block<S: Simd>(&self, simd: S, at: BlockStart, labels: &[u16], costs: &mut [sweep::Block], add: bool) {
-        let profile = self.matching.plan.model().profile();
-        if add {
-            compare_by!(profile, Bytes<S>, self.add_block(simd, at, labels, costs));
-        } else {
-            compare_by!(profile, Bytes<S>, self.write_block(simd, at, labels, costs));
-        }
-    }
-
-    /// Writes the costs of a block of nodes, by comparing `CHANNELS` channels.
-    #[inline(always)]
-    fn write_block<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        at: BlockStart,
-        labels: &[u16],
-        costs: &mut [sweep::Block],
-        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
-    ) {
-        self.each_block(
-            simd,
-            at,
-            labels,
-            costs,
-            cost,
-            #[inline(always)]
-            |out, cost| out.store(cost),
-        );
-    }
-
-    /// Adds the costs of a block of nodes to others.
-    #[inline(always)]
-    fn add_block<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        at: BlockStart,
-        labels: &[u16],
-        costs: &mut [sweep::Block],
-        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
-    ) {
-        self.each_block(
-            simd,
-            at,
-            labels,
-            costs,
-            cost,
-            #[inline(always)]
-            |out, cost| out.store(out.load(simd) + cost),
-        );
-    }
-
-    #[inline(always)]
-    fn each_block<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        at: BlockStart,
-        labels: &[u16],
-        costs: &mut [sweep::Block],
-        cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
-        then: impl Fn(&mut sweep::Block, Bytes<S>),
-    ) {
-        let Matching { features, plan, .. } = self.matching;
-        let outside = Bytes::<S>::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let load = |lanes: &[u8], at: usize| Bytes::<S>::from_slice(simd, &lanes[at..at + LANES]);
-        let left = channels::<CHANNELS>(|channel| features.left(self.y, channel, at.plane));
-        let left = left.map(|left| load(left, at.lane));
-        let node = load(features.inside(at.plane), BLOCK + at.lane);
-        let right = [0, 1].map(|parity| {
-            let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
-            (right, features.inside(parity))
-        });
-        // As in `lanes`, with everything that does not depend on the label computed once.
-        let (first, min) = (at.lane as i32, plan.model().min_disparity());
-        let (shift, before) = (at.plane as i32 - min, BLOCK as i32);
-        let nodes = [0, 1].map(|parity| self.matching.layout.nodes(parity) as i32);
-        for (&label, out) in labels.iter().zip(costs) {
-            let shift = shift - i32::from(label);
-            let parity = (shift & 1) as usize;
-            let start = first + (shift >> 1);
-            let (right, inside) = &right[parity];
-            if start >= 0 && start + LANES as i32 <= nodes[parity] {
-                // All of them match columns of the right image.
-                let start = (start + before) as usize;
-                then(out, cost(left, right.map(|right| load(right, start))) & node);
-            } else {
-                let start = (start.clamp(-before, nodes[parity]) + before) as usize;
-                let cost = cost(left, right.map(|right| load(right, start)));
-                let inside = load(inside, start);
-                then(out, (cost & inside | outside & !inside) & node);
-            }
-        }
-    }
-
     /// The sum of the differences over the colour channels.
     #[inline(always)]
     fn sum_of_differences(&self, start: BlockStart, label: usize) -> [u16; BLOCK] {
@@ -357,7 +244,7 @@ impl Row<'_> {
 
 /// Calls `lanes` for every channel and collects the results.
 #[inline(always)]
-fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
+pub(crate) fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
     let mut all = [[].as_slice(); CHANNELS];
     all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
     all

@@ -10,6 +10,7 @@ mod block;
 mod costs;
 mod decode;
 mod lists;
+mod match_cost;
 mod messages;
 mod pass;
 mod refine;
@@ -20,14 +21,17 @@ mod windows;
 
 use std::{
     ops::Range,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-pub(crate) use block::{Block, Bytes, LANES};
+pub(crate) use block::{Block, LANES};
 pub(crate) use costs::{CostSource, normalise};
 pub(crate) use swept::{Grid, Swept, bytes};
 pub(crate) use windows::Windows;
@@ -37,7 +41,7 @@ use lists::Lists;
 use messages::{Entry, Messages};
 use pass::{Gap, Pass, Start};
 use refine::Coarser;
-use seams::Prepared;
+use seams::{Prepared, Seams};
 use windows::{Window, Work};
 
 /// A band of a grid whose messages the next finer grid starts with.
@@ -84,14 +88,20 @@ pub(crate) struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Prepares all seams.
-    fn prepare(&self, seams: &mut [Prepared]) -> Result<(), Error> {
-        let height = self.layout.size.height;
-        let seams = seams.par_iter_mut().enumerate();
-        seams.try_for_each(|(index, prepared)| match Seam::all(height).nth(index) {
-            Some(seam) => self.windows.with(|window| self.prepare_seam(seam, prepared, window)),
-            None => Ok(()),
-        })
+    /// Prepares the seams above and below a band, unless another band did. So no thread waits until all seams are prepared.
+    fn prepare_seams(&self, band: usize, seams: &[Seams]) -> Result<(), Error> {
+        let all = Seam::all(self.layout.size.height).enumerate();
+        for (index, seam) in all.skip(band.saturating_sub(1)).take_while(|(index, _)| *index <= band) {
+            if seams[index].read().unwrap_or_else(PoisonError::into_inner).grid == Some(self.grid) {
+                continue;
+            }
+            let mut prepared = seams[index].write().unwrap_or_else(PoisonError::into_inner);
+            if prepared.grid != Some(self.grid) {
+                self.windows.with(|window| self.prepare_seam(seam, &mut prepared, window))?;
+                prepared.grid = Some(self.grid);
+            }
+        }
+        Ok(())
     }
 
     fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
@@ -140,10 +150,11 @@ impl Sweep<'_> {
     }
 
     /// Sweeps all bands and keeps their messages. Decides their labels, if `labels` has room for any.
-    fn keep(&self, seams: &[Prepared], bands: &mut [Band], labels: &mut [u16]) -> Result<(), Error> {
+    fn keep(&self, seams: &[Seams], bands: &mut [Band], labels: &mut [u16]) -> Result<(), Error> {
         let band_labels = BAND_ROWS * self.layout.size.width;
         let bands = bands.par_iter_mut().take(self.layout.size.height.div_ceil(BAND_ROWS)).enumerate();
         let sweep = |index: usize, band: &mut Band, labels: Option<&mut [u16]>| {
+            self.prepare_seams(index, seams)?;
             self.windows.with(|window| {
                 let Band { lists, messages } = band;
                 self.sweep(index, seams, (lists, messages, &mut window.work), |pass, above| {
@@ -162,7 +173,7 @@ impl Sweep<'_> {
     }
 
     /// Sweeps all bands and decides their labels.
-    fn decode(&self, seams: &[Prepared], labels: &mut [u16]) -> Result<(), Error> {
+    fn decode(&self, seams: &[Seams], labels: &mut [u16]) -> Result<(), Error> {
         let bands = labels.par_chunks_mut(BAND_ROWS * self.layout.size.width);
         bands.enumerate().try_for_each(|(index, labels)| {
             self.in_window(index, seams, |pass, above| pass.decode(pass.rows.clone(), above, labels))
@@ -171,7 +182,7 @@ impl Sweep<'_> {
 
     /// Sweeps all bands again and copies the messages received from `side`, `[height][width][labels]`. Labels that the
     /// receiver's set lacks have zeros.
-    fn read_messages(&self, seams: &[Prepared], side: Side, messages: &mut [u8]) -> Result<(), Error> {
+    fn read_messages(&self, seams: &[Seams], side: Side, messages: &mut [u8]) -> Result<(), Error> {
         messages.fill(0);
         let bands = messages.par_chunks_mut(BAND_ROWS * self.layout.size.width * self.layout.labels);
         bands
@@ -182,9 +193,10 @@ impl Sweep<'_> {
     fn in_window(
         &self,
         index: usize,
-        seams: &[Prepared],
+        seams: &[Seams],
         then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
     ) -> Result<(), Error> {
+        self.prepare_seams(index, seams)?;
         self.windows.with(|window| {
             let Window { lists, messages, work } = window;
             self.sweep(index, seams, (lists, messages, work), then)
@@ -195,7 +207,7 @@ impl Sweep<'_> {
     fn sweep(
         &self,
         index: usize,
-        seams: &[Prepared],
+        seams: &[Seams],
         (lists, messages, work): (&mut Lists, &mut Messages, &mut Work),
         then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
     ) -> Result<(), Error> {
@@ -204,14 +216,15 @@ impl Sweep<'_> {
         self.fill(rows.clone(), lists, messages, work)?;
         self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
         let mut pass = Pass { sweep: self, rows: rows.clone(), lists, messages, work };
-        let above = index.checked_sub(1).map(|seam| &seams[seam]);
-        match above {
+        let seam = |index: usize| seams[index].read().unwrap_or_else(PoisonError::into_inner);
+        let above = index.checked_sub(1).map(seam);
+        match &above {
             Some(seam) => seam.carry(self.plan, 0, lists, pass.up_mut(first)),
             None => pass.up_mut(first).fill(Block::ZERO),
         }
         let mut start = Start::Refined;
-        if let Some(seam) = seams.get(index).filter(|_| rows.end < height) {
-            seam.carry(self.plan, 1, lists, pass.up_mut(rows.end));
+        if rows.end < height {
+            seam(index).carry(self.plan, 1, lists, pass.up_mut(rows.end));
             start = Start::RefinedAboveSeam;
         }
         for _ in 0..self.plan.settings().steps {
@@ -219,7 +232,7 @@ impl Sweep<'_> {
             pass.backward(rows.clone());
             start = Start::Held;
         }
-        then(&pass, above.map(|seam| seam.labels_above(self.layout.size.width)));
+        then(&pass, above.as_deref().map(|seam| seam.labels_above(self.layout.size.width)));
         Ok(())
     }
 }

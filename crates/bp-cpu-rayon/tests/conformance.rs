@@ -1,10 +1,10 @@
 //! Compares the rayon backend with the reference, on every instruction set of this CPU.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings};
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
-use bp_testkit::{Answer, Case, Difference, compare_at_random, conform, noise_pair, random_case, solve};
+use bp_testkit::{Answer, Case, Difference, compare_at_random, conform, noise_pair, random_case, solve, stepped_pair};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::LazyLock;
 
@@ -77,4 +77,25 @@ fn a_matcher_may_move_to_another_pool() {
 fn a_device_that_is_not_there_is_refused() {
     let error = Rayon.open(99).err().unwrap();
     assert!(error.to_string().contains("instruction sets"), "{error}");
+}
+
+/// On surfaces far apart, label sets leave out most labels, and with them most of the work and memory.
+#[test]
+fn label_sets_save_work_and_memory() {
+    let pair = stepped_pair(400, 200, 100);
+    let model = Model::new(Profile::Census, 100).unwrap();
+    let ours = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+    let device = Rayon.open(0).unwrap();
+    let solved = |label_sets| {
+        let plan = Plan::new(pair.size(), model, Settings { label_sets, ..ours }).unwrap();
+        POOLS[1].install(|| {
+            let mut driver = Driver::new(device.as_ref(), plan.clone()).unwrap();
+            driver.solve(&pair).unwrap();
+            assert!(driver.allocated_bytes() <= device.planned_bytes(&plan) + 2 * plan.image_size().pixels() as u64);
+            (driver.message_updates(), driver.allocated_bytes(), plan.message_updates())
+        })
+    };
+    let ((all, bytes, planned), (left, fewer_bytes, most)) = (solved(false), solved(true));
+    assert_eq!(all, planned);
+    assert!(left < most / 2 && fewer_bytes < bytes * 2 / 3, "{left} of {most}, {fewer_bytes} of {bytes} bytes");
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bp_core::{Algorithm, Backend, Driver, Image, Model, Plan, Profile, Schedule, StereoPair};
+use bp_core::{Algorithm, Backend, Driver, Image, Model, Plan, Profile, Schedule, Settings, StereoPair};
 use bp_cpu_rayon::Rayon;
 use bp_testkit::{jumps, synthetic};
 
@@ -11,11 +11,11 @@ use bp_testkit::{jumps, synthetic};
 const PERIODS: [usize; 4] = [16, 32, 64, 128];
 
 /// How many times as frequent jumps are between rows at these periods as elsewhere, means over the pairs.
-fn ratios(pairs: &[(StereoPair, usize)]) -> [f64; 4] {
+fn ratios(pairs: &[(StereoPair, usize)], label_sets: bool) -> [f64; 4] {
     let device = Rayon.open(0).unwrap();
     let mut means = [0.0; 4];
     for (pair, labels) in pairs {
-        let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+        let settings = Settings { label_sets, ..Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep) };
         let plan = Plan::new(pair.size(), Model::new(Profile::Census, *labels).unwrap(), settings).unwrap();
         let mut driver = Driver::new(device.as_ref(), plan).unwrap();
         driver.solve(pair).unwrap();
@@ -29,8 +29,9 @@ fn ratios(pairs: &[(StereoPair, usize)]) -> [f64; 4] {
 #[test]
 fn synthetic_scenes_have_no_seams() {
     let pairs: Vec<_> = (0..6).map(|scene| (synthetic::scene(scene, 2).pair, 56)).collect();
-    let ratios = ratios(&pairs);
-    assert!(ratios.iter().all(|&ratio| ratio < 1.5), "{ratios:?}");
+    for ratios in [false, true].map(|label_sets| ratios(&pairs, label_sets)) {
+        assert!(ratios.iter().all(|&ratio| ratio < 1.5), "{ratios:?}");
+    }
 }
 
 /// Bands that exchanged nothing had ratios of 5.6, 8.9, 10.8 and 14.0. A sweep over the whole image as one band has 1.2, 1.0,
@@ -46,8 +47,10 @@ fn real_scenes_have_no_seams() {
     let version_3 = version_3.into_iter().chain([("Playtable", 76), ("Recycle", 68), ("Teddy", 64)]);
     let quarter = data.join("middlebury-v3-quarter");
     let version_3 = version_3.map(|(scene, labels)| pair(&quarter.join(scene), ["im0", "im1"], labels));
-    let ratios = ratios(&half.into_iter().chain(version_3).collect::<Vec<_>>());
-    assert!(ratios.iter().all(|&ratio| ratio < 1.4), "{ratios:?}");
+    let pairs: Vec<_> = half.into_iter().chain(version_3).collect();
+    for ratios in [false, true].map(|label_sets| ratios(&pairs, label_sets)) {
+        assert!(ratios.iter().all(|&ratio| ratio < 1.4), "{ratios:?}");
+    }
 }
 
 fn pair(folder: &Path, names: [&str; 2], labels: usize) -> (StereoPair, usize) {

@@ -2,7 +2,7 @@
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings};
 use bp_cpu_rayon::Rayon;
 use bp_testkit::noise_pair;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -24,7 +24,18 @@ fn matching_allocates_nothing() {
             matchers.push(pool.install(|| Driver::new(device.as_ref(), plan)).unwrap());
         }
     }
+    // With label sets, a pair that needs no more than the one before allocates nothing.
+    let model = Model::new(Profile::Census, 60).unwrap();
+    let settings = Algorithm::Sweep.settings(pairs[0].size(), 1, 1, Schedule::Sweep);
+    let plan = Plan::new(pairs[0].size(), model, Settings { label_sets: true, ..settings }).unwrap();
+    let mut restricted = pool.install(|| Driver::new(device.as_ref(), plan)).unwrap();
     pool.install(|| {
+        // Several times, because threads may exchange their windows.
+        (0..5).for_each(|_| _ = restricted.solve(&pairs[0]).unwrap());
+        let region = Region::new(ALLOCATOR);
+        restricted.solve(&pairs[0]).unwrap();
+        assert_eq!(region.change().bytes_allocated, 0);
+        assert!(restricted.allocated_bytes() < device.planned_bytes(restricted.plan()));
         // Solve once, so that the pool's own queues have grown.
         matchers.iter_mut().for_each(|driver| _ = driver.solve(&pairs[0]).unwrap());
         for driver in &mut matchers {

@@ -142,6 +142,34 @@ fn every_row_is_computed_as_often_as_it_should_be() {
     }
 }
 
+/// Sets and costs are made for the rows around seams, then for all bands. Messages get values for all labels where they cross
+/// a seam, and on grid 1 where the finer grid starts with them: those up, and those of odd nodes to the sides.
+#[test]
+fn label_sets_are_made_twice_a_grid_and_only_on_the_two_finest() {
+    let size = Size { width: 150, height: 131 };
+    let settings = Settings { label_sets: true, ..Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep) };
+    let plan = Plan::new(size, Model::new(Profile::Census, 40).unwrap(), settings).unwrap();
+    let rows = computed(&Program::new(&plan, &Limits::roomy()).unwrap());
+    for (grid, size) in (0..plan.grids()).map(|grid| (grid, plan.size(grid))) {
+        let (width, height) = (size.width as u32, size.height as u32);
+        let count = |kernel, row, colour| rows.get(&(kernel, width, row, colour)).copied().unwrap_or(0);
+        let has_sets = u32::from(grid < 2);
+        for window in 0..height.div_ceil(32) {
+            let sets = count(Kernel::LabelSets, window, 0);
+            assert_eq!(sets, has_sets * (1 + u32::from(has_seam_below(height, 32 * window))), "{grid} {window}");
+        }
+        for (row, colour) in (0..height).flat_map(|row| [(row, 0), (row, 1)]) {
+            let [above, below] = [has_seam_below(height, row) && row % 32 >= 20, row >= 32 && row % 32 < 4];
+            let restricted = has_sets * (1 + u32::from(above || below));
+            assert_eq!(count(Kernel::RestrictCosts, row, colour), restricted, "{grid} {row}");
+            let across =
+                u32::from(has_seam_below(height, row) && row % 32 == 31) + u32::from(row >= 32 && row % 32 == 0);
+            let started = if grid == 1 { 1 + 2 * colour } else { 0 };
+            assert_eq!(count(Kernel::ExtendMessages, row, colour), has_sets * across + started, "{grid} {row}");
+        }
+    }
+}
+
 #[test]
 fn what_no_device_can_run_is_refused() {
     let size = Size { width: 90, height: 70 };

@@ -280,3 +280,24 @@ impl Loops {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn label_sets_are_the_default_of_sweep_where_they_save_time() {
+        let size = Size { width: 300, height: 200 };
+        let label_sets = |label_sets, labels| {
+            Algorithm::Sweep { grids: None, loops: 1, coarse_clip: true, label_sets }.settings(size, labels).label_sets
+        };
+        assert_eq!([31, 32, 1024].map(|labels| label_sets(None, labels)), [false, true, true]);
+        assert_eq!([Some(true), Some(false)].map(|asked| label_sets(asked, 31)), [true, false]);
+        assert!(!label_sets(Some(false), 200));
+        let schedule = Schedule::Sync;
+        let hierarchy = Hierarchy { label_sets: true, ..Hierarchy::default() };
+        let cfbp = |schedule| Algorithm::Cfbp { loops: Loops::Total { k: None, schedule }, hierarchy };
+        assert!(cfbp(schedule).check().is_err() && cfbp(Schedule::Sweep).check().is_ok());
+        assert!(cfbp(Schedule::Sweep).settings(size, 50).label_sets);
+    }
+}

@@ -91,6 +91,10 @@ fn settings_change_what_they_say() {
         assert_ne!(hash(&format!("--algorithm cfbp --grids 3 --loops 1 {other}")), default, "{other}");
     }
     assert_ne!(hash("--algorithm sweep --profile mrf --coarse-clip off"), hash("--algorithm sweep --profile mrf"));
+    let sets = |options: &str| run(options)["settings"]["label_sets"].as_bool().unwrap();
+    assert!(!sets("") && sets("--label-sets on") && sets("--algorithm cfbp --schedule sweep --label-sets on"));
+    let updates = |options: &str| run(options)["message_updates"].as_u64().unwrap();
+    assert!(updates("--label-sets on") < updates("--label-sets off"));
     let seeded = "--algorithm ctbp --loops 1 --profile mrf --seed-start";
     assert_ne!(hash(&format!("{seeded} on")), hash(&format!("{seeded} off")));
 }
@@ -128,6 +132,8 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         ("--algorithm sweep --message-start receiver", ["--message-start", "sweep"]),
         ("--algorithm cfbp --schedule sweep --message-start sender", ["message start", "sweep"]),
         ("--algorithm bp --coarse-clip on", ["--coarse-clip", "cfbp"]),
+        ("--algorithm bp --label-sets off", ["--label-sets", "cfbp"]),
+        ("--algorithm cfbp --label-sets on", ["--label-sets", "--schedule sweep"]),
         ("--half-steps 3 --loops 2", ["--half-steps", "--loops"]),
         ("--truncation 64", ["--truncation", "63"]),
         ("--labels 0", ["--labels", "1024"]),

@@ -7,9 +7,10 @@ use sha2::{Digest, Sha256};
 use crate::{check, folder, json, run_in};
 
 /// Options of `bp match`.
-const PLANS: [&str; 16] = [
+const PLANS: [&str; 17] = [
     "",
     "--loops 3 --grids 4",
+    "--labels 40 --label-sets on",
     "--profile census-rgb --edge-threshold 10",
     "--profile mrf --labels 16 --min-disparity -3",
     "--profile gradient --coarse-clip off",

@@ -1,7 +1,7 @@
 //! How a plan is cut into tiles. This is decided before anything runs.
 
 use super::tile::{Margin, Span, Tile, distinct, spans};
-use crate::{Error, Plan, Schedule, Size};
+use crate::{BAND_ROWS, Error, Patch, Plan, Schedule, Size};
 
 /// Tiles begin at multiples of this many columns and rows, so that on up to five grids their nodes have the same children
 /// and the same colour as in the whole image.
@@ -50,20 +50,20 @@ impl Tiling {
         Self { plan, columns: spans(width, width, Margin::default()), rows: spans(height, height, Margin::default()) }
     }
 
-    /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32, with at least `halo` columns and rows
+    /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
     /// around them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
     /// keeps have the same costs as in the whole image; likewise on the right. Under [`Schedule::Sweep`] no halo has more
     /// than 64 rows.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
         let Size { width, height } = plan.image_size();
-        let model = plan.model();
+        let (model, align) = (plan.model(), align(&plan));
         let [left, right] = [model.disparity(model.labels() as u16 - 1), -model.min_disparity()]
-            .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(ALIGN));
+            .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(align.width));
         let swept = plan.settings().schedule == Schedule::Sweep;
-        let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(ALIGN);
-        let columns = spans(width, kept.width.next_multiple_of(ALIGN), Margin { before: left, after: right });
-        let rows = spans(height, kept.height.next_multiple_of(ALIGN), Margin { before: beyond, after: beyond });
+        let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
+        let columns = spans(width, kept.width.next_multiple_of(align.width), Margin { before: left, after: right });
+        let rows = spans(height, kept.height.next_multiple_of(align.height), Margin { before: beyond, after: beyond });
         Self { plan, columns, rows }
     }
 
@@ -165,19 +165,28 @@ impl Tiling {
     }
 }
 
+/// Tiles begin at multiples of this many columns and rows. With label sets, they begin where patches and bands of grid 1 do, so
+/// that these are those of the whole image.
+fn align(plan: &Plan) -> Size {
+    let (width, height) = if plan.has_label_sets(1) { (2 * Patch::COLUMNS, 2 * BAND_ROWS) } else { (ALIGN, ALIGN) };
+    Size { width, height }
+}
+
 /// Returns how many bytes a device needs for a plan, or why it cannot run it.
 pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
 
 /// Heights of tiles to try, the tallest first.
 fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
-    let highest = plan.image_size().height.next_multiple_of(ALIGN);
-    std::iter::successors(Some(highest), |&rows| (rows > ALIGN).then(|| rows.div_ceil(2).next_multiple_of(ALIGN)))
+    let align = align(plan).height;
+    let highest = plan.image_size().height.next_multiple_of(align);
+    std::iter::successors(Some(highest), move |&rows| (rows > align).then(|| rows.div_ceil(2).next_multiple_of(align)))
 }
 
 /// The widest tiles of a height that fit.
 fn widest(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
-    let tiles = |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * ALIGN, height }, HALO);
-    let blocks = plan.image_size().width.div_ceil(ALIGN);
+    let align = align(plan).width;
+    let tiles = |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * align, height }, HALO);
+    let blocks = plan.image_size().width.div_ceil(align);
     evenly(blocks, |blocks| fits(&tiles(blocks))).map(tiles)
 }
 

@@ -80,8 +80,9 @@ impl Matching<'_> {
         finer: &mut [Block],
     ) {
         if grid == 0 {
-            self.block(BlockStart { plane: 0, lane: LANES * patch }, y, labels, even, false);
-            self.block(BlockStart { plane: 1, lane: LANES * patch }, y, labels, odd, false);
+            for (plane, costs) in [even, odd].into_iter().enumerate() {
+                self.pixels(BlockStart { plane, lane: LANES * patch }, y, labels, costs);
+            }
             return;
         }
         let size = self.plan.size(grid - 1);
@@ -89,17 +90,13 @@ impl Matching<'_> {
             let child = 2 * patch + half;
             if 2 * LANES * child >= size.width {
                 sums.fill(Block::ZERO);
-                continue;
-            }
-            for y in 2 * y..size.height.min(2 * y + 2) {
-                let is_second = y % 2 == 1;
-                if grid == 1 {
-                    self.block(BlockStart { plane: 0, lane: LANES * child }, y, labels, sums, is_second);
-                    self.block(BlockStart { plane: 1, lane: LANES * child }, y, labels, sums, true);
-                } else {
+            } else if grid == 1 {
+                self.squares(LANES * child, 2 * y, labels, sums);
+            } else {
+                for y in 2 * y..size.height.min(2 * y + 2) {
                     let (first, second) = finer.split_at_mut(labels.len());
                     self.unclipped(1, child, y, labels, [first, second], &mut []);
-                    dispatch!(self.level, simd => sum(simd, first, second, sums, is_second));
+                    dispatch!(self.level, simd => sum(simd, first, second, sums, y % 2 == 1));
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! What was prepared for each seam of a swept grid; see [`bp_core::Seam`].
 
+use std::sync::RwLock;
+
 use bp_core::{Error, Plan, Schedule, Seam, memory};
 
 use super::{
@@ -16,7 +18,12 @@ pub(crate) struct Prepared {
     pub(crate) messages: [Vec<Block>; 2],
     /// The labels of [`Seam::label_rows`].
     pub(crate) labels: Vec<u16>,
+    /// The grid that it was prepared for, in this solve.
+    pub(crate) grid: Option<usize>,
 }
+
+/// A seam that several bands may read. The first of them prepares it.
+pub(crate) type Seams = RwLock<Prepared>;
 
 /// The number of seams.
 fn count(plan: &Plan) -> usize {
@@ -31,9 +38,9 @@ pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
 }
 
 /// Makes room for the seams of the finest grid.
-pub(crate) fn prepared(plan: &Plan) -> Result<Vec<Prepared>, Error> {
+pub(crate) fn prepared(plan: &Plan) -> Result<Vec<Seams>, Error> {
     let len = Seam::LABEL_ROWS * plan.image_size().width;
-    let seam = |_| Ok(Prepared { labels: memory::filled("labels", len, 0)?, ..Prepared::default() });
+    let seam = |_| Ok(RwLock::new(Prepared { labels: memory::filled("labels", len, 0)?, ..Prepared::default() }));
     (0..count(plan)).map(seam).collect()
 }
 

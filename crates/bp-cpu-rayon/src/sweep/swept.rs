@@ -1,6 +1,9 @@
 //! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{
+    PoisonError,
+    atomic::{AtomicU64, Ordering},
+};
 
 use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Side, memory};
 use fearless_simd::Level;
@@ -9,7 +12,7 @@ use super::{
     Band, CostSource, Sweep, Windows, band_bytes,
     pass::gaps,
     refine::Coarser,
-    seams::{self, Prepared},
+    seams::{self, Prepared, Seams},
     windows,
 };
 use crate::layout::Layout;
@@ -18,7 +21,7 @@ use crate::layout::Layout;
 #[derive(Default)]
 pub(crate) struct Swept {
     windows: Windows,
-    seams: Vec<Prepared>,
+    seams: Vec<Seams>,
     /// The bands of grids of even index from 2 on and of odd index: only a grid and the next coarser one are needed at the
     /// same time.
     bands: [Vec<Band>; 2],
@@ -75,6 +78,11 @@ pub(crate) fn bytes(plan: &Plan) -> u64 {
     bands.chain(labels).chain([windows, seams]).fold(0, u64::saturating_add)
 }
 
+/// A seam that no band uses.
+fn prepared(seam: &mut Seams) -> &mut Prepared {
+    seam.get_mut().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Swept {
     /// Allocates everything, except for what label sets make shorter.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
@@ -91,7 +99,7 @@ impl Swept {
         // With label sets, grid 2 is the first that needs room for all labels.
         let [patches, entries] = most_entries(plan, if plan.has_label_sets(0) { 2 } else { 0 });
         windows.fit(plan, patches, entries)?;
-        seams.iter_mut().try_for_each(|seam| seam.fit(patches, entries))?;
+        seams.iter_mut().map(prepared).try_for_each(|seam| seam.fit(patches, entries))?;
         Ok(Self { windows, seams, bands, labels: [labels(0)?, labels(1)?, labels(2)?], updates: AtomicU64::new(0) })
     }
 
@@ -100,15 +108,14 @@ impl Swept {
         if grid.index + 1 == grid.plan.grids() {
             self.updates.store(0, Ordering::Relaxed);
         }
-        let mut seams = std::mem::take(&mut self.seams);
+        self.seams.iter_mut().for_each(|seam| prepared(seam).grid = None);
         let mut bands = if grid.index > 0 { std::mem::take(&mut self.bands[grid.index % 2]) } else { Vec::new() };
         let mut labels = self.labels.get_mut(grid.index).map(std::mem::take).unwrap_or_default();
         let sweep = self.sweep(grid);
-        let result = sweep.prepare(&mut seams).and_then(|()| match grid.index {
-            0 => sweep.decode(&seams, &mut labels),
-            _ => sweep.keep(&seams, &mut bands, &mut labels),
-        });
-        self.seams = seams;
+        let result = match grid.index {
+            0 => sweep.decode(&self.seams, &mut labels),
+            _ => sweep.keep(&self.seams, &mut bands, &mut labels),
+        };
         if grid.index > 0 {
             self.bands[grid.index % 2] = bands;
         }
@@ -160,7 +167,8 @@ impl Swept {
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let bands: u64 = self.bands.iter().flatten().map(Band::bytes).sum();
-        let seams: u64 = self.seams.iter().map(Prepared::bytes).sum();
+        let bytes = |seam: &Seams| seam.read().unwrap_or_else(PoisonError::into_inner).bytes();
+        let seams: u64 = self.seams.iter().map(bytes).sum();
         self.windows.bytes() + bands + seams + self.labels.iter().map(memory::bytes).sum::<u64>()
     }
 }
