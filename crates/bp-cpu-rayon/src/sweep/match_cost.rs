@@ -54,7 +54,7 @@ impl Matching<'_> {
         costs: &mut [Block],
     ) {
         let profile = self.plan.model().profile();
-        compare_by!(profile, Bytes<S>, self.sums_by(simd, planes, [lane, y], labels, costs, Rows::<ROWS>));
+        compare_by!(profile, Bytes<S>, self.sums_by(simd, planes, Rows::<ROWS> { lane, y }, labels, costs));
     }
 
     #[inline(always)]
@@ -62,10 +62,9 @@ impl Matching<'_> {
         &self,
         simd: S,
         planes: [usize; PLANES],
-        [lane, y]: [usize; 2],
+        Rows { lane, y }: Rows<ROWS>,
         labels: &[u16],
         costs: &mut [Block],
-        _: Rows<ROWS>,
         cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
     ) {
         let outside = Bytes::<S>::splat(simd, self.plan.model().profile().out_of_range_cost() as u8);
@@ -127,5 +126,9 @@ impl Matching<'_> {
     }
 }
 
-/// The number of rows, for functions whose other parameters are inferred.
-struct Rows<const ROWS: usize>;
+/// `ROWS` rows of a block: its first lane, and the first of the rows.
+#[derive(Clone, Copy)]
+struct Rows<const ROWS: usize> {
+    lane: usize,
+    y: usize,
+}
