@@ -129,12 +129,6 @@ impl LabelSet {
             })
         })
     }
-
-    /// Its labels as bits, the lowest first.
-    #[must_use]
-    pub fn words(&self) -> &[u64] {
-        &self.words
-    }
 }
 
 #[cfg(test)]

@@ -21,7 +21,8 @@ impl Plan {
     ///
     /// # Errors
     /// [`Error::Plan`] if a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or comes with
-    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`], or label sets with another schedule. Also the errors of [`Size::new`].
+    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`], or label sets with another schedule. Also
+    /// the errors of [`Size::new`].
     pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
         let size = Size::new(size.width, size.height)?;
         if settings.grids == 0 || settings.steps == 0 {
@@ -148,8 +149,8 @@ impl Plan {
         if self.has_label_sets(0) { self.size(1).pixels() } else { 0 }
     }
 
-    /// Whether a grid's unclipped costs are needed beside its stored costs: for the sums of the next coarser grid, if the
-    /// stored costs may have been clipped, or for those of its label sets.
+    /// Whether a grid keeps its unclipped costs too. The next coarser grid needs them for its sums if the stored costs may
+    /// have been clipped, and label sets need them for the costs of their labels.
     #[must_use]
     pub fn keeps_sums(&self, grid: usize) -> bool {
         let clipped = self.model.max_cost(grid) > u64::from(self.clip(grid));

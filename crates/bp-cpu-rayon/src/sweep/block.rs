@@ -31,7 +31,7 @@ impl Block {
 /// The first lane of a [`Padded`] block.
 const PADDING: usize = 8;
 
-/// A block with a few more lanes before and after it, which belong to the patches beside it.
+/// A block with a few more lanes before and after it. These belong to the patches on its left and right.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Padded([u8; PADDING + LANES + PADDING]);

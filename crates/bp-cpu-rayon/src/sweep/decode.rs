@@ -108,7 +108,7 @@ struct Undecided<'a> {
 }
 
 impl Undecided<'_> {
-    /// Decides their labels, one chunk of labels at a time. `known` are the labels beside and above.
+    /// Decides their labels, one chunk of labels at a time. `known` are the labels on both sides and above.
     #[inline(always)]
     fn decide<S: Simd, const ODD: bool, const WEAK: bool>(&self, simd: S, known: &[Labels; 3]) -> Labels {
         let mut labels = [0; LANES];

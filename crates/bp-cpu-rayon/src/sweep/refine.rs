@@ -244,7 +244,7 @@ impl Reading<'_> {
         even.zip_low(odd).combine(even.zip_high(odd))
     }
 
-    /// Reads the columns that the patches beside the coarse one hold. Where there is no such column, that at the border takes
+    /// Reads the columns that the coarse patches on the left and right hold. Where there is no such column, that at the border takes
     /// its place in messages from below, and others are zeros.
     #[inline(always)]
     fn read_borders<const SIDE: usize>(&self, smoothness: Smoothness, sources: &[[Source; 3]], values: &mut [Padded]) {

@@ -64,13 +64,12 @@ impl Prepared {
     /// Writes its messages from above (0) or below (1) for the lists of a band, `[plane][entry]`.
     pub(crate) fn carry(&self, plan: &Plan, from: usize, lists: &Lists, out: &mut [Block]) {
         for patch in 0..lists.patches() {
-            let (range, own) = (lists.range(patch), self.lists.range(patch));
-            let labels = lists.list(patch).labels;
-            for plane in 0..2 {
-                let messages = &self.messages[from][plane * self.lists.entries()..][own.clone()];
-                let out = &mut out[plane * lists.entries()..][range.clone()];
-                for (source, out) in sources(self.lists.list(patch).labels, labels).zip(out) {
-                    *out = match source.exact() {
+            let own = self.lists.range(patch);
+            let messages = [0, 1].map(|plane| &self.messages[from][plane * self.lists.entries()..][own.clone()]);
+            let sources = sources(self.lists.list(patch).labels, lists.list(patch).labels);
+            for (entry, source) in lists.range(patch).zip(sources) {
+                for (plane, messages) in messages.into_iter().enumerate() {
+                    out[plane * lists.entries() + entry] = match source.exact() {
                         Some(entry) => messages[entry],
                         None => between(source.nearest(plan.model().smoothness()), plan, messages),
                     };

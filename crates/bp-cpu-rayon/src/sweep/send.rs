@@ -1,7 +1,7 @@
 //! Message passing: the kernel that sends the messages of one block.
 //!
-//! It computes what `update_messages` of the half-steps does, in a layout where each walk over the labels is contiguous, and for lists
-//! of labels: between two entries of a list, the envelope rises by what the smoothness costs from one label to the other.
+//! It computes what `update_messages` of the half-steps does, in a layout where each walk over the labels is contiguous, and
+//! for lists of labels: between two entries, the envelope rises by what the smoothness costs from one label to the other.
 
 use bp_core::Smoothness;
 use fearless_simd::{Simd, SimdBase, SimdInt};

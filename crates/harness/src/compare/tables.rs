@@ -15,7 +15,7 @@ use crate::{
 
 /// The whole page.
 pub fn page(comparison: &Comparison<'_>) -> String {
-    let mut text = String::from("# Records beside one another\n\n");
+    let mut text = String::from("# Records compared\n\n");
     for (place, record) in comparison.records.iter().enumerate() {
         let facts = facts(record);
         let _ = writeln!(text, "* Record {}: {}", place + 1, markdown_escaped(&facts));

@@ -28,7 +28,7 @@ const READING: &str = "Times are medians, with their range from three rounds on.
 /// The whole page.
 pub fn page(speed: &Speed) -> String {
     let quick = if speed.quick { ", a quick run" } else { "" };
-    let mut text = format!("# Devices beside one another, on {}{quick}\n\n", markdown_escaped(&speed.machine.cpu));
+    let mut text = format!("# Devices compared, on {}{quick}\n\n", markdown_escaped(&speed.machine.cpu));
     facts(speed).iter().for_each(|fact| _ = writeln!(text, "* {}", markdown_escaped(fact)));
     let _ = writeln!(text, "\n{READING}\n");
     if speed.contests_of(None).next().is_some() {
