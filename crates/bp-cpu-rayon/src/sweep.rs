@@ -60,7 +60,7 @@ impl Band {
     /// Allocates room for so many rows, patches and entries.
     fn new(rows: usize, patches: usize, entries: usize) -> Result<Self, Error> {
         let mut band = Self::default();
-        band.lists.reserve(patches, entries)?;
+        band.lists.fit(patches, entries)?;
         band.messages.fit(rows, entries)?;
         Ok(band)
     }

@@ -6,7 +6,7 @@ use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{Answer, Case, Difference, compare_at_random, conform, noise_pair, random_case, solve, stepped_pair};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::LazyLock;
+use std::{collections::BTreeSet, sync::LazyLock};
 
 const THREADS: [usize; 4] = [1, 2, 3, 8];
 
@@ -98,4 +98,23 @@ fn label_sets_save_work_and_memory() {
     let ((all, bytes, planned), (left, fewer_bytes, most)) = (solved(false), solved(true));
     assert_eq!(all, planned);
     assert!(left < most / 2 && fewer_bytes < bytes * 2 / 3, "{left} of {most}, {fewer_bytes} of {bytes} bytes");
+}
+
+/// The memory held after a solve is the same whichever thread swept which rows.
+#[test]
+fn memory_with_label_sets_does_not_depend_on_the_order_of_threads() {
+    let pair = stepped_pair(400, 500, 100);
+    let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+    let model = Model::new(Profile::Census, 100).unwrap();
+    let plan = Plan::new(pair.size(), model, Settings { label_sets: true, ..settings }).unwrap();
+    let device = Rayon.open(0).unwrap();
+    let bytes = |_| {
+        POOLS[2].install(|| {
+            let mut driver = Driver::new(device.as_ref(), plan.clone()).unwrap();
+            driver.solve(&pair).unwrap();
+            driver.allocated_bytes()
+        })
+    };
+    let all: BTreeSet<u64> = (0..20).map(bytes).collect();
+    assert_eq!(all.len(), 1, "{all:?}");
 }

@@ -36,8 +36,7 @@ impl Lists {
     /// Makes the lists of these rows of a grid, whose label sets come from the labels `coarser`.
     pub(crate) fn fill(&mut self, plan: &Plan, grid: usize, rows: Range<usize>, coarser: &[u16]) -> Result<(), Error> {
         let patches = Patch::all(plan.size(grid).width, rows);
-        self.clear();
-        self.reserve(patches.len(), 0)?;
+        self.fit(patches.len(), 0)?;
         for patch in patches {
             let set = LabelSet::of(plan, grid, &patch, coarser);
             self.reserve(0, set.count())?;
@@ -52,8 +51,14 @@ impl Lists {
         self.starts.clear();
     }
 
+    /// Makes room for so many patches and entries.
+    pub(crate) fn fit(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
+        self.clear();
+        self.reserve(patches, entries)
+    }
+
     /// Makes room for so many more patches and entries.
-    pub(crate) fn reserve(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
+    fn reserve(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
         let needed = bytes(patches, entries);
         let reserved = self.labels.try_reserve_exact(entries).and_then(|()| {
             self.steps.try_reserve_exact(entries + patches.max(1))?;

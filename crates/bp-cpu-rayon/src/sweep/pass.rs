@@ -39,6 +39,11 @@ impl Crossings {
         memory::grow("label sets", &mut self.sources, entries, [Source::NONE; 2])
     }
 
+    /// The most entries that there was ever room for.
+    pub(crate) fn most_entries(&self) -> usize {
+        self.sources.len()
+    }
+
     /// Finds the sources of all entries.
     pub(crate) fn find(&mut self, lists: &Lists) {
         for patch in 0..lists.patches() {

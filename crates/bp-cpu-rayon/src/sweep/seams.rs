@@ -47,7 +47,7 @@ pub(crate) fn prepared(plan: &Plan) -> Result<Vec<Seams>, Error> {
 impl Prepared {
     /// Makes room for so many patches and entries.
     pub(crate) fn fit(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
-        self.lists.reserve(patches, entries)?;
+        self.lists.fit(patches, entries)?;
         self.fit_messages(entries)
     }
 

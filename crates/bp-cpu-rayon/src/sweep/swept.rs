@@ -122,7 +122,8 @@ impl Swept {
         if let Some(kept) = self.labels.get_mut(grid.index) {
             *kept = labels;
         }
-        result
+        let [patches, _] = most_entries(grid.plan, 0);
+        result.and(self.windows.even_out(grid.plan, patches))
     }
 
     fn sweep<'a>(&'a self, grid: &'a Grid<'a>) -> Sweep<'a> {

@@ -70,6 +70,11 @@ pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
     (windows(plan) as u64).saturating_mul(window)
 }
 
+/// A window that no thread uses.
+fn unused(window: &mut Mutex<Window>) -> &mut Window {
+    window.get_mut().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Windows {
     /// Makes windows for the threads of the current pool.
     pub(crate) fn new(plan: &Plan) -> Self {
@@ -79,12 +84,18 @@ impl Windows {
     /// Makes room in all windows for rows with so many patches and entries.
     pub(crate) fn fit(&mut self, plan: &Plan, patches: usize, entries: usize) -> Result<(), Error> {
         let rows = BAND_ROWS.min(plan.image_size().height);
-        self.windows.iter_mut().try_for_each(|window| {
-            let window = window.get_mut().unwrap_or_else(PoisonError::into_inner);
-            window.lists.reserve(patches, entries)?;
+        self.windows.iter_mut().map(unused).try_for_each(|window| {
+            window.lists.fit(patches, entries)?;
             window.messages.fit(rows, entries)?;
             window.work.fit(rows, entries)
         })
+    }
+
+    /// Makes all windows as large as any had to become. So memory does not depend on which thread passed which rows, and
+    /// the same pair needs no more when other threads pass them.
+    pub(crate) fn even_out(&mut self, plan: &Plan, patches: usize) -> Result<(), Error> {
+        let most = self.windows.iter_mut().map(|window| unused(window).work.crossings.most_entries()).max();
+        self.fit(plan, patches, most.unwrap_or(0))
     }
 
     /// Calls `work` with a free window. A thread waits only if more threads than windows need one at the same time.
