@@ -21,7 +21,7 @@ use crate::{
     layout::Layout,
     match_cost::Matching,
     shape::{BLOCK, BlockStart, STRIP, Strip},
-    sweep::{self, Block, LANES, Windows},
+    sweep::{Block, LANES, PatchRow, Windows, clip_above},
 };
 
 /// Computes the costs of `grid` from those of the finer grid, `grid - 1`. `layouts` has the layouts of both, the finer
@@ -59,15 +59,16 @@ pub(crate) fn coarsen_unstored(
     costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
         windows.with(|window| {
             let (even, rest) = window.work.costs.split_at_mut(labels.len());
-            let (odd, rest) = rest.split_at_mut(labels.len());
+            let odd = &mut rest[..labels.len()];
             for patch in 0..layout.size.width.div_ceil(Patch::COLUMNS) {
-                matching.unclipped(grid, patch, y, labels, [&mut *even, &mut *odd], rest);
-                for (plane, costs) in [&mut *even, &mut *odd].into_iter().enumerate() {
+                let at = PatchRow { grid, patch, y };
+                let least = matching.unclipped(at, labels, [&mut *even, &mut *odd]);
+                for (plane, (costs, least)) in [&mut *even, &mut *odd].into_iter().zip(least).enumerate() {
                     let first = plane * layout.plane() + LANES * patch;
                     if let Some(keep) = keep.as_deref_mut() {
                         store(layout, costs, &mut keep[first..]);
                     }
-                    dispatch!(level, simd => sweep::normalise(simd, clip, costs));
+                    dispatch!(level, simd => clip_above(simd, &least, clip, costs));
                     store(layout, costs, &mut stored[first..]);
                 }
             }

@@ -32,7 +32,8 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 pub(crate) use block::{Block, LANES};
-pub(crate) use costs::{CostSource, normalise};
+pub(crate) use costs::{CostSource, clip_above};
+pub(crate) use match_cost::PatchRow;
 pub(crate) use swept::{Grid, Swept, bytes};
 pub(crate) use windows::Windows;
 

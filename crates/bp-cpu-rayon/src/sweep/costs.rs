@@ -5,6 +5,7 @@ use fearless_simd::{Simd, SimdBase, dispatch};
 use super::{
     Sweep,
     block::{Block, Bytes, LANES},
+    match_cost::PatchRow,
 };
 use crate::{
     costs::{Costs, Sum, Sums},
@@ -24,7 +25,7 @@ impl CostSource<'_> {
     /// Writes the costs of both planes of a patch in row y, for these labels.
     pub(crate) fn fill(&self, sweep: &Sweep<'_>, patch: usize, y: usize, labels: &[u16], costs: [&mut [Block]; 2]) {
         match self {
-            Self::Computed(matching) => matching.costs(sweep.grid, patch, y, labels, costs),
+            Self::Computed(matching) => matching.costs(PatchRow { grid: sweep.grid, patch, y }, labels, costs),
             Self::Stored(stored) => {
                 for (plane, costs) in costs.into_iter().enumerate() {
                     let first = (2 * y + plane) * sweep.layout.plane() + LANES * patch;
@@ -54,72 +55,29 @@ fn restricted(sweep: &Sweep<'_>, stored: &Costs, entries: impl Iterator<Item = u
 }
 
 impl Matching<'_> {
-    /// Writes the costs of both planes of a patch of grid 0 or 1 in row y, for these labels.
-    fn costs(&self, grid: usize, patch: usize, y: usize, labels: &[u16], [even, odd]: [&mut [Block]; 2]) {
-        let (clip, clips) = (self.plan.clip(grid), grid > 0 || !self.fits());
-        self.unclipped(grid, patch, y, labels, [&mut *even, &mut *odd], &mut []);
-        for (plane, costs) in [even, odd].into_iter().enumerate() {
+    /// Writes the costs of both planes of a patch of grid 0 or 1, for these labels.
+    fn costs(&self, at: PatchRow, labels: &[u16], [even, odd]: [&mut [Block]; 2]) {
+        let (clip, clips) = (self.plan.clip(at.grid), at.grid > 0 || !self.fits());
+        let least = self.unclipped(at, labels, [&mut *even, &mut *odd]);
+        for (plane, (costs, least)) in [even, odd].into_iter().zip(least).enumerate() {
             if clips {
-                dispatch!(self.level, simd => normalise(simd, clip, costs));
+                dispatch!(self.level, simd => clip_above(simd, &least, clip, costs));
             }
-            if grid == 0 {
-                self.fix_block(BlockStart { plane, lane: LANES * patch }, y, labels, costs);
+            if at.grid == 0 {
+                self.fix_block(BlockStart { plane, lane: LANES * at.patch }, at.y, labels, costs);
             }
         }
     }
 
-    /// Writes the unclipped costs of both planes of a patch of grid 0, 1 or 2 in row y, for these labels. They must fit 8
-    /// bits. Grid 2 needs room for both planes of a patch of grid 1.
-    pub(crate) fn unclipped(
-        &self,
-        grid: usize,
-        patch: usize,
-        y: usize,
-        labels: &[u16],
-        [even, odd]: [&mut [Block]; 2],
-        finer: &mut [Block],
-    ) {
-        if grid == 0 {
-            for (plane, costs) in [even, odd].into_iter().enumerate() {
-                self.pixels(BlockStart { plane, lane: LANES * patch }, y, labels, costs);
-            }
-            return;
-        }
-        let size = self.plan.size(grid - 1);
-        for (half, sums) in [&mut *even, &mut *odd].into_iter().enumerate() {
-            let child = 2 * patch + half;
-            if 2 * LANES * child >= size.width {
-                sums.fill(Block::ZERO);
-            } else if grid == 1 {
-                self.squares(LANES * child, 2 * y, labels, sums);
-            } else {
-                for y in 2 * y..size.height.min(2 * y + 2) {
-                    let (first, second) = finer.split_at_mut(labels.len());
-                    self.unclipped(1, child, y, labels, [first, second], &mut []);
-                    dispatch!(self.level, simd => sum(simd, first, second, sums, y % 2 == 1));
-                }
+    /// As [`Matching::fix`], for a block.
+    fn fix_block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [Block]) {
+        let Some(seed) = self.seed else { return };
+        for lane in 0..LANES {
+            if seed.touches(2 * (at.lane + lane) + at.plane, y) {
+                let cost = |&label: &u16| if label.abs_diff(seed.label) <= 1 { 0 } else { self.dear() };
+                labels.iter().zip(&mut *costs).for_each(|(label, block)| block.0[lane] = cost(label));
             }
         }
-        dispatch!(self.level, simd => deal(simd, even, odd));
-    }
-}
-
-/// Writes the sums of two planes, or adds them to what `sums` hold.
-#[inline(always)]
-fn sum<S: Simd>(simd: S, first: &[Block], second: &[Block], sums: &mut [Block], add: bool) {
-    for ((first, second), sum) in first.iter().zip(second).zip(sums) {
-        let both = first.load(simd) + second.load(simd);
-        sum.store(if add { both + sum.load(simd) } else { both });
-    }
-}
-
-/// Deals the values of 64 consecutive columns, of which each slice has 32, to even and odd columns.
-#[inline(always)]
-fn deal<S: Simd>(simd: S, first: &mut [Block], second: &mut [Block]) {
-    for (first, second) in first.iter_mut().zip(second) {
-        let (even, odd) = first.load(simd).deinterleave(second.load(simd));
-        first.store(even);
-        second.store(odd);
     }
 }
 
@@ -143,9 +101,17 @@ fn clipped<T: Sum>(values: &[T], entries: impl Iterator<Item = usize> + Clone, c
 
 /// Normalises costs by each node's least, and clips them.
 #[inline(always)]
-pub(crate) fn normalise<S: Simd>(simd: S, clip: u8, costs: &mut [Block]) {
+fn normalise<S: Simd>(simd: S, clip: u8, costs: &mut [Block]) {
     let mut least = Bytes::<S>::splat(simd, u8::MAX);
     costs.iter().for_each(|block| least = least.min(block.load(simd)));
-    let clip = Bytes::splat(simd, clip);
+    let mut block = Block::ZERO;
+    block.store(least);
+    clip_above(simd, &block, clip, costs);
+}
+
+/// Subtracts each node's least cost, and clips the rest.
+#[inline(always)]
+pub(crate) fn clip_above<S: Simd>(simd: S, least: &Block, clip: u8, costs: &mut [Block]) {
+    let (least, clip) = (least.load(simd), Bytes::splat(simd, clip));
     costs.iter_mut().for_each(|block| block.store((block.load(simd) - least).min(clip)));
 }

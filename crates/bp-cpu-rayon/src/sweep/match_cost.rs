@@ -1,134 +1,295 @@
-//! Data costs of blocks, summed over the pixels that a node covers: one on grid 0, up to four on grid 1.
+//! Data costs of blocks, summed over the pixels that a node covers: one on grid 0, up to four on grid 1, up to 16 on grid 2.
 //!
 //! In the terms of `bp-cpu-scalar`, the kernel computes for every node and each label d of its list:
 //!
 //! ```text
 //! raw(d) = sum over its pixels (x, y) of D(left(x, y), right(x - disparity(d), y)), or the out-of-range cost
+//! least = min over d of raw(d)
 //! ```
+//!
+//! Lane i of the image's two planes is lane i of a row of grid 1, in the order of columns. So sums over planes and rows stay in
+//! their lanes, and are dealt to the planes of the coarser grid at the end.
 
-use std::array;
+use std::{array, ops::Range};
 
-use fearless_simd::{Simd, SimdBase, dispatch};
+use fearless_simd::{Simd, SimdBase, SimdSplit, dispatch, u8x64};
 
 use super::block::{Block, Bytes, LANES};
 use crate::{
-    compare::compare_by,
+    compare::{Vector, compare_by},
     match_cost::{Matching, channels},
-    shape::{BLOCK, BlockStart},
+    shape::BLOCK,
 };
 
-/// Pixels of one plane in `ROWS` rows of a block, and the rows of the right image that they match.
-struct Pixels<'a, S: Simd, const CHANNELS: usize, const ROWS: usize> {
-    plane: usize,
-    left: [[Bytes<S>; CHANNELS]; ROWS],
-    /// By parity of the column, from a block before lane 0 on.
-    right: [[[&'a [u8]; CHANNELS]; ROWS]; 2],
-    /// 255 where the left image has a column, otherwise 0.
-    exist: Bytes<S>,
+/// The nodes of both planes of a patch in row y of a grid.
+#[derive(Clone, Copy)]
+pub(crate) struct PatchRow {
+    pub(crate) grid: usize,
+    pub(crate) patch: usize,
+    pub(crate) y: usize,
+}
+
+/// Costs to be written, `[plane][entry]`, for these labels. Those of several rows of pixels are added.
+struct To<'a> {
+    labels: &'a [u16],
+    costs: [&'a mut [Block]; 2],
 }
 
 impl Matching<'_> {
-    /// Writes the unclipped costs of a block of pixels in row y, for these labels.
-    pub(super) fn pixels(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [Block]) {
-        dispatch!(self.level, simd => self.sums::<_, 1, 1>(simd, [at.plane], at.lane, y, labels, costs));
-    }
-
-    /// Writes the sums of the unclipped costs of the pixels in these lanes of both planes, in row y and the next one, if there
-    /// is one.
-    pub(super) fn squares(&self, lane: usize, y: usize, labels: &[u16], costs: &mut [Block]) {
-        if y + 1 < self.layout.size.height {
-            dispatch!(self.level, simd => self.sums::<_, 2, 2>(simd, [0, 1], lane, y, labels, costs));
-        } else {
-            dispatch!(self.level, simd => self.sums::<_, 2, 1>(simd, [0, 1], lane, y, labels, costs));
+    /// Writes the unclipped costs of these nodes of grid 0, 1 or 2 for these labels, `[plane][entry]`, and returns the least of
+    /// each node. They must fit 8 bits.
+    pub(crate) fn unclipped(&self, at: PatchRow, labels: &[u16], [even, odd]: [&mut [Block]; 2]) -> [Block; 2] {
+        let PatchRow { grid, patch, y } = at;
+        let y = y << grid;
+        let level = self.level;
+        let to = To { labels, costs: [&mut *even, &mut *odd] };
+        match (grid, self.layout.size.height - y) {
+            (0, _) => return dispatch!(level, simd => self.pixels(simd, patch, y, to)),
+            (1, 2..) => return dispatch!(level, simd => self.squares(simd, Shape::<1, 2>, patch, y, to)),
+            (2, 4..) => return dispatch!(level, simd => self.squares(simd, Shape::<2, 4>, patch, y, to)),
+            _ => {}
         }
+        // At the lower border, row by row.
+        let mut least = [Block::ZERO; 2];
+        to.costs.into_iter().for_each(|costs| costs.fill(Block::ZERO));
+        for y in y..self.layout.size.height {
+            let to = To { labels, costs: [&mut *even, &mut *odd] };
+            least = match grid {
+                1 => dispatch!(level, simd => self.squares(simd, Shape::<1, 1>, patch, y, to)),
+                _ => dispatch!(level, simd => self.squares(simd, Shape::<2, 1>, patch, y, to)),
+            };
+        }
+        least
     }
 
     #[inline(always)]
-    fn sums<S: Simd, const PLANES: usize, const ROWS: usize>(
+    fn pixels<S: Simd>(&self, simd: S, patch: usize, y: usize, to: To<'_>) -> [Block; 2] {
+        compare_by!(self.plan.model().profile(), Bytes<S>, self.pixels_by(simd, patch, y, to))
+    }
+
+    #[inline(always)]
+    fn pixels_by<S: Simd, const CHANNELS: usize>(
         &self,
         simd: S,
-        planes: [usize; PLANES],
-        lane: usize,
+        patch: usize,
         y: usize,
-        labels: &[u16],
-        costs: &mut [Block],
-    ) {
-        let profile = self.plan.model().profile();
-        compare_by!(profile, Bytes<S>, self.sums_by(simd, planes, Rows::<ROWS> { lane, y }, labels, costs));
-    }
-
-    #[inline(always)]
-    fn sums_by<S: Simd, const PLANES: usize, const ROWS: usize, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        planes: [usize; PLANES],
-        Rows { lane, y }: Rows<ROWS>,
-        labels: &[u16],
-        costs: &mut [Block],
+        to: To<'_>,
         cost: impl Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
-    ) {
-        let outside = Bytes::<S>::splat(simd, self.plan.model().profile().out_of_range_cost() as u8);
-        let load = |lanes: &[u8], at: usize| Bytes::<S>::from_slice(simd, &lanes[at..at + LANES]);
-        let pixels = planes.map(|plane| self.pixels_of::<S, CHANNELS, ROWS>(simd, plane, lane, y));
-        let inside = [0, 1].map(|parity| self.features.inside(parity));
-        // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
-        let (first, min, before) = (lane as i32, self.plan.model().min_disparity(), BLOCK as i32);
-        let nodes = [0, 1].map(|parity| self.layout.nodes(parity) as i32);
-        for (&label, out) in labels.iter().zip(costs) {
-            let mut sum = Bytes::<S>::splat(simd, 0);
-            for Pixels { plane, left, right, exist } in &pixels {
-                let shift = *plane as i32 - min - i32::from(label);
-                let parity = (shift & 1) as usize;
-                let start = first + (shift >> 1);
-                let is_inside = start >= 0 && start + LANES as i32 <= nodes[parity];
-                let start = (start.clamp(-before, nodes[parity]) + before) as usize;
-                for row in 0..ROWS {
-                    let mut cost = cost(left[row], right[parity][row].map(|right| load(right, start)));
-                    if !is_inside {
-                        let inside = load(inside[parity], start);
-                        cost = cost & inside | outside & !inside;
-                    }
-                    sum += cost & *exist;
-                }
-            }
-            out.store(sum);
-        }
+    ) -> [Block; 2] {
+        let rows = Rows::<S, Bytes<S>, CHANNELS, 1>::new(simd, self, y);
+        let first = LANES * patch;
+        let lanes = self.lanes(&rows, y, first);
+        run(simd, &Pixels { rows, lanes, cost }, first..first + LANES, self, to)
     }
 
     #[inline(always)]
-    fn pixels_of<S: Simd, const CHANNELS: usize, const ROWS: usize>(
+    fn squares<S: Simd, const SPANS: usize, const ROWS: usize>(
         &self,
         simd: S,
-        plane: usize,
-        lane: usize,
+        shape: Shape<SPANS, ROWS>,
+        patch: usize,
         y: usize,
-    ) -> Pixels<'_, S, CHANNELS, ROWS> {
-        let load = |lanes: &[u8], at: usize| Bytes::<S>::from_slice(simd, &lanes[at..at + LANES]);
-        let left = |row: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
-        let right = |parity: usize, row: usize| channels(|channel| self.features.right(y + row, channel, parity));
-        Pixels {
-            plane,
-            left: array::from_fn(|row| left(row).map(|left| load(left, lane))),
-            right: [0, 1].map(|parity| array::from_fn(|row| right(parity, row))),
-            exist: load(self.features.inside(plane), BLOCK + lane),
-        }
+        to: To<'_>,
+    ) -> [Block; 2] {
+        compare_by!(self.plan.model().profile(), u8x64<S>, self.squares_by(simd, shape, patch, y, to))
     }
 
-    /// As [`Matching::fix`], for a block.
-    pub(super) fn fix_block(&self, at: BlockStart, y: usize, labels: &[u16], costs: &mut [Block]) {
-        let Some(seed) = self.seed else { return };
-        for lane in 0..LANES {
-            if seed.touches(2 * (at.lane + lane) + at.plane, y) {
-                let cost = |&label: &u16| if label.abs_diff(seed.label) <= 1 { 0 } else { self.dear() };
-                labels.iter().zip(&mut *costs).for_each(|(label, block)| block.0[lane] = cost(label));
-            }
+    #[inline(always)]
+    fn squares_by<S: Simd, const SPANS: usize, const ROWS: usize, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        _: Shape<SPANS, ROWS>,
+        patch: usize,
+        y: usize,
+        to: To<'_>,
+        cost: impl Fn([u8x64<S>; CHANNELS], [u8x64<S>; CHANNELS]) -> u8x64<S>,
+    ) -> [Block; 2] {
+        let rows = Rows::<S, u8x64<S>, CHANNELS, ROWS>::new(simd, self, y);
+        let first = SPANS * BLOCK * patch;
+        let spans: [_; SPANS] = array::from_fn(
+            #[inline(always)]
+            |span| self.lanes(&rows, y, first + span * BLOCK),
+        );
+        run(simd, &Squares { rows, spans, cost }, first..first + SPANS * BLOCK, self, to)
+    }
+
+    /// Loads the lanes of the left image from `first` on. Those beyond the image count as zeros.
+    #[inline(always)]
+    fn lanes<S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize>(
+        &self,
+        rows: &Rows<'_, S, V, CHANNELS, ROWS>,
+        y: usize,
+        first: usize,
+    ) -> Lanes<V, CHANNELS, ROWS> {
+        let exists = first < self.layout.lanes;
+        let first = if exists { first } else { 0 };
+        let left = |row: usize, plane: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
+        let node = |plane: usize| rows.load(self.features.inside(plane), BLOCK + first);
+        Lanes {
+            first: first as i32,
+            left: [0, 1].map(|plane| array::from_fn(|row| left(row, plane).map(|left| rows.load(left, first)))),
+            exist: [0, 1].map(|plane| if exists { node(plane) } else { V::splat(rows.simd, 0) }),
         }
     }
 }
 
-/// `ROWS` rows of a block: its first lane, and the first of the rows.
-#[derive(Clone, Copy)]
-struct Rows<const ROWS: usize> {
-    lane: usize,
-    y: usize,
+/// Squares of pixels: a vector of them is summed for each of `SPANS` spans of lanes and `ROWS` rows.
+struct Shape<const SPANS: usize, const ROWS: usize>;
+
+/// Rows of the right image.
+struct Rows<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> {
+    simd: S,
+    /// By parity of the column, from a block before lane 0 on.
+    right: [[[&'a [u8]; CHANNELS]; ROWS]; 2],
+    inside: [&'a [u8]; 2],
+    nodes: [i32; 2],
+    outside: V,
+}
+
+/// The lanes of the left image that a vector holds, in the same rows.
+struct Lanes<V, const CHANNELS: usize, const ROWS: usize> {
+    first: i32,
+    /// By plane.
+    left: [[[V; CHANNELS]; ROWS]; 2],
+    /// By plane, 255 where the image has a column, otherwise 0.
+    exist: [V; 2],
+}
+
+impl<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> Rows<'a, S, V, CHANNELS, ROWS> {
+    #[inline(always)]
+    fn new(simd: S, matching: &'a Matching<'_>, y: usize) -> Self {
+        let Matching { features, layout, plan, .. } = matching;
+        let right = |row: usize, parity: usize| channels(|channel| features.right(y + row, channel, parity));
+        Self {
+            simd,
+            right: [0, 1].map(|parity| array::from_fn(|row| right(row, parity))),
+            inside: [0, 1].map(|parity| features.inside(parity)),
+            nodes: [0, 1].map(|parity| layout.nodes(parity) as i32),
+            outside: V::splat(simd, plan.model().profile().out_of_range_cost() as u8),
+        }
+    }
+
+    #[inline(always)]
+    fn load(&self, values: &[u8], at: usize) -> V {
+        V::from_slice(self.simd, &values[at..at + V::LEN])
+    }
+
+    /// The costs of the pixels of a plane at this disparity, summed over the rows. If `INSIDE`, none is matched with a pixel
+    /// outside the image.
+    #[inline(always)]
+    fn costs<const INSIDE: bool>(
+        &self,
+        lanes: &Lanes<V, CHANNELS, ROWS>,
+        plane: usize,
+        disparity: i32,
+        cost: &impl Fn([V; CHANNELS], [V; CHANNELS]) -> V,
+    ) -> V {
+        // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
+        let shift = plane as i32 - disparity;
+        let (parity, start) = ((shift & 1) as usize, lanes.first + (shift >> 1));
+        let start = if INSIDE { start } else { start.clamp(-(BLOCK as i32), self.nodes[parity]) };
+        let start = (start + BLOCK as i32) as usize;
+        let mut sum = V::splat(self.simd, 0);
+        for row in 0..ROWS {
+            let right = self.right[parity][row].map(
+                #[inline(always)]
+                |right| self.load(right, start),
+            );
+            let mut cost = cost(lanes.left[plane][row], right);
+            if !INSIDE {
+                let inside = self.load(self.inside[parity], start);
+                cost = cost & inside | self.outside & !inside;
+            }
+            sum += cost;
+        }
+        sum & lanes.exist[plane]
+    }
+}
+
+/// Something that computes the costs of both planes of a patch for a label.
+trait Costs<S: Simd> {
+    /// `held` are the costs so far.
+    fn costs<const INSIDE: bool>(&self, disparity: i32, held: [&Block; 2]) -> [Bytes<S>; 2];
+}
+
+/// Nodes of grid 0.
+struct Pixels<'a, S: Simd, const CHANNELS: usize, F> {
+    rows: Rows<'a, S, Bytes<S>, CHANNELS, 1>,
+    lanes: Lanes<Bytes<S>, CHANNELS, 1>,
+    cost: F,
+}
+
+impl<S: Simd, const CHANNELS: usize, F> Costs<S> for Pixels<'_, S, CHANNELS, F>
+where
+    F: Fn([Bytes<S>; CHANNELS], [Bytes<S>; CHANNELS]) -> Bytes<S>,
+{
+    #[inline(always)]
+    fn costs<const INSIDE: bool>(&self, disparity: i32, _: [&Block; 2]) -> [Bytes<S>; 2] {
+        [0, 1].map(
+            #[inline(always)]
+            |plane| self.rows.costs::<INSIDE>(&self.lanes, plane, disparity, &self.cost),
+        )
+    }
+}
+
+/// Nodes of grid 1, which cover one span of lanes, or of grid 2, which cover two.
+struct Squares<'a, S: Simd, const SPANS: usize, const ROWS: usize, const CHANNELS: usize, F> {
+    rows: Rows<'a, S, u8x64<S>, CHANNELS, ROWS>,
+    spans: [Lanes<u8x64<S>, CHANNELS, ROWS>; SPANS],
+    cost: F,
+}
+
+impl<S: Simd, const SPANS: usize, const ROWS: usize, const CHANNELS: usize, F> Costs<S>
+    for Squares<'_, S, SPANS, ROWS, CHANNELS, F>
+where
+    F: Fn([u8x64<S>; CHANNELS], [u8x64<S>; CHANNELS]) -> u8x64<S>,
+{
+    #[inline(always)]
+    fn costs<const INSIDE: bool>(&self, disparity: i32, held: [&Block; 2]) -> [Bytes<S>; 2] {
+        let simd = self.rows.simd;
+        let mut sums = [u8x64::splat(simd, 0); 2];
+        for (span, sum) in self.spans.iter().zip(&mut sums) {
+            let of_plane = [0, 1].map(
+                #[inline(always)]
+                |plane| self.rows.costs::<INSIDE>(span, plane, disparity, &self.cost),
+            );
+            *sum = of_plane[0] + of_plane[1];
+        }
+        let mut sum = sums[0];
+        if SPANS == 2 {
+            let (even, odd) = sum.deinterleave(sums[1]);
+            sum = even + odd;
+        }
+        let (first, second) = sum.split();
+        let (even, odd) = first.deinterleave(second);
+        if ROWS == 1 { [held[0].load(simd) + even, held[1].load(simd) + odd] } else { [even, odd] }
+    }
+}
+
+/// Writes the costs for all labels and returns the least of each node. `lanes` are those of the pixels.
+#[inline(always)]
+fn run<S: Simd>(simd: S, nodes: &impl Costs<S>, lanes: Range<usize>, matching: &Matching<'_>, to: To<'_>) -> [Block; 2] {
+    let To { labels, costs: [even, odd] } = to;
+    let inside = inside(matching, lanes, labels);
+    let mut least = [Bytes::<S>::splat(simd, u8::MAX); 2];
+    for (i, ((&label, even), odd)) in labels.iter().zip(even).zip(odd).enumerate() {
+        let disparity = matching.plan.model().min_disparity() + i32::from(label);
+        let held = [&*even, &*odd];
+        let costs =
+            if inside.contains(&i) { nodes.costs::<true>(disparity, held) } else { nodes.costs::<false>(disparity, held) };
+        even.store(costs[0]);
+        odd.store(costs[1]);
+        least = [least[0].min(costs[0]), least[1].min(costs[1])];
+    }
+    least.map(|least| Block(least.into()))
+}
+
+/// The labels, which ascend, under which all pixels of these lanes are matched with pixels of the image.
+fn inside(matching: &Matching<'_>, lanes: Range<usize>, labels: &[u16]) -> Range<usize> {
+    // The lane of even columns moves by -d div 2, rounded down, and that of odd columns by (1 - d) div 2.
+    let least = 2 * (lanes.end as i32 - matching.layout.nodes(1) as i32);
+    let most = 2 * lanes.start as i32;
+    let disparity = |label: u16| matching.plan.model().min_disparity() + i32::from(label);
+    let start = labels.partition_point(|&label| disparity(label) < least);
+    start..labels.partition_point(|&label| disparity(label) <= most).max(start)
 }

@@ -30,9 +30,9 @@ pub(crate) struct Work {
     pub(crate) crossings: Crossings,
 }
 
-/// The costs of so many rows, for each entry. Coarsening needs those of two patches, with both planes.
+/// The costs of so many rows, for each entry.
 fn costs(rows: usize) -> usize {
-    2 * rows.max(2)
+    2 * rows
 }
 
 impl Work {
