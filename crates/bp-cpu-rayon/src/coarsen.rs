@@ -17,10 +17,10 @@ use bp_core::{MAX_LABELS, Patch, Plan};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
-    costs::{self, Costs, Sum, Sums, Widen},
+    costs::{self, Costs, Sum, Sums, Widen, block},
     layout::Layout,
     match_cost::Matching,
-    shape::{BLOCK, BlockStart, STRIP, Strip},
+    shape::{BLOCK, STRIP, Strip},
     sweep::{Block, LANES, PatchRow, Windows, clip_above},
 };
 
@@ -116,7 +116,7 @@ impl Grids<'_> {
                 self.layouts[1],
                 self.clip,
                 #[inline(always)]
-                |start, label| sum_children(fine_layout, children, start, label),
+                |lane, label| sum_children(fine_layout, children, lane, label),
                 stored,
                 keep,
             ));
@@ -198,28 +198,34 @@ fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::
     sum
 }
 
-/// Sums for a block of coarse nodes. The children of coarse column X are lane X of both planes, so those of lane i of a
-/// coarse plane are lanes 2i + plane.
+/// Sums for a block of coarse nodes of both planes. The children of coarse column X are lane X of both planes, so those of lane
+/// i of a coarse plane are lanes 2i + plane.
 #[inline(always)]
 fn sum_children<F: Sum + Widen<C>, C: Sum>(
     fine: &Layout,
     children: [&[F]; 2],
-    BlockStart { plane, lane: at }: BlockStart,
+    lane: usize,
     label: usize,
-) -> [C; BLOCK] {
+) -> [[C; BLOCK]; 2] {
     let mut sums = [C::default(); 2 * BLOCK];
-    for row in children.into_iter().filter(|row| !row.is_empty()) {
-        for fine_plane in 0..2 {
-            let lanes = &row[fine_plane * fine.plane() + label * fine.lanes..][..fine.lanes];
-            // The last block of coarse lanes may reach beyond the fine ones.
-            for (sum, lane) in sums.iter_mut().zip(&lanes[2 * at..]) {
-                *sum = *sum + lane.widen();
+    // The last block of coarse lanes may reach beyond the fine ones.
+    let blocks = (2 * lane..fine.lanes).step_by(BLOCK);
+    for (from, sums) in blocks.zip(sums.chunks_exact_mut(BLOCK)) {
+        for row in children.into_iter().filter(|row| !row.is_empty()) {
+            for plane in 0..2 {
+                let lanes = block(row, plane * fine.plane() + label * fine.lanes + from);
+                sums.iter_mut().zip(lanes).for_each(|(sum, lane)| *sum = *sum + lane.widen());
             }
         }
     }
-    let mut every_second = [C::default(); BLOCK];
-    for (i, sum) in every_second.iter_mut().enumerate() {
-        *sum = sums[2 * i + plane];
-    }
-    every_second
+    [0, 1].map(
+        #[inline(always)]
+        |plane| {
+            let mut every_second = [C::default(); BLOCK];
+            for (i, sum) in every_second.iter_mut().enumerate() {
+                *sum = sums[2 * i + plane];
+            }
+            every_second
+        },
+    )
 }

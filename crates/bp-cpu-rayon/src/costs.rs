@@ -4,7 +4,7 @@ use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::shape::{BLOCK, BlockStart, STRIP, Shape, Strip};
+use crate::shape::{BLOCK, STRIP, Shape, Strip};
 
 /// Data costs `[height][plane][label][lane]`, in the forms that messages and the sums of coarser grids need.
 pub(crate) struct Costs {
@@ -127,34 +127,30 @@ macro_rules! widen {
 
 widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
-/// Stores the costs of a row, block by block. `raw(start, label)` returns the unclipped costs of a block, which are
-/// also written to `keep`.
+/// Stores the costs of a row, block by block. `raw(lane, label)` returns the unclipped costs of a block of both planes, which
+/// are also written to `keep`.
 #[inline(always)]
 pub(crate) fn store<S: Simd, T: Sum>(
     simd: S,
     shape: &Shape,
     clip: u8,
-    raw: impl Fn(BlockStart, usize) -> [T; BLOCK],
+    raw: impl Fn(usize, usize) -> [[T; BLOCK]; 2],
     stored: &mut [u8],
     mut keep: Option<&mut [T]>,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            for (plane, stored) in stored.chunks_exact_mut(shape.plane()).enumerate() {
-                let mut keep = keep.as_mut().map(|keep| &mut keep[plane * shape.plane()..][..shape.plane()]);
-                for lane in (0..shape.nodes(plane)).step_by(BLOCK) {
-                    let keep = keep.as_deref_mut();
-                    store_block(
-                        shape,
-                        clip,
-                        lane,
-                        #[inline(always)]
-                        |label| raw(BlockStart { plane, lane }, label),
-                        stored,
-                        keep,
-                    );
-                }
+            for lane in (0..shape.nodes(0)).step_by(BLOCK) {
+                store_block(
+                    shape,
+                    clip,
+                    lane,
+                    #[inline(always)]
+                    |label| raw(lane, label),
+                    stored,
+                    keep.as_deref_mut(),
+                );
             }
         },
     );
@@ -166,31 +162,44 @@ pub(crate) fn store<S: Simd, T: Sum>(
 fn store_block<T: Sum>(
     shape: &Shape,
     clip: u8,
-    at: usize,
-    raw: impl Fn(usize) -> [T; BLOCK],
+    lane: usize,
+    raw: impl Fn(usize) -> [[T; BLOCK]; 2],
     stored: &mut [u8],
     mut keep: Option<&mut [T]>,
 ) {
-    let mut least = [T::MAX; BLOCK];
+    let start = |plane: usize, label: usize| plane * shape.plane() + label * shape.lanes + lane;
+    let mut least = [[T::MAX; BLOCK]; 2];
     for label in 0..shape.labels {
         let costs = raw(label);
-        for (least, cost) in least.iter_mut().zip(costs) {
-            *least = cost.min(*least);
-        }
-        if let Some(keep) = &mut keep {
-            keep[label * shape.lanes + at..][..BLOCK].copy_from_slice(&costs);
+        for plane in 0..2 {
+            for (least, cost) in least[plane].iter_mut().zip(costs[plane]) {
+                *least = cost.min(*least);
+            }
+            if let Some(keep) = &mut keep {
+                keep[start(plane, label)..][..BLOCK].copy_from_slice(&costs[plane]);
+            }
         }
     }
     for label in 0..shape.labels {
-        let start = label * shape.lanes + at;
-        let mut costs = [T::default(); BLOCK];
-        match &keep {
-            Some(keep) => costs.copy_from_slice(&keep[start..start + BLOCK]),
-            None => costs = raw(label),
+        let costs = match &keep {
+            Some(keep) => [0, 1].map(|plane| *block(keep, start(plane, label))),
+            None => raw(label),
+        };
+        for plane in 0..2 {
+            let stored = &mut stored[start(plane, label)..][..BLOCK];
+            for ((stored, cost), least) in stored.iter_mut().zip(costs[plane]).zip(least[plane]) {
+                *stored = (cost - least).clipped(clip);
+            }
         }
-        for ((stored, cost), least) in stored[start..start + BLOCK].iter_mut().zip(costs).zip(least) {
-            *stored = (cost - least).clipped(clip);
-        }
+    }
+}
+
+/// A block of lanes.
+#[inline(always)]
+pub(crate) fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
+    match lanes[at..].first_chunk() {
+        Some(block) => block,
+        None => panic!("rows are padded to whole blocks"),
     }
 }
 

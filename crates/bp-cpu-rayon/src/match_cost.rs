@@ -16,7 +16,7 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
     compare::compare_by,
-    costs::{self, Costs, Sums},
+    costs::{self, Costs, Sums, block},
     features::Features,
     layout::Layout,
     shape::{BLOCK, BlockStart, Column, STRIP, Strip},
@@ -94,7 +94,7 @@ impl Matching<'_> {
             self.layout,
             self.plan.clip(0),
             #[inline(always)]
-            |start, label| row.sum_of_differences(start, label),
+            |lane, label| [0, 1].map(|plane| row.sum_of_differences(BlockStart { plane, lane }, label)),
             stored,
             sums,
         ));
@@ -257,13 +257,4 @@ struct Block<'a> {
     inside: &'a [u8; BLOCK],
     /// 255 where the left image has a column, otherwise 0.
     node: &'a [u8; BLOCK],
-}
-
-/// A block of lanes.
-#[inline(always)]
-fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
-    match lanes[at..].first_chunk() {
-        Some(block) => block,
-        None => panic!("rows are padded to whole blocks"),
-    }
 }
