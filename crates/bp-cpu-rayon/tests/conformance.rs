@@ -118,3 +118,21 @@ fn memory_with_label_sets_does_not_depend_on_the_order_of_threads() {
     let all: BTreeSet<u64> = (0..20).map(bytes).collect();
     assert_eq!(all.len(), 1, "{all:?}");
 }
+
+/// With more labels than columns to the left, most nodes are matched partly outside the right image; rows end inside a vector.
+#[test]
+fn borders_of_the_right_image_are_exact() {
+    for (width, labels, min_disparity) in
+        [(300, 240, 0), (257, 200, -90), (130, 255, 3), (641, 64, -64), (513, 40, 200)]
+    {
+        let pair = noise_pair(width, 37, width as u64);
+        for (device, profile) in [Profile::Census, Profile::Gradient, Profile::CensusRgb].into_iter().enumerate() {
+            let model = Model::new(profile, labels).unwrap().with_min_disparity(min_disparity).unwrap();
+            let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+            let plan = Plan::new(pair.size(), model, Settings { label_sets: true, ..settings }).unwrap();
+            let case = Case { plan, pair: pair.clone() };
+            let device = device % Rayon.devices().len();
+            assert!(solve_on(device, 1, &case) == solve(&Scalar, &case).unwrap(), "{width} {labels} {profile:?}");
+        }
+    }
+}

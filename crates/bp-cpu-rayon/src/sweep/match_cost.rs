@@ -113,7 +113,8 @@ impl Matching<'_> {
         run(simd, &Squares { rows, spans, cost }, first..first + SPANS * BLOCK, self, to)
     }
 
-    /// Loads the lanes of the left image from `first` on. Those beyond the image count as zeros.
+    /// Loads the lanes of the left image from `first` on. Those beyond the image count as zeros. A row may lack a second span;
+    /// then this loads the first one again.
     #[inline(always)]
     fn lanes<S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize>(
         &self,
@@ -122,8 +123,9 @@ impl Matching<'_> {
         first: usize,
     ) -> Lanes<V, CHANNELS, ROWS> {
         let exists = first < self.layout.lanes;
-        let first = if exists { first } else { 0 };
-        let left = |row: usize, plane: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
+        let first = if exists { first } else { first - BLOCK };
+        let left =
+            |row: usize, plane: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
         let node = |plane: usize| rows.load(self.features.inside(plane), BLOCK + first);
         Lanes {
             first: first as i32,
@@ -268,15 +270,24 @@ where
 
 /// Writes the costs for all labels and returns the least of each node. `lanes` are those of the pixels.
 #[inline(always)]
-fn run<S: Simd>(simd: S, nodes: &impl Costs<S>, lanes: Range<usize>, matching: &Matching<'_>, to: To<'_>) -> [Block; 2] {
+fn run<S: Simd>(
+    simd: S,
+    nodes: &impl Costs<S>,
+    lanes: Range<usize>,
+    matching: &Matching<'_>,
+    to: To<'_>,
+) -> [Block; 2] {
     let To { labels, costs: [even, odd] } = to;
     let inside = inside(matching, lanes, labels);
     let mut least = [Bytes::<S>::splat(simd, u8::MAX); 2];
     for (i, ((&label, even), odd)) in labels.iter().zip(even).zip(odd).enumerate() {
         let disparity = matching.plan.model().min_disparity() + i32::from(label);
         let held = [&*even, &*odd];
-        let costs =
-            if inside.contains(&i) { nodes.costs::<true>(disparity, held) } else { nodes.costs::<false>(disparity, held) };
+        let costs = if inside.contains(&i) {
+            nodes.costs::<true>(disparity, held)
+        } else {
+            nodes.costs::<false>(disparity, held)
+        };
         even.store(costs[0]);
         odd.store(costs[1]);
         least = [least[0].min(costs[0]), least[1].min(costs[1])];
@@ -284,10 +295,11 @@ fn run<S: Simd>(simd: S, nodes: &impl Costs<S>, lanes: Range<usize>, matching: &
     least.map(|least| Block(least.into()))
 }
 
-/// The labels, which ascend, under which all pixels of these lanes are matched with pixels of the image.
+/// The labels, which ascend, under which all pixels in these lanes are matched with pixels of the image.
 fn inside(matching: &Matching<'_>, lanes: Range<usize>, labels: &[u16]) -> Range<usize> {
+    let nodes = [0, 1].map(|plane| matching.layout.nodes(plane));
     // The lane of even columns moves by -d div 2, rounded down, and that of odd columns by (1 - d) div 2.
-    let least = 2 * (lanes.end as i32 - matching.layout.nodes(1) as i32);
+    let least = 2 * (lanes.end.min(nodes[0]) as i32 - nodes[1] as i32);
     let most = 2 * lanes.start as i32;
     let disparity = |label: u16| matching.plan.model().min_disparity() + i32::from(label);
     let start = labels.partition_point(|&label| disparity(label) < least);
