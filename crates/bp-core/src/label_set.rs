@@ -1,4 +1,4 @@
-//! Label sets: the few labels that nodes of the two finest grids may take.
+//! Label sets: the few labels that nodes of the finest grids may take.
 
 use std::{array, ops::Range};
 
@@ -59,6 +59,13 @@ impl LabelSet {
 
     /// How far a label may lie from a coarser label.
     const REACH: usize = 2;
+
+    /// The number of grids that have label sets with so many labels, from the finest one on, if there are coarser ones: two, and
+    /// from 448 on three, because the third one's labels would be most of the work.
+    #[must_use]
+    pub const fn grids(labels: usize) -> usize {
+        if labels < 448 { 2 } else { 3 }
+    }
 
     /// All labels below `labels`, which is at most [`MAX_LABELS`].
     #[must_use]
@@ -175,5 +182,6 @@ mod tests {
         assert_eq!(LabelSet::of(&plan(false), 0, &patch, &coarser), LabelSet::all(70));
         assert_eq!(LabelSet::all(70).count(), 70);
         assert_eq!([0, 1, 2].map(|grid| plan(true).has_label_sets(grid)), [true, true, false]);
+        assert_eq!([447, 448].map(LabelSet::grids), [2, 3]);
     }
 }

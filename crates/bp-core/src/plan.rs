@@ -3,7 +3,7 @@
 mod traffic;
 mod updates;
 
-use crate::{Error, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
+use crate::{Error, LabelSet, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
 
 /// The most grids of a plan. This many reduce the longest side, [`crate::MAX_SIDE`], to 1.
 pub const MAX_GRIDS: u32 = 25;
@@ -131,10 +131,20 @@ impl Plan {
         if grid > 0 && self.settings.coarse_clip { truncation + truncation / 2 } else { self.model.clip() }
     }
 
-    /// Whether the nodes of a grid have label sets: on grids 0 and 1 of at least three, under [`Settings::label_sets`].
+    /// Whether the nodes of a grid have label sets, under [`Settings::label_sets`]: those finer than
+    /// [`Plan::finest_with_all_labels`].
     #[must_use]
     pub fn has_label_sets(&self, grid: usize) -> bool {
-        self.settings.label_sets && self.grids() > 2 && grid < 2
+        grid < self.finest_with_all_labels()
+    }
+
+    /// The finest grid without label sets: 0, if no grid has any.
+    #[must_use]
+    pub fn finest_with_all_labels(&self) -> usize {
+        if !self.settings.label_sets || self.grids() < 3 {
+            return 0;
+        }
+        LabelSet::grids(self.model.labels()).min(self.grids() - 1)
     }
 
     /// Whether the labels of a grid are decided: those of grid 0, and those that determine label sets.
@@ -143,7 +153,8 @@ impl Plan {
         grid.checked_sub(1).is_none_or(|finer| self.has_label_sets(finer))
     }
 
-    /// The number of labels that determine label sets: those of grid 2, then those of grid 1 in their place.
+    /// The most labels that determine the label sets of a grid: those of grid 1. The labels of coarser grids lie in the same
+    /// place before.
     #[must_use]
     pub fn coarser_labels(&self) -> usize {
         if self.has_label_sets(0) { self.size(1).pixels() } else { 0 }

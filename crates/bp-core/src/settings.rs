@@ -240,11 +240,12 @@ pub struct Settings {
     /// coarser grids stay unclipped. Clipping lowers the energy and the root mean squared error of [`Algorithm::Sweep`].
     /// It is off for the algorithms of the thesis.
     pub coarse_clip: bool,
-    /// Whether the nodes of grids 1 and 0 may take only the labels that the next coarser grid's answer makes likely, see
-    /// [`LabelSet`](crate::LabelSet). Only under [`Schedule::Sweep`], and without effect on fewer than three grids.
+    /// Whether the nodes of the finest grids ([`LabelSet::grids`](crate::LabelSet::grids)) may take only the labels that the
+    /// next coarser grid's answer makes likely, see [`LabelSet`](crate::LabelSet). Only under [`Schedule::Sweep`], and without
+    /// effect on fewer than three grids. The coarsest grid always has all labels.
     ///
-    /// The labels of grids 2 and 1 are decided as those of grid 0. Then the nodes of each [`Patch`](crate::Patch) of the next
-    /// finer grid share a set, and other labels do not exist for them:
+    /// The labels of the coarser grid are decided as those of grid 0. Then the nodes of each [`Patch`](crate::Patch) of the
+    /// next finer grid share a set, and other labels do not exist for them:
     ///
     /// - The data cost of a node is that of its set's labels, less the least of these, clipped as usual.
     /// - A message has a value for each label of the receiver's set: the least, over the labels a of the sender's set, of

@@ -19,7 +19,7 @@ pub(crate) struct ScalarSolver {
     /// needed at the same time.
     messages: Vec<Messages>,
     seams: Seams,
-    /// The labels of grid 2, then those of grid 1, if they determine label sets.
+    /// The labels that determine the label sets of the next grid. Every grid's overwrite the coarser ones'.
     coarser: Vec<u16>,
     scratch: Vec<u64>,
     h: Vec<u8>,

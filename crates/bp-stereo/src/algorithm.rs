@@ -20,7 +20,7 @@ pub enum Algorithm {
         /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
         #[serde(default = "yes")]
         coarse_clip: bool,
-        /// Whether the two finest grids try only the labels that the coarser ones make likely; see
+        /// Whether the finest grids try only the labels that the coarser ones make likely; see
         /// [`Settings::label_sets`]. `None` means from 32 labels on.
         #[serde(default)]
         label_sets: Option<bool>,
@@ -114,7 +114,7 @@ pub struct Hierarchy {
     pub message_start: MessageStart,
     /// Whether the data costs of coarse grids are clipped; see [`Settings::coarse_clip`].
     pub coarse_clip: bool,
-    /// Whether the two finest grids try only the labels that the coarser ones make likely; see [`Settings::label_sets`].
+    /// Whether the finest grids try only the labels that the coarser ones make likely; see [`Settings::label_sets`].
     /// Needs [`Schedule::Sweep`].
     pub label_sets: bool,
 }

@@ -30,7 +30,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
     whole.chain(strips()).chain(label_sets())
 }
 
-/// Plans whose label sets differ between patches, bands and seams, on both grids that have any.
+/// Plans whose label sets differ between patches, bands and seams, on two or three grids.
 fn label_sets() -> impl Iterator<Item = Case> {
     let plain = |profile, labels| Model::new(profile, labels);
     let weak = |profile, slope, truncation| {
@@ -41,6 +41,7 @@ fn label_sets() -> impl Iterator<Item = Case> {
         ((65, 135), weak(Profile::Census, 4, 15)),
         ((200, 40), plain(Profile::Gradient, 33)),
         ((135, 9), weak(Profile::Mrf, 3, 63)),
+        ((40, 135), plain(Profile::Census, 450)),
     ];
     models.into_iter().filter_map(|(size, model)| Some((size, model.ok()?))).flat_map(|((width, height), model)| {
         let pair = stepped_pair(width, height, model.labels());

@@ -132,7 +132,7 @@ pub(crate) struct PlanArgs {
     /// Whether to clip the data costs of coarse grids at K + K div 2. [default: on for sweep, else off]
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) coarse_clip: Option<bool>,
-    /// Whether the two finest grids try only the labels that the coarser ones make likely. [default: on for sweep from 32
+    /// Whether the finest grids try only the labels that the coarser ones make likely. [default: on for sweep from 32
     /// labels on, else off]
     ///
     /// This is faster and needs less memory. Needs the schedule sweep and at least three grids.

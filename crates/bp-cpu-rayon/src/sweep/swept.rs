@@ -25,8 +25,8 @@ pub(crate) struct Swept {
     /// The bands of grids of even index from 2 on and of odd index: only a grid and the next coarser one are needed at the
     /// same time.
     bands: [Vec<Band>; 2],
-    /// The labels of grids 0, 1 and 2, where they are decided.
-    labels: [Vec<u16>; 3],
+    /// The labels of all grids where they are decided, from the finest one on.
+    labels: Vec<Vec<u16>>,
     /// The message entries computed so far in a solve.
     updates: AtomicU64,
 }
@@ -46,11 +46,11 @@ fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
     [patches, patches.saturating_mul(plan.model().labels())]
 }
 
-/// The grids whose bands are the largest of those of even and of odd index that keep any, under `sweep`.
-fn kept(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
+/// The grids from `first` on whose bands are the largest of those of even and of odd index that keep any, under `sweep`.
+fn kept(plan: &Plan, first: usize) -> impl Iterator<Item = usize> + use<> {
     let swept = plan.settings().schedule == Schedule::Sweep;
     let grids = plan.grids();
-    [1, 2].into_iter().filter(move |&grid| swept && grid < grids)
+    [first, first + 1].into_iter().filter(move |&grid| swept && grid < grids)
 }
 
 /// The rows of the bands of a grid.
@@ -59,20 +59,20 @@ fn band_rows(plan: &Plan, grid: usize) -> impl Iterator<Item = usize> + use<> {
     (0..height).step_by(BAND_ROWS).map(move |first| BAND_ROWS.min(height - first))
 }
 
-/// The number of labels of a grid that are decided and kept.
-fn decided(plan: &Plan, grid: usize) -> usize {
+/// For each grid whose labels are decided and kept, their number.
+fn decided(plan: &Plan) -> impl Iterator<Item = usize> + use<'_> {
     let swept = plan.settings().schedule == Schedule::Sweep;
-    if swept && grid < plan.grids() && plan.decides_labels(grid) { plan.size(grid).pixels() } else { 0 }
+    (0..plan.grids()).filter(move |&grid| swept && plan.decides_labels(grid)).map(|grid| plan.size(grid).pixels())
 }
 
 /// The most bytes that [`Swept`] will hold.
 pub(crate) fn bytes(plan: &Plan) -> u64 {
     let [patches, entries] = most_entries(plan, 0);
-    let bands = kept(plan).flat_map(|grid| {
+    let bands = kept(plan, 1).flat_map(|grid| {
         let [patches, entries] = most_entries(plan, grid);
         band_rows(plan, grid).map(move |rows| band_bytes(rows, patches, entries))
     });
-    let labels = (0..3).map(|grid| (decided(plan, grid) * size_of::<u16>()) as u64);
+    let labels = decided(plan).map(|labels| (labels * size_of::<u16>()) as u64);
     let windows = windows::bytes(plan, patches, entries);
     let seams = seams::bytes(plan, patches, entries);
     bands.chain(labels).chain([windows, seams]).fold(0, u64::saturating_add)
@@ -86,21 +86,23 @@ fn prepared(seam: &mut Seams) -> &mut Prepared {
 impl Swept {
     /// Allocates everything, except for what label sets make shorter.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
-        let labels = |grid| memory::filled("labels", decided(plan, grid), 0);
+        let base = plan.finest_with_all_labels();
         let mut bands = [Vec::new(), Vec::new()];
-        for grid in kept(plan) {
+        for grid in kept(plan, base.max(1)) {
             let [patches, entries] = most_entries(plan, grid);
-            let restricted = plan.has_label_sets(grid);
-            let band = |rows| if restricted { Ok(Band::default()) } else { Band::new(rows, patches, entries) };
+            let band = |rows| Band::new(rows, patches, entries);
             bands[grid % 2] = band_rows(plan, grid).map(band).collect::<Result<_, _>>()?;
+        }
+        for grid in kept(plan, 1) {
+            bands[grid % 2].resize_with(band_rows(plan, grid).count(), Band::default);
         }
         let mut windows = Windows::new(plan);
         let mut seams = seams::prepared(plan)?;
-        // With label sets, grid 2 is the first that needs room for all labels.
-        let [patches, entries] = most_entries(plan, if plan.has_label_sets(0) { 2 } else { 0 });
+        let [patches, entries] = most_entries(plan, base);
         windows.fit(plan, patches, entries)?;
         seams.iter_mut().map(prepared).try_for_each(|seam| seam.fit(patches, entries))?;
-        Ok(Self { windows, seams, bands, labels: [labels(0)?, labels(1)?, labels(2)?], updates: AtomicU64::new(0) })
+        let labels = decided(plan).map(|labels| memory::filled("labels", labels, 0)).collect::<Result<_, _>>()?;
+        Ok(Self { windows, seams, bands, labels, updates: AtomicU64::new(0) })
     }
 
     /// Runs all loops on a grid. Keeps the messages of grids from 1 on, and decides labels where they are needed.
@@ -157,7 +159,7 @@ impl Swept {
 
     /// The labels of the image.
     pub(crate) fn labels(&self) -> &[u16] {
-        &self.labels[0]
+        self.labels.first().map_or(&[], Vec::as_slice)
     }
 
     /// Sweeps grid 0 again and copies the messages received from `side`, `[height][width][labels]`.

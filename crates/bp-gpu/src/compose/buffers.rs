@@ -29,7 +29,7 @@ pub(crate) struct Buffers {
     /// The features of both images.
     pub(crate) features: [usize; 2],
     pub(crate) seed: usize,
-    /// The labels of grids 0, 1 and 2, where they are decided.
+    /// The labels of all grids where they are decided, from the finest one on.
     pub(crate) labels: Vec<usize>,
     /// The label sets of a grid, if any has some.
     pub(crate) label_sets: Option<usize>,
@@ -60,7 +60,7 @@ impl Buffers {
             images: [(); 2].map(|()| device("images", image_bytes(size))),
             features: [(); 2].map(|()| device("features", features)),
             seed: device("seed", SEED_BYTES),
-            labels: (0..plan.grids().min(3))
+            labels: (0..plan.grids())
                 .filter(|&grid| plan.decides_labels(grid))
                 .map(|grid| device("labels", label_bytes(plan.size(grid))))
                 .collect(),
