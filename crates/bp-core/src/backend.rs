@@ -107,6 +107,12 @@ pub trait Device: Send + Sync {
         plan.bytes()
     }
 
+    /// The bytes that a solver will probably hold in the end: with label sets, possibly fewer than planned. By default
+    /// [`Device::planned_bytes`].
+    fn likely_bytes(&self, plan: &Plan) -> u64 {
+        self.planned_bytes(plan)
+    }
+
     /// Measures the total bytes per second that the device reads and writes while it copies its own memory. This is an
     /// upper bound for its kernels. `None` if the rate is not meaningful.
     ///
@@ -201,4 +207,10 @@ pub trait Solver: Send {
 
     /// The bytes that this solver has actually allocated.
     fn allocated_bytes(&self) -> u64;
+
+    /// Sets the most bytes that it may allocate. A solver that allocates nothing after [`Device::prepare`] ignores this.
+    /// Others return [`Error::OutOfMemory`] from [`Solver::update_messages`] before they would exceed it.
+    fn limit_bytes(&mut self, bytes: u64) {
+        let _ = bytes;
+    }
 }

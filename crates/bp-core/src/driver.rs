@@ -79,6 +79,12 @@ impl Driver {
         self.solver.allocated_bytes() + memory::bytes(&self.labels)
     }
 
+    /// Makes solves fail with [`Error::OutOfMemory`] rather than allocate more than so many bytes in all, where label sets
+    /// determine what is needed.
+    pub(crate) fn limit_bytes(&mut self, bytes: u64) {
+        self.solver.limit_bytes(bytes.saturating_sub(memory::bytes(&self.labels)));
+    }
+
     /// The time that [`Driver::new`] spent on compiling kernels, if the device compiles any.
     #[must_use]
     pub fn compile_time(&self) -> Option<Duration> {

@@ -63,7 +63,8 @@ impl Tiled {
     }
 
     /// Matches a pair on the same device as in [`Tiled::new`]. [`Tiled::labels`] and [`Tiled::disparities`] hold the result
-    /// until the next solve. Stage times are summed over all tiles. The total includes preparing tiles of other sizes.
+    /// until the next solve. Stage times are summed over all tiles. The total includes preparing tiles of other sizes. If the
+    /// tiles need more memory than was likely, it starts again with smaller ones.
     ///
     /// # Errors
     /// As [`Driver::solve_observed`], and those of [`Device::prepare`].
@@ -78,6 +79,21 @@ impl Tiled {
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
         let start = Instant::now();
+        let mut times = self.solve_tiles(device, pair, observer);
+        if let (Err(Error::OutOfMemory { .. }), Some(certain)) = (&times, self.tiling.certain().cloned()) {
+            log::debug!("label sets need more memory than is usual: {:?} tiles instead", certain.counts());
+            (self.tiling, self.driver) = (certain, None);
+            times = self.solve_tiles(device, pair, observer);
+        }
+        times.map(|times| Times { total: start.elapsed(), ..times })
+    }
+
+    fn solve_tiles(
+        &mut self,
+        device: &dyn Device,
+        pair: &StereoPair,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
         self.updates = 0;
         let (mut times, mut done, total) = (Times::default(), 0, self.tiling.message_updates());
         for tile in self.tiling.tiles() {
@@ -91,7 +107,6 @@ impl Tiled {
             self.driver = Some(driver);
             times += solved?;
         }
-        times.total = start.elapsed();
         Ok(times)
     }
 
@@ -147,10 +162,11 @@ impl Tiled {
     /// Takes the current driver if it fits the tile. Otherwise frees it and prepares the tile's plan.
     fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
         let plan = tile.plan(self.tiling.plan())?;
-        let driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
+        let mut driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
             Some(driver) => driver,
             None => Driver::new(device, plan)?,
         };
+        driver.limit_bytes(self.tiling.limit(tile).unwrap_or(u64::MAX));
         self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
         Ok(driver)
     }

@@ -99,6 +99,10 @@ impl Device for RayonDevice {
         solver::planned_bytes(plan)
     }
 
+    fn likely_bytes(&self, plan: &Plan) -> u64 {
+        solver::likely_bytes(plan)
+    }
+
     fn copy_rate(&self) -> Result<Option<f64>, Error> {
         let threads = rayon::current_num_threads();
         let copy = |from: &[u8], to: &mut [u8]| {

@@ -29,6 +29,8 @@ pub(crate) struct RayonSolver {
     /// Whether grid 0 starts with the messages that it already holds.
     keeps_messages: bool,
     seed: Option<Seed>,
+    /// The most bytes to allocate.
+    limit: u64,
 }
 
 /// The messages of one grid, in two sets.
@@ -54,13 +56,24 @@ fn has_sets(plan: &Plan) -> bool {
 
 /// The bytes that a solver will allocate, or with label sets the most that it may allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
+    bytes(plan, plan.model().labels())
+}
+
+/// The bytes that a solver will probably allocate. Of public pairs with 64 to 240 labels, label sets hold less than this.
+pub(crate) fn likely_bytes(plan: &Plan) -> u64 {
+    let labels = plan.model().labels();
+    bytes(plan, labels.min(16 + labels / 5))
+}
+
+/// The bytes that a solver will allocate, if label sets hold this many labels.
+fn bytes(plan: &Plan, labels: usize) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
     let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
     let messages = kept.map(|grid| 2 * half_steps::bytes(&Shape::new(plan, grid)) as u64);
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let features = features::bytes(plan.image_size(), plan.model());
-    costs.chain(messages).chain(layouts).chain([features, sweep::bytes(plan)]).fold(0, u64::saturating_add)
+    costs.chain(messages).chain(layouts).chain([features, sweep::bytes(plan, labels)]).fold(0, u64::saturating_add)
 }
 
 impl RayonSolver {
@@ -78,6 +91,7 @@ impl RayonSolver {
             swept: Swept::new(plan)?,
             keeps_messages: false,
             seed: None,
+            limit: u64::MAX,
             plan: plan.clone(),
         })
     }
@@ -174,7 +188,7 @@ impl Solver for RayonSolver {
         if self.plan.settings().schedule == Schedule::Sweep {
             // All loops of a band run together, at the last step.
             let is_last = steps.end == self.plan.settings().steps;
-            return if is_last { self.with_swept(|swept, solver| swept.run(&solver.grid(grid))) } else { Ok(()) };
+            return if is_last { self.with_swept(|swept, solver| solver.sweep(grid, swept)) } else { Ok(()) };
         }
         let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
@@ -228,9 +242,22 @@ impl Solver for RayonSolver {
         let layouts: u64 = self.layouts.iter().map(Layout::bytes).sum();
         self.features.bytes() + costs + messages + layouts + self.swept.bytes()
     }
+
+    fn limit_bytes(&mut self, bytes: u64) {
+        self.limit = bytes;
+    }
 }
 
 impl RayonSolver {
+    /// Sweeps a grid, if there is room.
+    fn sweep(&self, grid: usize, swept: &mut Swept) -> Result<(), Error> {
+        let grid = self.grid(grid);
+        if self.limit < u64::MAX {
+            swept.check_room(&grid, self.limit.saturating_sub(self.allocated_bytes()))?;
+        }
+        swept.run(&grid)
+    }
+
     /// Calls `run` with what is swept, which it may change while it reads everything else.
     fn with_swept(&mut self, run: impl FnOnce(&mut Swept, &Self) -> Result<(), Error>) -> Result<(), Error> {
         let mut swept = std::mem::take(&mut self.swept);

@@ -7,7 +7,7 @@ use bp_core::{
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
-use bp_testkit::{noise_pair, synthetic};
+use bp_testkit::{noise_pair, stepped_pair, synthetic};
 
 fn whole(device: &dyn Device, pair: &StereoPair, plan: &Plan) -> Vec<u16> {
     let mut driver = Driver::new(device, plan.clone()).unwrap();
@@ -101,4 +101,32 @@ fn progress_is_of_all_tiles_and_the_answer_outlives_them() {
     tiled.free_tiles();
     assert!(tiled.labels().len() == 90 * 140 && tiled.labels().iter().any(|&label| label > 0));
     assert!(tiled.messages(Side::Left).is_err());
+}
+
+/// Label sets that need more memory than expected are matched in smaller tiles instead.
+#[test]
+fn tiles_stay_within_the_limit_whatever_the_label_sets() {
+    let (size, labels) = (Size { width: 1000, height: 900 }, 200);
+    let device = Rayon.open(0).unwrap();
+    let settings = Settings { label_sets: true, ..Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep) };
+    let plan = Plan::new(size, Model::new(Profile::Census, labels).unwrap(), settings).unwrap();
+    let limit = device.planned_bytes(&plan) / 3;
+    let pair = stepped_pair(size.width, size.height, labels);
+    let within = |share: u64| {
+        let needed = |plan: &Plan| Ok(device.planned_bytes(plan));
+        let likely = |plan: &Plan| Ok(device.likely_bytes(plan) / share);
+        let tiling = Tiling::within(&plan, limit, &needed, &likely).unwrap();
+        let mut tiled = Tiled::new(device.as_ref(), tiling.clone()).unwrap();
+        tiled.solve(device.as_ref(), &pair).unwrap();
+        assert!(tiled.allocated_bytes() <= limit, "{} of {limit}", tiled.allocated_bytes());
+        (tiling, tiled)
+    };
+    let (expected, tiled) = within(1);
+    assert!(expected.certain().is_some() && *tiled.tiling() == expected);
+    let (hoped_for, tiled) = within(3);
+    let certain = hoped_for.certain().unwrap();
+    assert_eq!(tiled.tiling(), certain);
+    let mut small = Tiled::new(device.as_ref(), certain.clone()).unwrap();
+    small.solve(device.as_ref(), &pair).unwrap();
+    assert_eq!(tiled.labels(), small.labels());
 }

@@ -232,7 +232,8 @@ impl Prepared {
         let total = updates.saturating_mul(if options.needs_right() { 2 } else { 1 });
         let mut done = 0_u64;
         finished(options, pair, |pair: &StereoPair| -> Result<(Times, DisparityMap), Error> {
-            let observer = &mut |progress: Progress| watch.progress(done.saturating_add(progress.done), total);
+            let observer =
+                &mut |progress: Progress| watch.progress(done.saturating_add(progress.done).min(total), total);
             let times = match start {
                 Start::Cold => tiled.solve_observed(device, pair, observer)?,
                 Start::Warm => tiled.solve_warm_observed(device, pair, observer)?,

@@ -80,7 +80,11 @@ pub(crate) fn fitted(
         Ok(opened.device.planned_bytes(tile).saturating_add(kept))
     };
     let room = limit.bytes.saturating_sub(bytes.held + bytes.coming);
-    let tiling = match Tiling::within(plan, room, &needed) {
+    let likely = |tile: &Plan| {
+        opened.device.check(tile)?;
+        Ok(opened.device.likely_bytes(tile))
+    };
+    let tiling = match Tiling::within(plan, room, &needed, &likely) {
         Err(bp_core::Error::OutOfMemory { needed, available, .. }) if available == Some(room) => {
             return Err(limit.refuse(plan, bytes.peak(needed)));
         }

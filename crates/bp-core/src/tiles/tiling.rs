@@ -40,6 +40,15 @@ pub struct Tiling {
     plan: Plan,
     columns: Vec<Span>,
     rows: Vec<Span>,
+    likely: Option<Likely>,
+}
+
+/// Tiles that run within some bytes unless label sets turn out larger than usual.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Likely {
+    bytes: u64,
+    /// Tiles that do in any case.
+    certain: Box<Tiling>,
 }
 
 impl Tiling {
@@ -47,7 +56,8 @@ impl Tiling {
     #[must_use]
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
-        Self { plan, columns: spans(width, width, Margin::default()), rows: spans(height, height, Margin::default()) }
+        let whole = |length| spans(length, length, Margin::default());
+        Self { plan, columns: whole(width), rows: whole(height), likely: None }
     }
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
@@ -64,29 +74,48 @@ impl Tiling {
         let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
         let columns = spans(width, kept.width.next_multiple_of(align.width), Margin { before: left, after: right });
         let rows = spans(height, kept.height.next_multiple_of(align.height), Margin { before: beyond, after: beyond });
-        Self { plan, columns, rows }
+        Self { plan, columns, rows, likely: None }
     }
 
     /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that need the least
-    /// work in total. `needed` returns how many bytes a device needs for a plan, or why it cannot run it.
+    /// work in total. `needed` returns the most bytes that a device needs for a plan, or why it cannot run it. `likely` returns
+    /// fewer, if it probably needs no more. Tiles that only probably fit are replaced by others if they do not, see
+    /// [`Tiling::certain`].
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] with the bytes that the smallest tiles need, or the reason why they cannot run.
-    pub fn within(plan: &Plan, bytes: u64, needed: &Needed<'_>) -> Result<Self, Error> {
-        let fits = |tiling: &Self| tiling.bytes(needed).is_ok_and(|needed| needed <= bytes);
+    pub fn within(plan: &Plan, bytes: u64, needed: &Needed<'_>, likely: &Needed<'_>) -> Result<Self, Error> {
+        let fits = |tiling: &Self, needed: &Needed<'_>| tiling.bytes(needed).is_ok_and(|needed| needed <= bytes);
         let whole = Self::whole(plan.clone());
-        if fits(&whole) {
+        if fits(&whole, needed) {
             return Ok(whole);
         }
-        let tiles = heights(plan).filter_map(|height| widest(plan, height, fits));
-        match tiles.min_by(|a, b| a.work().total_cmp(&b.work())) {
-            Some(tiling) => Ok(tiling),
-            None => {
-                let smallest = Self::cut(plan.clone(), Size { width: 1, height: 1 }, HALO);
-                let needed = smallest.bytes(needed)?;
-                Err(Error::OutOfMemory { what: "the smallest tiles", needed, available: Some(bytes) })
-            }
-        }
+        let best = |needed: &Needed<'_>| {
+            let tiles = heights(plan).filter_map(|height| widest(plan, height, |tiling| fits(tiling, needed)));
+            tiles.filter(|tiling| !tiling.is_whole()).min_by(|a, b| a.work().total_cmp(&b.work()))
+        };
+        let Some(certain) = best(needed) else {
+            let smallest = Self::cut(plan.clone(), Size { width: 1, height: 1 }, HALO);
+            let needed = smallest.bytes(needed)?;
+            return Err(Error::OutOfMemory { what: "the smallest tiles", needed, available: Some(bytes) });
+        };
+        let tiling = best(likely).filter(|tiling| tiling.work() < certain.work());
+        Ok(match tiling {
+            Some(tiling) => Self { likely: Some(Likely { bytes, certain: Box::new(certain) }), ..tiling },
+            None => certain,
+        })
+    }
+
+    /// The tiling to use if these tiles need more memory than is there. `None` if they cannot.
+    #[must_use]
+    pub fn certain(&self) -> Option<&Self> {
+        self.likely.as_ref().map(|likely| &*likely.certain)
+    }
+
+    /// The bytes that matching a tile must not exceed, if it could.
+    pub(super) fn limit(&self, tile: &Tile) -> Option<u64> {
+        let beside = tile.pair_bytes(self.plan.image_size()).saturating_add(self.label_bytes());
+        self.likely.as_ref().map(|likely| likely.bytes.saturating_sub(beside))
     }
 
     /// The plan of the whole image.
@@ -138,7 +167,7 @@ impl Tiling {
         plans.fold(0, |sum: u64, plan| sum.saturating_add(plan.message_updates()))
     }
 
-    /// The bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the
+    /// The most bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the
     /// labels of all tiles.
     ///
     /// # Errors
@@ -155,7 +184,13 @@ impl Tiling {
                 most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.image_size())));
             }
         }
-        Ok(most.saturating_add(2 * self.plan.image_size().pixels() as u64))
+        let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);
+        Ok(most.saturating_add(self.label_bytes()).min(limit))
+    }
+
+    /// The bytes of the labels of all tiles.
+    fn label_bytes(&self) -> u64 {
+        2 * self.plan.image_size().pixels() as u64
     }
 
     /// The number of matched pixels per pixel of the image.
@@ -221,7 +256,7 @@ mod tests {
     }
 
     fn within(plan: &Plan, bytes: u64) -> Tiling {
-        let tiling = Tiling::within(plan, bytes, &needed).unwrap();
+        let tiling = Tiling::within(plan, bytes, &needed, &needed).unwrap();
         assert!(tiling.bytes(&needed).unwrap() <= bytes, "{:?}", tiling.counts());
         tiling
     }
@@ -238,12 +273,25 @@ mod tests {
             assert!(tiling.work() > work);
             work = tiling.work();
         }
-        let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed) else {
+        let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed, &needed)
+        else {
             panic!()
         };
         assert_eq!(available, Some(1));
         assert_eq!(within(&plan, least).likeness(), Likeness::Near);
-        assert!(Tiling::within(&plan, least - 1, &needed).is_err());
+        assert!(Tiling::within(&plan, least - 1, &needed, &needed).is_err());
+    }
+
+    #[test]
+    fn tiles_that_probably_fit_are_larger_and_know_those_that_certainly_do() {
+        let plan = plan((1500, 3000), 64, Algorithm::Sweep);
+        let bytes = plan.bytes() / 5;
+        let certain = within(&plan, bytes);
+        let likely = |plan: &Plan| Ok(plan.bytes() / 2);
+        let tiling = Tiling::within(&plan, bytes, &needed, &likely).unwrap();
+        assert!(tiling.work() < certain.work() && tiling.bytes(&needed).unwrap() == bytes);
+        assert_eq!((tiling.certain(), certain.certain()), (Some(&certain), None));
+        assert_eq!(Tiling::within(&plan, plan.bytes() / 2, &needed, &likely).unwrap().counts(), (1, 2), "not whole");
     }
 
     #[test]
@@ -267,10 +315,10 @@ mod tests {
             Size { width: 0..=400, .. } => needed(plan),
             _ => Err(Error::Plan("too wide")),
         };
-        let tiling = Tiling::within(&plan, u64::MAX, &narrow).unwrap();
+        let tiling = Tiling::within(&plan, u64::MAX, &narrow, &narrow).unwrap();
         assert!(tiling.tile_size().width <= 400);
         let nothing = |_: &Plan| Err(Error::Plan("too small"));
-        assert_eq!(Tiling::within(&plan, u64::MAX, &nothing), Err(Error::Plan("too small")));
+        assert_eq!(Tiling::within(&plan, u64::MAX, &nothing, &nothing), Err(Error::Plan("too small")));
     }
 
     #[test]

@@ -1,12 +1,16 @@
 //! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
 
-use std::sync::{
-    PoisonError,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    ops::Range,
+    sync::{
+        PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
-use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Side, memory};
+use bp_core::{BAND_ROWS, Error, LabelSet, Patch, Plan, Schedule, Seam, Side, memory};
 use fearless_simd::Level;
+use rayon::prelude::*;
 
 use super::{
     Band, CostSource, Sweep, Windows, band_bytes,
@@ -65,17 +69,25 @@ fn decided(plan: &Plan) -> impl Iterator<Item = usize> + use<'_> {
     (0..plan.grids()).filter(move |&grid| swept && plan.decides_labels(grid)).map(|grid| plan.size(grid).pixels())
 }
 
-/// The most bytes that [`Swept`] will hold.
-pub(crate) fn bytes(plan: &Plan) -> u64 {
-    let [patches, entries] = most_entries(plan, 0);
-    let bands = kept(plan, 1).flat_map(|grid| {
+/// The bytes that [`Swept`] will hold, if label sets hold this many labels.
+pub(crate) fn bytes(plan: &Plan, labels: usize) -> u64 {
+    let entries = |grid: usize| {
         let [patches, entries] = most_entries(plan, grid);
-        band_rows(plan, grid).map(move |rows| band_bytes(rows, patches, entries))
+        [patches, if plan.has_label_sets(grid) { patches.saturating_mul(labels) } else { entries }]
+    };
+    let bands = (1..plan.grids()).map(|grid| {
+        let [patches, entries] = entries(grid);
+        band_rows(plan, grid).map(|rows| band_bytes(rows, patches, entries)).fold(0, u64::saturating_add)
     });
-    let labels = decided(plan).map(|labels| (labels * size_of::<u16>()) as u64);
-    let windows = windows::bytes(plan, patches, entries);
-    let seams = seams::bytes(plan, patches, entries);
-    bands.chain(labels).chain([windows, seams]).fold(0, u64::saturating_add)
+    // Grids of even and of odd index share memory.
+    let mut most = [0; 2];
+    bands.zip([1, 0].into_iter().cycle()).for_each(|(bytes, parity)| most[parity] = bytes.max(most[parity]));
+    let bands = if plan.settings().schedule == Schedule::Sweep { most } else { [0; 2] };
+    let [patches, _] = most_entries(plan, 0);
+    let most = (0..plan.grids()).map(|grid| entries(grid)[1]).max().unwrap_or(0);
+    let kept = decided(plan).map(|labels| (labels * size_of::<u16>()) as u64);
+    let once = [windows::bytes(plan, patches, most), seams::bytes(plan, patches, most)];
+    bands.into_iter().chain(kept).chain(once).fold(0, u64::saturating_add)
 }
 
 /// A seam that no band uses.
@@ -103,6 +115,36 @@ impl Swept {
         seams.iter_mut().map(prepared).try_for_each(|seam| seam.fit(patches, entries))?;
         let labels = decided(plan).map(|labels| memory::filled("labels", labels, 0)).collect::<Result<_, _>>()?;
         Ok(Self { windows, seams, bands, labels, updates: AtomicU64::new(0) })
+    }
+
+    /// Checks that a grid whose label sets are known needs no more than `room` bytes.
+    pub(crate) fn check_room(&self, grid: &Grid<'_>, room: u64) -> Result<(), Error> {
+        let Grid { plan, index, .. } = *grid;
+        if !plan.has_label_sets(index) {
+            return Ok(());
+        }
+        let size = plan.size(index);
+        let coarser = &self.labels[index + 1];
+        let entries = |rows: Range<usize>| -> usize {
+            Patch::all(size.width, rows).map(|patch| LabelSet::of(plan, index, &patch, coarser).count()).sum()
+        };
+        let rows = |band: usize| band * BAND_ROWS..size.height.min((band + 1) * BAND_ROWS);
+        let bands: Vec<usize> =
+            (0..size.height.div_ceil(BAND_ROWS)).into_par_iter().map(|band| entries(rows(band))).collect();
+        let seams: Vec<usize> = Seam::all(size.height).map(|seam| entries(seam.rows())).collect();
+        let [patches, _] = most_entries(plan, 0);
+        let most = bands.iter().chain(&seams).copied().max().unwrap_or(0);
+        let kept = self.bands[index % 2].iter().map(Band::bytes).chain(std::iter::repeat(0)).zip(&bands).enumerate();
+        let kept = kept.map(|(band, (held, &entries))| held.max(band_bytes(rows(band).len(), patches, entries)));
+        let kept: u64 = if index > 0 { kept.sum() } else { 0 };
+        let needed = [kept, windows::bytes(plan, patches, most), seams::bytes(plan, patches, most)];
+        let held = [&self.bands[1 - index % 2]].into_iter().flatten().map(Band::bytes);
+        let labels = self.labels.iter().map(memory::bytes);
+        let needed = needed.into_iter().chain(held).chain(labels).fold(0, u64::saturating_add);
+        if needed <= room {
+            return Ok(());
+        }
+        Err(Error::OutOfMemory { what: "label sets", needed, available: Some(room) })
     }
 
     /// Runs all loops on a grid. Keeps the messages of grids from 1 on, and decides labels where they are needed.

@@ -59,7 +59,8 @@ fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     let energy = Energy::of(pair, plan.model(), &left)?;
     assert!(energy.total() <= most(plan), "{energy:?}");
     let needed = |plan: &Plan| Ok(fast.planned_bytes(plan));
-    let tilings = [Ok(Tiling::cut(plan.clone(), tile.0, tile.1)), Tiling::within(plan, *memory, &needed)];
+    let likely = |plan: &Plan| Ok(fast.likely_bytes(plan));
+    let tilings = [Ok(Tiling::cut(plan.clone(), tile.0, tile.1)), Tiling::within(plan, *memory, &needed, &likely)];
     tilings.into_iter().flatten().try_for_each(|tiling| tiles(&tiling, pair, &left, devices))?;
     let map = |labels: &[u16]| DisparityMap::from_labels(pair.size(), plan.model(), labels);
     finished(drawn.finish, map(&left), &map(&right).mirrored())?;
