@@ -95,32 +95,36 @@ impl Image {
         grey(self.row_near(y)[x.clamp(0, self.size.width as isize - 1) as usize])
     }
 
-    /// Copies some rows to a new image. Its apron holds the rows above and below them, so its data costs equal those of
-    /// the whole image.
+    /// Copies some rows to a new image; see [`Image::part`].
     ///
     /// # Panics
     /// If `rows` is empty or lies outside the image.
     #[must_use]
     pub fn strip(&self, rows: Range<usize>) -> Self {
-        assert!(rows.start < rows.end && rows.end <= self.size.height, "rows {rows:?} of an image of {}", self.size);
-        let width = self.size.width;
-        let (above, below) = (rows.start + self.above, self.size.height - rows.end + self.below);
-        let (above, below) = (above.min(APRON), below.min(APRON));
-        let known = rows.start + self.above - above..rows.end + self.above + below;
-        let pixels = self.pixels[known.start * width..known.end * width].to_vec();
-        Self { size: Size { width, height: rows.len() }, above, below, pixels: pixels.into() }
+        self.part(0..self.size.width, rows)
     }
 
-    /// Copies some columns, including those of the apron, to a new image. The other columns are not kept.
+    /// Copies some columns and rows to a new image. Its apron holds the rows above and below them, so the data costs of whole
+    /// rows equal those of the whole image. Other columns are not kept.
     ///
     /// # Panics
-    /// If `columns` is empty or lies outside the image.
+    /// If `columns` or `rows` is empty or lies outside the image.
     #[must_use]
-    pub fn columns(&self, columns: Range<usize>) -> Self {
-        let Self { size: Size { width, height }, above, below, ref pixels } = *self;
-        assert!(!columns.is_empty() && columns.end <= width, "columns {columns:?} of an image of {}", self.size);
-        let pixels: Vec<_> = pixels.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect();
-        Self { size: Size { width: columns.len(), height }, above, below, pixels: pixels.into() }
+    pub fn part(&self, columns: Range<usize>, rows: Range<usize>) -> Self {
+        let Size { width, height } = self.size;
+        assert!(rows.start < rows.end && rows.end <= height, "rows {rows:?} of an image of {}", self.size);
+        assert!(
+            columns.start < columns.end && columns.end <= width,
+            "columns {columns:?} of an image of {}",
+            self.size
+        );
+        let (above, below) = (rows.start + self.above, height - rows.end + self.below);
+        let (above, below) = (above.min(APRON), below.min(APRON));
+        let known = rows.start + self.above - above..rows.end + self.above + below;
+        let mut pixels = Vec::with_capacity(known.len() * columns.len());
+        let known = self.pixels[known.start * width..known.end * width].chunks_exact(width);
+        known.for_each(|row| pixels.extend_from_slice(&row[columns.clone()]));
+        Self { size: Size { width: columns.len(), height: rows.len() }, above, below, pixels: pixels.into() }
     }
 
     /// The colour at column `x`, row `y`.
@@ -215,13 +219,13 @@ impl StereoPair {
         Self { left: self.left.strip(rows.clone()), right: self.right.strip(rows) }
     }
 
-    /// Copies the same columns of both images; see [`Image::columns`].
+    /// Copies the same columns and rows of both images; see [`Image::part`].
     ///
     /// # Panics
-    /// As [`Image::columns`].
+    /// As [`Image::part`].
     #[must_use]
-    pub fn columns(&self, columns: Range<usize>) -> Self {
-        Self { left: self.left.columns(columns.clone()), right: self.right.columns(columns) }
+    pub fn part(&self, columns: Range<usize>, rows: Range<usize>) -> Self {
+        Self { left: self.left.part(columns.clone(), rows.clone()), right: self.right.part(columns, rows) }
     }
 }
 

@@ -51,15 +51,12 @@ impl Tile {
     /// If the tile lies outside.
     #[must_use]
     pub fn pair(&self, pair: &StereoPair) -> StereoPair {
-        let strip = pair.strip(self.rows.all.clone());
-        if self.columns.all.len() == pair.size().width { strip } else { strip.columns(self.columns.all.clone()) }
+        pair.part(self.columns.all.clone(), self.rows.all.clone())
     }
 
-    /// The bytes of such a copy, and of the copy of whole rows that it is made from.
-    pub(super) fn pair_bytes(&self, image: Size) -> u64 {
-        let width = self.columns.all.len();
-        let columns = if width == image.width { width } else { width + image.width };
-        2 * 3 * (columns * (self.rows.all.len() + 2 * APRON)) as u64
+    /// The bytes of such a copy.
+    pub(super) fn pair_bytes(&self) -> u64 {
+        2 * 3 * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
     }
 }
 
@@ -70,14 +67,27 @@ pub(super) struct Margin {
     pub(super) after: usize,
 }
 
-/// Splits `len` columns or rows into spans that keep `kept` each. A span also has the margin, clipped to the image.
-pub(super) fn spans(len: usize, kept: usize, Margin { before, after }: Margin) -> Vec<Span> {
+/// Splits `len` columns or rows into spans that keep `kept` each and begin at multiples of `align`. A span also has the margin,
+/// clipped to the image. If they can have one length at little cost, they do: then one driver matches all of them.
+pub(super) fn spans(len: usize, kept: usize, align: usize, Margin { before, after }: Margin) -> Vec<Span> {
     let span = |start: usize| {
         let end = (start + kept).min(len);
         Span { all: start.saturating_sub(before)..(end + after).min(len), kept: start..end }
     };
-    (0..len).step_by(kept).map(span).collect()
+    let spans: Vec<_> = (0..len).step_by(kept).map(span).collect();
+    let longest = spans.iter().map(|span| span.all.len()).max().unwrap_or(0);
+    let last = len.saturating_sub(longest) / align * align;
+    let lengthened = |span: &Span| {
+        let start = span.all.start.min(last);
+        Span { all: start..start + (len - last), kept: span.kept.clone() }
+    };
+    let matched = |spans: &[Span]| spans.iter().map(|span| span.all.len()).sum::<usize>();
+    let equal: Vec<_> = spans.iter().map(lengthened).collect();
+    if matched(&equal) <= matched(&spans) + matched(&spans) / MOST_LENGTHENED { equal } else { spans }
 }
+
+/// Spans are made equal if this adds no more than this part of their sum.
+const MOST_LENGTHENED: usize = 32;
 
 /// The first span of each length.
 pub(super) fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {

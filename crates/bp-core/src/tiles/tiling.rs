@@ -56,7 +56,7 @@ impl Tiling {
     #[must_use]
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
-        let whole = |length| spans(length, length, Margin::default());
+        let whole = |length| spans(length, length, 1, Margin::default());
         Self { plan, columns: whole(width), rows: whole(height), likely: None }
     }
 
@@ -72,8 +72,10 @@ impl Tiling {
             .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(align.width));
         let swept = plan.settings().schedule == Schedule::Sweep;
         let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
-        let columns = spans(width, kept.width.next_multiple_of(align.width), Margin { before: left, after: right });
-        let rows = spans(height, kept.height.next_multiple_of(align.height), Margin { before: beyond, after: beyond });
+        let columns =
+            spans(width, kept.width.next_multiple_of(align.width), align.width, Margin { before: left, after: right });
+        let margin = Margin { before: beyond, after: beyond };
+        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, margin);
         Self { plan, columns, rows, likely: None }
     }
 
@@ -114,7 +116,7 @@ impl Tiling {
 
     /// The bytes that matching a tile must not exceed, if it could.
     pub(super) fn limit(&self, tile: &Tile) -> Option<u64> {
-        let beside = tile.pair_bytes(self.plan.image_size()).saturating_add(self.label_bytes());
+        let beside = tile.pair_bytes().saturating_add(self.label_bytes());
         self.likely.as_ref().map(|likely| likely.bytes.saturating_sub(beside))
     }
 
@@ -181,7 +183,7 @@ impl Tiling {
             for rows in distinct(&self.rows) {
                 let tile = Tile { columns: columns.clone(), rows: rows.clone() };
                 let bytes = needed(&tile.plan(&self.plan)?)?;
-                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.image_size())));
+                most = most.max(bytes.saturating_add(tile.pair_bytes()));
             }
         }
         let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);

@@ -99,11 +99,13 @@ impl Swept {
     /// Allocates everything, except for what label sets make shorter.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
         let base = plan.finest_with_all_labels();
-        let mut bands = [Vec::new(), Vec::new()];
+        let mut bands: [Vec<Band>; 2] = [Vec::new(), Vec::new()];
         for grid in kept(plan, base.max(1)) {
             let [patches, entries] = most_entries(plan, grid);
             let band = |rows| Band::new(rows, patches, entries);
-            bands[grid % 2] = band_rows(plan, grid).map(band).collect::<Result<_, _>>()?;
+            // In parallel, because most of the time is the system's, to hand out memory.
+            let rows: Vec<_> = band_rows(plan, grid).collect();
+            bands[grid % 2] = rows.into_par_iter().map(band).collect::<Result<_, _>>()?;
         }
         for grid in kept(plan, 1) {
             bands[grid % 2].resize_with(band_rows(plan, grid).count(), Band::default);
