@@ -13,7 +13,6 @@ use crate::shape::{self, BLOCK, MIN_ROWS, every_second};
 /// The features of both images of a pair, `[height][channel][parity][lane]`. The parity is that of the column.
 pub(crate) struct Features {
     profile: Profile,
-    size: Size,
     lanes: usize,
     left: Vec<u8>,
     /// Every row of lanes has a block of padding on both sides.
@@ -39,7 +38,6 @@ impl Features {
         };
         Ok(Self {
             profile,
-            size,
             lanes,
             left: memory::filled("images", rows * lanes, 0)?,
             right: memory::filled("images", rows * (lanes + 2 * BLOCK), 0)?,
@@ -50,18 +48,14 @@ impl Features {
 
     /// Loads a pair.
     pub(crate) fn load(&mut self, level: Level, pair: &StereoPair) {
-        let Self { profile, size, lanes, left, right, padded, .. } = self;
+        let Self { profile, lanes, left, right, padded, .. } = self;
         let [left_padded, right_padded] = padded;
         let right = Rows { values: right, lanes: *lanes + 2 * BLOCK, offset: BLOCK };
         let left = Rows { values: left, lanes: *lanes, offset: 0 };
-        for (image, padded, out) in [(pair.left(), left_padded, left), (pair.right(), right_padded, right)] {
-            let rows = padded.par_chunks_mut(size.width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
-            rows.for_each(|(index, row)| dispatch!(level, simd => pad_row(simd, *profile, image, index, row)));
-            let Rows { values, lanes, offset } = out;
-            let rows = values.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
-            let view = View { profile: *profile, image, padded, lanes, offset };
-            rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows)));
-        }
+        rayon::join(
+            || load_image(level, *profile, pair.left(), left_padded, left),
+            || load_image(level, *profile, pair.right(), right_padded, right),
+        );
     }
 
     /// The features of a row of the left image, `[lane]`.
@@ -84,6 +78,16 @@ impl Features {
     pub(crate) fn bytes(&self) -> u64 {
         [&self.left, &self.right].into_iter().chain(&self.inside).chain(&self.padded).map(memory::bytes).sum()
     }
+}
+
+/// Writes the features of an image.
+fn load_image(level: Level, profile: Profile, image: &Image, padded: &mut [u8], out: Rows<'_>) {
+    let rows = padded.par_chunks_mut(image.size().width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
+    rows.for_each(|(index, row)| dispatch!(level, simd => pad_row(simd, profile, image, index, row)));
+    let Rows { values, lanes, offset } = out;
+    let rows = values.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
+    let view = View { profile, image, padded, lanes, offset };
+    rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows)));
 }
 
 /// The bytes that [`Features`] will hold.

@@ -139,7 +139,7 @@ impl Sweep<'_> {
         lists.fill(self.plan, self.grid, rows.clone(), self.coarser_labels)?;
         messages.fit(rows.len(), lists.entries())?;
         work.fit(rows.len(), lists.entries())?;
-        work.crossings.find(lists);
+        work.crossings.find(lists, self.plan.model().smoothness());
         Ok(())
     }
 

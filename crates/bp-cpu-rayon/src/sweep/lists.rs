@@ -118,42 +118,44 @@ fn cost_of(smoothness: Smoothness, distance: usize) -> u8 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Source {
     entries: [u16; 2],
-    distances: [u16; 2],
+    /// What the smoothness costs from either, over usual and over weak edges.
+    costs: [[u8; 2]; 2],
 }
 
 impl Source {
-    pub(crate) const NONE: Self = Self { entries: [0; 2], distances: [0; 2] };
+    pub(crate) const NONE: Self = Self { entries: [0; 2], costs: [[0; 2]; 2] };
 
-    /// The entry, if the other list has this label.
+    /// The entry, if the value is that of an entry, over usual edges.
     #[inline(always)]
     pub(crate) fn exact(self) -> Option<usize> {
-        (self.distances == [0; 2]).then_some(usize::from(self.entries[0]))
+        (self.entries[0] == self.entries[1] && self.costs[0][0] == 0).then_some(usize::from(self.entries[0]))
     }
 
     /// Both entries and what the smoothness costs from them.
     #[inline(always)]
-    pub(crate) fn nearest(self, smoothness: Smoothness) -> [(usize, u8); 2] {
-        [0, 1].map(|i| (usize::from(self.entries[i]), cost_of(smoothness, usize::from(self.distances[i]))))
+    pub(crate) fn nearest(self, weak: bool) -> [(usize, u8); 2] {
+        [0, 1].map(|i| (usize::from(self.entries[i]), self.costs[i][usize::from(weak)]))
     }
 
     /// The value for this label.
     #[inline(always)]
-    pub(crate) fn value(self, smoothness: Smoothness, message: impl Fn(usize) -> u8) -> u8 {
-        let [below, above] = self.nearest(smoothness).map(|(entry, cost)| message(entry).saturating_add(cost));
-        below.min(above).min(smoothness.truncation)
+    pub(crate) fn value(self, weak: bool, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
+        let [below, above] = self.nearest(weak).map(|(entry, cost)| message(entry).saturating_add(cost));
+        below.min(above).min(truncation)
     }
 }
 
 /// The sources of the labels `to` in a list of the labels `from`. Both ascend.
-pub(crate) fn sources(from: &[u16], to: &[u16]) -> impl Iterator<Item = Source> {
+pub(crate) fn sources(from: &[u16], to: &[u16], smoothness: Smoothness) -> impl Iterator<Item = Source> {
+    let both = [smoothness, smoothness.weakened()];
     let mut above = 0;
     to.iter().map(move |&label| {
         while above + 1 < from.len() && from[above] < label {
             above += 1;
         }
         let below = if from[above] > label { above.saturating_sub(1) } else { above };
-        let entries = [below, above];
-        Source { entries: entries.map(|i| i as u16), distances: entries.map(|i| from[i].abs_diff(label)) }
+        let costs = |entry: usize| both.map(|smoothness| cost_of(smoothness, from[entry].abs_diff(label).into()));
+        Source { entries: [below as u16, above as u16], costs: [costs(below), costs(above)] }
     })
 }
 
@@ -163,8 +165,10 @@ mod tests {
 
     #[test]
     fn sources_are_the_nearest_entries_on_both_sides() {
-        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20]).collect();
-        let source = |entries, distances| Source { entries, distances };
+        let smoothness = Smoothness { slope: 2, truncation: 10 };
+        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20], smoothness).collect();
+        let source =
+            |entries, [below, above]: [u8; 2]| Source { entries, costs: [[2 * below, below], [2 * above, above]] };
         let expected = [
             source([0, 0], [2, 2]),
             source([0, 0], [0, 0]),

@@ -127,11 +127,20 @@ impl Matching<'_> {
         let left =
             |row: usize, plane: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
         let node = |plane: usize| rows.load(self.features.inside(plane), BLOCK + first);
-        Lanes {
-            first: first as i32,
-            left: [0, 1].map(|plane| array::from_fn(|row| left(row, plane).map(|left| rows.load(left, first)))),
-            exist: [0, 1].map(|plane| if exists { node(plane) } else { V::splat(rows.simd, 0) }),
+        let none = V::splat(rows.simd, 0);
+        let mut lanes = Lanes { first: first as i32, left: [[[none; CHANNELS]; ROWS]; 2], exist: [none; 2] };
+        // Loops are inlined where `map` is not.
+        for plane in 0..2 {
+            for row in 0..ROWS {
+                for (lanes, left) in lanes.left[plane][row].iter_mut().zip(left(row, plane)) {
+                    *lanes = rows.load(left, first);
+                }
+            }
+            if exists {
+                lanes.exist[plane] = node(plane);
+            }
         }
+        lanes
     }
 }
 

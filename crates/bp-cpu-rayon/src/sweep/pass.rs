@@ -45,13 +45,14 @@ impl Crossings {
     }
 
     /// Finds the sources of all entries.
-    pub(crate) fn find(&mut self, lists: &Lists) {
+    pub(crate) fn find(&mut self, lists: &Lists, smoothness: Smoothness) {
         for patch in 0..lists.patches() {
             let labels = lists.list(patch).labels;
             let beside = [patch.checked_sub(1), Some(patch + 1).filter(|&next| next < lists.patches())];
             for (index, other) in beside.into_iter().enumerate() {
                 let Some(other) = other else { continue };
-                let all = self.sources[lists.range(patch)].iter_mut().zip(sources(lists.list(other).labels, labels));
+                let sources = sources(lists.list(other).labels, labels, smoothness);
+                let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
                 all.for_each(|(sources, source)| sources[index] = source);
             }
         }
@@ -236,7 +237,7 @@ impl Pass<'_> {
         let lane = LANES * patch;
         let weak = self.sweep.layout.around(0, y).is_some_and(|around| around.is_weak(1, lane));
         let usual = self.sweep.plan.model().smoothness();
-        let smoothness = if weak { usual.weakened() } else { usual };
+        let truncation = if weak { usual.weakened() } else { usual }.truncation;
         let inside = (y - self.rows.start) * self.lists.entries();
         let next = &mut self.messages.next[inside..inside + self.lists.entries()];
         let (left, right) = next[self.lists.range(before).start..self.lists.range(patch).end]
@@ -244,23 +245,24 @@ impl Pass<'_> {
         let end = LANES as isize - 1;
         if plane == 1 {
             let sources = &self.work.crossings.sources[self.lists.range(patch)];
-            carry(smoothness, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
+            carry(weak, truncation, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
         } else {
             let sources = &self.work.crossings.sources[self.lists.range(before)];
-            carry(smoothness, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
+            carry(weak, truncation, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
         }
     }
 }
 
 /// Writes the messages of a lane for the labels of another patch.
 fn carry(
-    smoothness: Smoothness,
+    weak: bool,
+    truncation: u8,
     sources: impl Iterator<Item = Source>,
     (from, from_lane): (&mut [Padded], isize),
     (to, to_lane): (&mut [Padded], isize),
 ) {
     for (source, out) in sources.zip(to) {
-        *out.lane_mut(to_lane) = source.value(smoothness, |entry| from[entry].lane(from_lane));
+        *out.lane_mut(to_lane) = source.value(weak, truncation, |entry| from[entry].lane(from_lane));
     }
 }
 

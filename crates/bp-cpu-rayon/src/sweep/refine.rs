@@ -93,9 +93,10 @@ impl CoarseRows {
         let band = &coarser.bands[index];
         for patch in 0..lists.patches() {
             if self.band != Some(index) {
-                self.find_sources(band, lists, patch);
+                self.find_sources(coarser, band, lists, patch);
             }
             let width = coarser.layout.size.width;
+            let truncation = coarser.smoothness.truncation;
             let reading = Reading { band, width, row: y % BAND_ROWS, y, patch };
             for side in 0..SIDES {
                 let range = lists.range(patch);
@@ -104,25 +105,26 @@ impl CoarseRows {
                 let sources = &self.sources[range];
                 match side {
                     LEFT => {
-                        dispatch!(level, simd => reading.read::<_, LEFT>(simd, coarser.smoothness, sources, values))
+                        dispatch!(level, simd => reading.read::<_, LEFT>(simd, truncation, sources, values))
                     }
                     RIGHT => {
-                        dispatch!(level, simd => reading.read::<_, RIGHT>(simd, coarser.smoothness, sources, values))
+                        dispatch!(level, simd => reading.read::<_, RIGHT>(simd, truncation, sources, values))
                     }
-                    _ => dispatch!(level, simd => reading.read::<_, BELOW>(simd, coarser.smoothness, sources, values)),
+                    _ => dispatch!(level, simd => reading.read::<_, BELOW>(simd, truncation, sources, values)),
                 }
             }
         }
         self.band = Some(index);
     }
 
-    fn find_sources(&mut self, band: &Band, lists: &Lists, patch: usize) {
+    fn find_sources(&mut self, coarser: Coarser<'_>, band: &Band, lists: &Lists, patch: usize) {
         let own = patch / 2;
         let labels = lists.list(patch).labels;
         let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
         for (index, from) in patches.into_iter().enumerate() {
             let Some(from) = from else { continue };
-            let all = self.sources[lists.range(patch)].iter_mut().zip(sources(band.lists.list(from).labels, labels));
+            let sources = sources(band.lists.list(from).labels, labels, coarser.smoothness);
+            let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
             all.for_each(|(sources, source)| sources[index] = source);
         }
     }
@@ -194,7 +196,7 @@ impl Reading<'_> {
     fn read<S: Simd, const SIDE: usize>(
         &self,
         simd: S,
-        smoothness: Smoothness,
+        truncation: u8,
         sources: &[[Source; 3]],
         values: &mut [Padded],
     ) {
@@ -204,16 +206,16 @@ impl Reading<'_> {
             let value = match source.exact() {
                 Some(entry) => self.columns::<S, SIDE>(simd, first + entry),
                 None => {
-                    let [below, above] = source.nearest(smoothness).map(|(entry, cost)| {
+                    let [below, above] = source.nearest(false).map(|(entry, cost)| {
                         let value: Bytes<S> = self.columns::<S, SIDE>(simd, first + entry);
                         value.saturating_add(Bytes::splat(simd, cost))
                     });
-                    below.min(above).min(Bytes::splat(simd, smoothness.truncation))
+                    below.min(above).min(Bytes::splat(simd, truncation))
                 }
             };
             out.store::<S, 0>(value);
         }
-        self.read_borders::<SIDE>(smoothness, sources, values);
+        self.read_borders::<SIDE>(truncation, sources, values);
     }
 
     /// The messages of the columns of this entry. Those that other patches hold are arbitrary.
@@ -247,7 +249,7 @@ impl Reading<'_> {
     /// Reads the columns that the coarse patches on the left and right hold. Where there is no such column, that at the border takes
     /// its place in messages from below, and others are zeros.
     #[inline(always)]
-    fn read_borders<const SIDE: usize>(&self, smoothness: Smoothness, sources: &[[Source; 3]], values: &mut [Padded]) {
+    fn read_borders<const SIDE: usize>(&self, truncation: u8, sources: &[[Source; 3]], values: &mut [Padded]) {
         let first = LANES * self.patch;
         // Of messages from the side, only the sides' own columns can lie in another patch.
         let columns: [isize; 2] = match (SIDE, self.y % 2) {
@@ -260,7 +262,7 @@ impl Reading<'_> {
         for &column in wanted {
             let holder = usize::try_from(first as isize + column).ok().and_then(|x| self.holder::<SIDE>(x));
             match holder {
-                Some(x) => self.read_column::<SIDE>(smoothness, sources, x, column, values),
+                Some(x) => self.read_column::<SIDE>(truncation, sources, x, column, values),
                 None => values.iter_mut().for_each(|out| *out.lane_mut(column) = 0),
             }
         }
@@ -293,7 +295,7 @@ impl Reading<'_> {
     /// Writes the messages that column x holds, which may belong to any patch, to a lane.
     fn read_column<const SIDE: usize>(
         &self,
-        smoothness: Smoothness,
+        truncation: u8,
         sources: &[[Source; 3]],
         x: usize,
         lane: isize,
@@ -313,13 +315,13 @@ impl Reading<'_> {
         let in_pair = (SIDE == LEFT) == (plane == 1);
         if SIDE == BELOW {
             let below = &messages.vertical[(2 * self.row + 2 + plane) * entries..][range];
-            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| below[entry].0[from]));
+            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| below[entry].0[from]));
         } else if in_pair {
             let same = &messages.same[inside];
-            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| same[entry].0[from]));
+            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| same[entry].0[from]));
         } else {
             let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
-            out.for_each(|(source, out)| *out = source.value(smoothness, |entry| next[entry].lane(from)));
+            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| next[entry].lane(from)));
         }
     }
 }
