@@ -77,4 +77,4 @@ pub use side::Side;
 pub use size::Size;
 pub use smoothness::Smoothness;
 pub use stage::Stage;
-pub use tiles::{HALO, Likeness, Needed, Span, Tile, Tiled, Tiling};
+pub use tiles::{HALO, Needed, Span, Tile, Tiled, Tiling};

@@ -6,7 +6,7 @@ mod tiling;
 use std::{ops::ControlFlow, time::Instant};
 
 pub use tile::{Span, Tile};
-pub use tiling::{HALO, Likeness, Needed, Tiling};
+pub use tiling::{HALO, Needed, Tiling};
 
 use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 

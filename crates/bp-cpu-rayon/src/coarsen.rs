@@ -43,8 +43,7 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
     }
 }
 
-/// As [`coarsen`], for a `grid` whose finer grid's costs are not stored: computes them again, patch by patch. Its sums must fit 8
-/// bits.
+/// As [`coarsen`], for a `grid` whose finer grid's costs are not stored: computes them again, patch by patch.
 pub(crate) fn coarsen_unstored(
     matching: &Matching<'_>,
     windows: &Windows,
@@ -52,28 +51,120 @@ pub(crate) fn coarsen_unstored(
     layout: &Layout,
     coarse: &mut Costs,
 ) {
-    let (clip, level) = (matching.plan.clip(grid), matching.level);
     let labels = array::from_fn::<u16, MAX_LABELS, _>(|label| label as u16);
-    let labels = &labels[..layout.labels];
-    let Costs { stored, sums } = coarse;
-    costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
-        windows.with(|window| {
-            let (even, rest) = window.work.costs.split_at_mut(labels.len());
-            let odd = &mut rest[..labels.len()];
-            for patch in 0..layout.size.width.div_ceil(Patch::COLUMNS) {
-                let at = PatchRow { grid, patch, y };
-                let least = matching.unclipped(at, labels, [&mut *even, &mut *odd]);
-                for (plane, (costs, least)) in [&mut *even, &mut *odd].into_iter().zip(least).enumerate() {
-                    let first = plane * layout.plane() + LANES * patch;
-                    if let Some(keep) = keep.as_deref_mut() {
-                        store(layout, costs, &mut keep[first..]);
+    let unstored = Unstored { matching, windows, grid, layout, labels: &labels[..layout.labels] };
+    match grid {
+        1 | 2 => unstored.narrow_rows(coarse),
+        _ => unstored.rows(coarse),
+    }
+}
+
+/// A grid that is made from the images.
+struct Unstored<'a> {
+    matching: &'a Matching<'a>,
+    windows: &'a Windows,
+    grid: usize,
+    layout: &'a Layout,
+    labels: &'a [u16],
+}
+
+impl Unstored<'_> {
+    /// Sums of grid 1 or 2, which fit 8 bits.
+    fn narrow_rows(&self, coarse: &mut Costs) {
+        let (layout, level, clip) = (self.layout, self.matching.level, self.matching.plan.clip(self.grid));
+        let Costs { stored, sums } = coarse;
+        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
+            self.windows.with(|window| {
+                let (even, rest) = window.work.costs.split_at_mut(self.labels.len());
+                let odd = &mut rest[..self.labels.len()];
+                for patch in 0..layout.size.width.div_ceil(Patch::COLUMNS) {
+                    let at = PatchRow { grid: self.grid, patch, y };
+                    let least = self.matching.unclipped(at, self.labels, [&mut *even, &mut *odd]);
+                    for (plane, (costs, least)) in [&mut *even, &mut *odd].into_iter().zip(least).enumerate() {
+                        let first = plane * layout.plane() + LANES * patch;
+                        if let Some(keep) = keep.as_deref_mut() {
+                            store(layout, costs, &mut keep[first..]);
+                        }
+                        dispatch!(level, simd => clip_above(simd, &least, clip, costs));
+                        store(layout, costs, &mut stored[first..]);
                     }
-                    dispatch!(level, simd => clip_above(simd, &least, clip, costs));
-                    store(layout, costs, &mut stored[first..]);
                 }
-            }
+            });
         });
-    });
+    }
+
+    /// Sums of grid 3, which are made of sums of grid 2.
+    fn rows(&self, coarse: &mut Costs) {
+        let (layout, clip) = (self.layout, self.matching.plan.clip(self.grid));
+        let Costs { stored, sums } = coarse;
+        costs::rows(layout, stored, u16::of(sums), |y, stored, mut keep| {
+            self.windows.with(|window| {
+                for lane in (0..layout.nodes(0)).step_by(BLOCK) {
+                    let (children, rest) = window.work.costs.split_at_mut(CHILDREN * self.labels.len());
+                    self.sum_pairs(lane, y, children, rest);
+                    let keep = keep.as_deref_mut();
+                    dispatch!(self.matching.level, simd => simd.vectorize(
+                        #[inline(always)]
+                        || costs::store_block(
+                            layout,
+                            clip,
+                            lane,
+                            #[inline(always)]
+                            |label| sum_of_rows(&children[CHILDREN * label..][..CHILDREN]),
+                            stored,
+                            keep,
+                        ),
+                    ));
+                }
+            });
+        });
+    }
+
+    /// For a block of nodes in row y, writes the sums of the pairs of children in each row below it, `[label][half][row][plane]`.
+    fn sum_pairs(&self, lane: usize, y: usize, children: &mut [Block], costs: &mut [Block]) {
+        let finer = self.matching.plan.size(self.grid - 1);
+        let (even, rest) = costs.split_at_mut(self.labels.len());
+        let odd = &mut rest[..self.labels.len()];
+        children.fill(Block::ZERO);
+        for (child, row) in (0..4).flat_map(|child| [0, 1].map(|row| (child, row))) {
+            let at = PatchRow { grid: self.grid - 1, patch: 2 * lane / LANES + child, y: 2 * y + row };
+            if Patch::COLUMNS * at.patch >= finer.width || at.y >= finer.height {
+                continue;
+            }
+            self.matching.unclipped(at, self.labels, [&mut *even, &mut *odd]);
+            let slot = 4 * (child / 2) + 2 * row;
+            for (label, children) in children.chunks_exact_mut(CHILDREN).enumerate() {
+                deal_pairs(&even[label], &odd[label], child % 2, &mut children[slot..slot + 2]);
+            }
+        }
+    }
+}
+
+/// The blocks that hold the children of a block of nodes of both planes: two halves, two rows and two planes.
+const CHILDREN: usize = 8;
+
+/// Sums pairs of columns of a patch, and writes them to the first or second half of a block of each plane.
+fn deal_pairs(even: &Block, odd: &Block, half: usize, to: &mut [Block]) {
+    let (first, second) = to.split_at_mut(1);
+    let range = half * LANES / 2..(half + 1) * LANES / 2;
+    let both = first[0].0[range.clone()].iter_mut().zip(&mut second[0].0[range]);
+    let pairs = even.0.chunks_exact(2).zip(odd.0.chunks_exact(2));
+    for ((first, second), (even, odd)) in both.zip(pairs) {
+        (*first, *second) = (even[0] + odd[0], even[1] + odd[1]);
+    }
+}
+
+/// The sums of the children of a block of nodes in both rows.
+#[inline(always)]
+fn sum_of_rows(children: &[Block]) -> [[u16; BLOCK]; 2] {
+    let mut sums = [[0; BLOCK]; 2];
+    for (half, rows) in children.chunks_exact(CHILDREN / 2).enumerate() {
+        for (i, row) in rows.iter().enumerate() {
+            let sums = sums[i % 2][half * LANES..(half + 1) * LANES].iter_mut();
+            sums.zip(row.0).for_each(|(sum, value)| *sum += u16::from(value));
+        }
+    }
+    sums
 }
 
 /// Stores the blocks of all labels.

@@ -159,7 +159,7 @@ pub(crate) fn store<S: Simd, T: Sum>(
 /// Goes over all labels twice, because the least cost is known only after the first time. The second time it calls `raw` again,
 /// unless the costs were kept.
 #[inline(always)]
-fn store_block<T: Sum>(
+pub(crate) fn store_block<T: Sum>(
     shape: &Shape,
     clip: u8,
     lane: usize,

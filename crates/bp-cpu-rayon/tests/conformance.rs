@@ -123,7 +123,7 @@ fn memory_with_label_sets_does_not_depend_on_the_order_of_threads() {
 #[test]
 fn borders_of_the_right_image_are_exact() {
     for (width, labels, min_disparity) in
-        [(300, 240, 0), (257, 200, -90), (130, 255, 3), (641, 64, -64), (513, 40, 200)]
+        [(300, 240, 0), (257, 200, -90), (130, 255, 3), (641, 64, -64), (513, 40, 200), (1100, 450, 0)]
     {
         let pair = noise_pair(width, 37, width as u64);
         for (device, profile) in [Profile::Census, Profile::Gradient, Profile::CensusRgb].into_iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use bp_core::{Plan, Schedule, Size, Tiling};
 
-use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory};
+use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory, tiles::ANSWER};
 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators.
 const PROGRAM: u64 = 16 << 20;
@@ -147,8 +147,8 @@ impl Bytes {
 
 /// A tiling in words.
 fn described(tiling: &Tiling) -> String {
-    let ((columns, rows), size, answer) = (tiling.counts(), tiling.tile_size(), tiling.likeness().name());
-    format!("{columns}x{rows} tiles of up to {size} pixels, which give {answer} (docs/big-images.md),")
+    let ((columns, rows), size) = (tiling.counts(), tiling.tile_size());
+    format!("{columns}x{rows} tiles of up to {size} pixels, which give {ANSWER} (docs/big-images.md),")
 }
 
 /// How many bytes the program may hold.

@@ -13,28 +13,9 @@ pub const HALO: usize = 96;
 /// The same for rows under [`Schedule::Sweep`], where less reaches a row from far above or below.
 const SWEPT_ROWS_HALO: usize = 64;
 
-/// How close the result of tiles comes to that of the whole image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Likeness {
-    /// Bit-identical: there is one tile.
-    Same,
-    /// Nearly the same, and as accurate: pixels beyond the halo have no influence. Under [`Schedule::Sweep`], bands also begin
-    /// at the first row of each tile.
-    Near,
-}
-
-impl Likeness {
-    /// A description in words.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Same => "the whole image's answer",
-            Self::Near => "nearly the whole image's answer",
-        }
-    }
-}
-
-/// A plan, and the tiles that it runs on.
+/// A plan, and the tiles that it runs on. One tile gives the image's answer to the bit. Several give nearly the same one, which is
+/// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`] bands also begin at the first row of
+/// each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
     plan: Plan,
@@ -156,12 +137,6 @@ impl Tiling {
         self.counts() == (1, 1)
     }
 
-    /// How close the result comes to that of the whole image.
-    #[must_use]
-    pub fn likeness(&self) -> Likeness {
-        if self.is_whole() { Likeness::Same } else { Likeness::Near }
-    }
-
     /// The message entries that all tiles compute.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
@@ -267,11 +242,11 @@ mod tests {
     fn less_memory_means_smaller_tiles_then_an_error_that_names_the_least() {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let whole = plan.bytes();
-        assert_eq!(within(&plan, whole).likeness(), Likeness::Same);
+        assert!(within(&plan, whole).is_whole());
         let mut work = 1.0;
         for (bytes, counts) in [(whole - 1, (1, 2)), (whole / 2, (1, 4)), (whole / 5, (1, 8))] {
             let tiling = within(&plan, bytes);
-            assert_eq!((tiling.counts(), tiling.likeness()), (counts, Likeness::Near), "{bytes}");
+            assert_eq!(tiling.counts(), counts, "{bytes}");
             assert!(tiling.work() > work);
             work = tiling.work();
         }
@@ -280,7 +255,7 @@ mod tests {
             panic!()
         };
         assert_eq!(available, Some(1));
-        assert_eq!(within(&plan, least).likeness(), Likeness::Near);
+        assert!(!within(&plan, least).is_whole());
         assert!(Tiling::within(&plan, least - 1, &needed, &needed).is_err());
     }
 
@@ -301,12 +276,7 @@ mod tests {
         for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
             let plan = plan((1500, 3000), 16, algorithm);
             let tiling = within(&plan, plan.bytes() / 4);
-            assert!(
-                tiling.likeness() == Likeness::Near && tiling.work() < 1.4,
-                "{:?} {}",
-                tiling.counts(),
-                tiling.work()
-            );
+            assert!(!tiling.is_whole() && tiling.work() < 1.4, "{:?} {}", tiling.counts(), tiling.work());
         }
     }
 

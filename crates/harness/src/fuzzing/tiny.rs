@@ -2,8 +2,8 @@
 
 use arbitrary::Unstructured;
 use bp_core::{
-    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, Likeness, MAX_GRIDS,
-    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
+    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS, MAX_TRUNCATION,
+    MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
     finish::{Finish, MEDIANS, confidence},
     survey::Survey,
 };
@@ -83,7 +83,7 @@ fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Devic
     let [slow, fast] = labels;
     let fast = fast?;
     assert!(slow? == fast, "backends differ in {tiling:?}");
-    assert!(tiling.likeness() != Likeness::Same || fast == whole, "other labels than the whole's in {tiling:?}");
+    assert!(!tiling.is_whole() || fast == whole, "other labels than the whole's in {tiling:?}");
     Ok(())
 }
 
