@@ -14,6 +14,7 @@ mod match_cost;
 mod messages;
 mod pass;
 mod refine;
+mod room;
 mod seams;
 mod send;
 mod swept;
@@ -34,7 +35,8 @@ use rayon::prelude::*;
 pub(crate) use block::{Block, LANES};
 pub(crate) use costs::{CostSource, clip_above};
 pub(crate) use match_cost::PatchRow;
-pub(crate) use swept::{Grid, Swept, bytes};
+pub(crate) use room::bytes;
+pub(crate) use swept::{Grid, Swept};
 pub(crate) use windows::Windows;
 
 use crate::layout::Layout;

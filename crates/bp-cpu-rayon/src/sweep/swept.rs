@@ -1,23 +1,20 @@
 //! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
 
-use std::{
-    ops::Range,
-    sync::{
-        PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+use std::sync::{
+    PoisonError,
+    atomic::{AtomicU64, Ordering},
 };
 
-use bp_core::{BAND_ROWS, Error, LabelSet, Patch, Plan, Schedule, Seam, Side, memory};
+use bp_core::{Error, Plan, Schedule, Side, memory};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::{
-    Band, CostSource, Sweep, Windows, band_bytes,
+    Band, CostSource, Sweep, Windows,
     pass::gaps,
     refine::Coarser,
+    room::{Entries, band_rows, decided, most_entries},
     seams::{self, Prepared, Seams},
-    windows,
 };
 use crate::layout::Layout;
 
@@ -44,50 +41,11 @@ pub(crate) struct Grid<'a> {
     pub(crate) costs: CostSource<'a>,
 }
 
-/// The patches of a row of a grid, and the most entries that they may have.
-fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
-    let patches = Patch::all(plan.size(grid).width, 0..1).len();
-    [patches, patches.saturating_mul(plan.model().labels())]
-}
-
 /// The grids from `first` on whose bands are the largest of those of even and of odd index that keep any, under `sweep`.
 fn kept(plan: &Plan, first: usize) -> impl Iterator<Item = usize> + use<> {
     let swept = plan.settings().schedule == Schedule::Sweep;
     let grids = plan.grids();
     [first, first + 1].into_iter().filter(move |&grid| swept && grid < grids)
-}
-
-/// The rows of the bands of a grid.
-fn band_rows(plan: &Plan, grid: usize) -> impl Iterator<Item = usize> + use<> {
-    let height = plan.size(grid).height;
-    (0..height).step_by(BAND_ROWS).map(move |first| BAND_ROWS.min(height - first))
-}
-
-/// For each grid whose labels are decided and kept, their number.
-fn decided(plan: &Plan) -> impl Iterator<Item = usize> + use<'_> {
-    let swept = plan.settings().schedule == Schedule::Sweep;
-    (0..plan.grids()).filter(move |&grid| swept && plan.decides_labels(grid)).map(|grid| plan.size(grid).pixels())
-}
-
-/// The bytes that [`Swept`] will hold, if label sets hold this many labels.
-pub(crate) fn bytes(plan: &Plan, labels: usize) -> u64 {
-    let entries = |grid: usize| {
-        let [patches, entries] = most_entries(plan, grid);
-        [patches, if plan.has_label_sets(grid) { patches.saturating_mul(labels) } else { entries }]
-    };
-    let bands = (1..plan.grids()).map(|grid| {
-        let [patches, entries] = entries(grid);
-        band_rows(plan, grid).map(|rows| band_bytes(rows, patches, entries)).fold(0, u64::saturating_add)
-    });
-    // Grids of even and of odd index share memory.
-    let mut most = [0; 2];
-    bands.zip([1, 0].into_iter().cycle()).for_each(|(bytes, parity)| most[parity] = bytes.max(most[parity]));
-    let bands = if plan.settings().schedule == Schedule::Sweep { most } else { [0; 2] };
-    let [patches, _] = most_entries(plan, 0);
-    let most = (0..plan.grids()).map(|grid| entries(grid)[1]).max().unwrap_or(0);
-    let kept = decided(plan).map(|labels| (labels * size_of::<u16>()) as u64);
-    let once = [windows::bytes(plan, patches, most), seams::bytes(plan, patches, most)];
-    bands.into_iter().chain(kept).chain(once).fold(0, u64::saturating_add)
 }
 
 /// A seam that no band uses.
@@ -119,30 +77,17 @@ impl Swept {
         Ok(Self { windows, seams, bands, labels, updates: AtomicU64::new(0) })
     }
 
-    /// Checks that a grid whose label sets are known needs no more than `room` bytes.
+    /// Checks that sweeping a grid takes no more than `room` bytes in all, if it has label sets, which are known by now.
     pub(crate) fn check_room(&self, grid: &Grid<'_>, room: u64) -> Result<(), Error> {
         let Grid { plan, index, .. } = *grid;
         if !plan.has_label_sets(index) {
             return Ok(());
         }
-        let size = plan.size(index);
-        let coarser = &self.labels[index + 1];
-        let entries = |rows: Range<usize>| -> usize {
-            Patch::all(size.width, rows).map(|patch| LabelSet::of(plan, index, &patch, coarser).count()).sum()
-        };
-        let rows = |band: usize| band * BAND_ROWS..size.height.min((band + 1) * BAND_ROWS);
-        let bands: Vec<usize> =
-            (0..size.height.div_ceil(BAND_ROWS)).into_par_iter().map(|band| entries(rows(band))).collect();
-        let seams: Vec<usize> = Seam::all(size.height).map(|seam| entries(seam.rows())).collect();
-        let [patches, _] = most_entries(plan, 0);
-        let most = bands.iter().chain(&seams).copied().max().unwrap_or(0);
-        let kept = self.bands[index % 2].iter().map(Band::bytes).chain(std::iter::repeat(0)).zip(&bands).enumerate();
-        let kept = kept.map(|(band, (held, &entries))| held.max(band_bytes(rows(band).len(), patches, entries)));
-        let kept: u64 = if index > 0 { kept.sum() } else { 0 };
-        let needed = [kept, windows::bytes(plan, patches, most), seams::bytes(plan, patches, most)];
-        let held = [&self.bands[1 - index % 2]].into_iter().flatten().map(Band::bytes);
+        let entries = Entries::count(plan, index, &self.labels[index + 1]);
+        let bands = if index > 0 { entries.band_bytes(plan, index, &self.bands[index % 2]) } else { 0 };
+        let held = self.bands[1 - index % 2].iter().map(Band::bytes);
         let labels = self.labels.iter().map(memory::bytes);
-        let needed = needed.into_iter().chain(held).chain(labels).fold(0, u64::saturating_add);
+        let needed = held.chain(labels).chain([bands, entries.shared_bytes(plan)]).fold(0, u64::saturating_add);
         if needed <= room {
             return Ok(());
         }
