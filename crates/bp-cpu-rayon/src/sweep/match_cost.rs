@@ -45,8 +45,8 @@ impl Matching<'_> {
         let to = To { labels, costs: [&mut *even, &mut *odd] };
         match (grid, self.layout.size.height - y) {
             (0, _) => return dispatch!(level, simd => self.pixels(simd, patch, y, to)),
-            (1, 2..) => return dispatch!(level, simd => self.squares(simd, Shape::<1, 2>, patch, y, to)),
-            (2, 4..) => return dispatch!(level, simd => self.squares(simd, Shape::<2, 4>, patch, y, to)),
+            (1, 2..) => return dispatch!(level, simd => self.squares(simd, Footprint::<1, 2>, patch, y, to)),
+            (2, 4..) => return dispatch!(level, simd => self.squares(simd, Footprint::<2, 4>, patch, y, to)),
             _ => {}
         }
         // At the lower border, row by row.
@@ -55,8 +55,8 @@ impl Matching<'_> {
         for y in y..self.layout.size.height {
             let to = To { labels, costs: [&mut *even, &mut *odd] };
             least = match grid {
-                1 => dispatch!(level, simd => self.squares(simd, Shape::<1, 1>, patch, y, to)),
-                _ => dispatch!(level, simd => self.squares(simd, Shape::<2, 1>, patch, y, to)),
+                1 => dispatch!(level, simd => self.squares(simd, Footprint::<1, 1>, patch, y, to)),
+                _ => dispatch!(level, simd => self.squares(simd, Footprint::<2, 1>, patch, y, to)),
             };
         }
         least
@@ -86,19 +86,19 @@ impl Matching<'_> {
     fn squares<S: Simd, const SPANS: usize, const ROWS: usize>(
         &self,
         simd: S,
-        shape: Shape<SPANS, ROWS>,
+        footprint: Footprint<SPANS, ROWS>,
         patch: usize,
         y: usize,
         to: To<'_>,
     ) -> [Block; 2] {
-        compare_by!(self.plan.model().profile(), u8x64<S>, self.squares_by(simd, shape, patch, y, to))
+        compare_by!(self.plan.model().profile(), u8x64<S>, self.squares_by(simd, footprint, patch, y, to))
     }
 
     #[inline(always)]
     fn squares_by<S: Simd, const SPANS: usize, const ROWS: usize, const CHANNELS: usize>(
         &self,
         simd: S,
-        _: Shape<SPANS, ROWS>,
+        _: Footprint<SPANS, ROWS>,
         patch: usize,
         y: usize,
         to: To<'_>,
@@ -144,8 +144,8 @@ impl Matching<'_> {
     }
 }
 
-/// Squares of pixels: a vector of them is summed for each of `SPANS` spans of lanes and `ROWS` rows.
-struct Shape<const SPANS: usize, const ROWS: usize>;
+/// The pixels that the nodes of a patch cover: `SPANS` vectors of lanes of both planes, in `ROWS` rows.
+struct Footprint<const SPANS: usize, const ROWS: usize>;
 
 /// Rows of the right image.
 struct Rows<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> {
