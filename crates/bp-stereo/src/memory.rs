@@ -5,7 +5,7 @@ use bp_core::{Plan, Schedule, Size, Tiling};
 use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory, tiles::ANSWER};
 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators.
-const PROGRAM: u64 = 16 << 20;
+const PROGRAM: u64 = 20 << 20;
 
 /// Bytes per pixel of both images.
 const PAIR: u64 = 6;
