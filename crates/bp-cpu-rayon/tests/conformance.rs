@@ -122,11 +122,20 @@ fn memory_with_label_sets_does_not_depend_on_the_order_of_threads() {
 /// With more labels than columns to the left, most nodes are matched partly outside the right image; rows end inside a vector.
 #[test]
 fn borders_of_the_right_image_are_exact() {
-    for (width, labels, min_disparity) in
-        [(300, 240, 0), (257, 200, -90), (130, 255, 3), (641, 64, -64), (513, 40, 200), (1100, 450, 0)]
-    {
-        let pair = noise_pair(width, 37, width as u64);
-        for (device, profile) in [Profile::Census, Profile::Gradient, Profile::CensusRgb].into_iter().enumerate() {
+    let cases = [
+        ((300, 39), 240, 0),
+        ((258, 39), 200, -90),
+        ((130, 38), 255, 3),
+        ((641, 37), 64, -64),
+        ((513, 37), 40, 200),
+        ((1100, 39), 450, 0),
+        ((100, 2), 450, 0),
+    ];
+    for ((width, height), labels, min_disparity) in cases {
+        let pair = noise_pair(width, height, width as u64);
+        for (device, profile) in
+            [Profile::Census, Profile::Gradient, Profile::CensusRgb, Profile::Thesis].into_iter().enumerate()
+        {
             let model = Model::new(profile, labels).unwrap().with_min_disparity(min_disparity).unwrap();
             let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
             let plan = Plan::new(pair.size(), model, Settings { label_sets: true, ..settings }).unwrap();
