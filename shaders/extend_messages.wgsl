@@ -4,7 +4,8 @@
 @group(0) @binding(1) var<storage, read_write> messages: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> sets: array<u32>;
 
-// The sets of the receivers of four nodes, and whether there are any.
+// The sets of the receivers of four nodes, and whether a message is sent: columns that only fill up the last word have
+// neighbours too.
 struct Receivers {
     sets: vec4<u32>,
     exist: u32,
@@ -13,6 +14,8 @@ struct Receivers {
 fn receivers(nodes: Nodes) -> Receivers {
     var x = vec4<i32>(columns(nodes));
     var y = i32(nodes.y);
+    let width = vec4(i32(parameters.width));
+    let sends = x < width;
     switch parameters.side {
         case LEFT: {
             x -= 1;
@@ -27,7 +30,7 @@ fn receivers(nodes: Nodes) -> Receivers {
             y += 1;
         }
     }
-    let inside = (x >= vec4(0)) & (x < vec4(i32(parameters.width))) & vec4(y >= 0 && y < i32(parameters.height));
+    let inside = sends & (x >= vec4(0)) & (x < width) & vec4(y >= 0 && y < i32(parameters.height));
     let patch_index = vec4<u32>(max(x, vec4(0))) / PATCH_COLUMNS;
     let at = window(u32(max(y, 0))) * patches() + min(patch_index, vec4(patches() - 1));
     return Receivers(at * set_words(), bytes_where(inside));

@@ -30,8 +30,21 @@ pub fn cases() -> impl Iterator<Item = Case> {
     whole.chain(strips()).chain(label_sets())
 }
 
-/// Plans whose label sets differ between patches, bands and seams, on two or three grids.
+/// Plans with label sets on two or three grids: of pictures whose sets differ between patches, bands and seams, and of noise,
+/// where messages at the borders matter.
 fn label_sets() -> impl Iterator<Item = Case> {
+    let noise = [(10, 8), (13, 2), (14, 7), (17, 6), (67, 5)].into_iter().flat_map(|(width, height)| {
+        let pair = noise_pair(width, height, width as u64);
+        let model = |profile| Model::new(profile, 40)?.with_min_disparity(3);
+        [Profile::Census, Profile::Mrf].into_iter().filter_map(move |profile| {
+            let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+            case(&pair, model(profile).ok()?, Settings { grids: 3, label_sets: true, ..settings })
+        })
+    });
+    stepped_label_sets().chain(noise)
+}
+
+fn stepped_label_sets() -> impl Iterator<Item = Case> {
     let plain = |profile, labels| Model::new(profile, labels);
     let weak = |profile, slope, truncation| {
         Ok(plain(profile, 30)?.with_smoothness(slope, truncation)?.with_weak_edges(Some(30)))

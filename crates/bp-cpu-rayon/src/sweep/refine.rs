@@ -274,10 +274,22 @@ impl Reading<'_> {
             if SIDE == BELOW && (-1..LANES as isize).contains(&last) {
                 *out.lane_mut(last + 1) = out.lane(last);
             }
-            // The last column of odd nodes has no neighbour that could have received anything.
-            if SIDE == RIGHT && (0..LANES as isize).contains(&last) && (self.width - 1 + self.y) % 2 == 1 {
-                *out.lane_mut(last) = 0;
+            // Zeros for all labels, where nothing was received: by the even node at the border, or next to it by none.
+            for column in self.without_message::<SIDE>().filter(|column| (0..LANES as isize).contains(column)) {
+                *out.lane_mut(column) = 0;
             }
+        }
+    }
+
+    /// The lanes of the columns for which nothing was received from a side: that at the border and, if its node is even, the
+    /// next one, which would take over what that node received.
+    fn without_message<const SIDE: usize>(&self) -> impl Iterator<Item = isize> + use<SIDE> {
+        let (first, last) = (-((LANES * self.patch) as isize), self.width as isize - 1 - (LANES * self.patch) as isize);
+        let is_even = |x: usize| isize::from((x + self.y).is_multiple_of(2));
+        match SIDE {
+            LEFT => first..first + 1 + is_even(0),
+            RIGHT => last - is_even(self.width - 1)..last + 1,
+            _ => 0..0,
         }
     }
 

@@ -135,16 +135,17 @@ impl State {
         Some(if side == Side::Down { nearer(near, between_rows(other_x)) } else { near })
     }
 
-    /// M(Q) of the definition. `None` if there is no such node, or its row receives nothing from that side.
+    /// M(Q) of the definition, for all labels. `None` if there is no such node, or its row receives nothing from that side.
     fn coarse_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
         let size = self.plan.size(grid);
         if node.x >= size.width || node.y >= size.height {
             return None;
         }
+        let received = |node| self.plan.neighbour(grid, node, side).map(|_| node);
         let receiver = match side {
-            Side::Left | Side::Right if !node.is_even() => self.plan.neighbour(grid, node, side),
-            Side::Left | Side::Right => Some(node),
-            Side::Up | Side::Down => Some(self.plan.neighbour(grid, node, side).map(|_| node)?),
+            Side::Left | Side::Right if !node.is_even() => self.plan.neighbour(grid, node, side).and_then(received),
+            Side::Left | Side::Right => received(node),
+            Side::Up | Side::Down => Some(received(node)?),
         };
         let zeros = || vec![0; self.plan.model().labels()];
         Some(receiver.map_or_else(zeros, |node| {
