@@ -1,5 +1,7 @@
 //! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
+use std::{array, ops::Range};
+
 use crate::{Image, Model, Node, StereoPair, image::grey};
 
 /// Half the length of the strip that is compared around the centre: the "length scan" of the thesis.
@@ -33,6 +35,47 @@ impl Seed {
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
     compare_window(image, Node { x, y }, 1, grey) as u8
+}
+
+/// Writes the codes of the pixels at `columns` and `rows`, `[rows][columns]`; see [`code`]. It reads each grey value once, in
+/// runs of columns from top to bottom.
+pub(crate) fn write_codes(image: &Image, columns: Range<usize>, rows: Range<usize>, codes: &mut [u8]) {
+    const COLUMNS: usize = 64;
+    let width = columns.len();
+    for (x, first) in columns.zip(0..).step_by(COLUMNS) {
+        let greys = |y: isize| -> [u8; COLUMNS + 2] {
+            let row = image.row_near(y);
+            array::from_fn(|i| grey(row[(x + i).saturating_sub(1).min(row.len() - 1)]))
+        };
+        let [mut above, mut middle] = [-1, 0].map(|dy| greys(rows.start as isize + dy));
+        for (y, codes) in rows.clone().zip(codes.chunks_exact_mut(width)) {
+            let below = greys(y as isize + 1);
+            let codes = &mut codes[first..width.min(first + COLUMNS)];
+            codes.fill(0);
+            for (row, dx) in [
+                (&above, 0),
+                (&above, 1),
+                (&above, 2),
+                (&middle, 0),
+                (&middle, 2),
+                (&below, 0),
+                (&below, 1),
+                (&below, 2),
+            ] {
+                for ((code, neighbour), centre) in codes.iter_mut().zip(&row[dx..]).zip(&middle[1..]) {
+                    *code = *code << 1 | u8::from(neighbour > centre);
+                }
+            }
+            (above, middle) = (middle, below);
+        }
+    }
+}
+
+/// The codes of [`write_codes`].
+pub(crate) fn codes(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<u8> {
+    let mut codes = vec![0; columns.len() * rows.len()];
+    write_codes(image, columns, rows, &mut codes);
+    codes
 }
 
 /// The census code computed from a colour channel (0 red, 1 green, 2 blue) instead of grey values.
@@ -117,6 +160,17 @@ mod tests {
         assert_eq!(code(&image, 1, 1), 0b1000_1010);
         let flat = Image::from_grey(1, 1, &[5]).unwrap();
         assert_eq!(code(&flat, 0, 0), 0);
+    }
+
+    #[test]
+    fn codes_of_many_pixels_are_those_of_single_ones() {
+        let pixels: Vec<u8> = (0..1000).map(|i| (i * i * 29 % 50) as u8).collect();
+        let image = Image::from_grey(200, 5, &pixels).unwrap();
+        for (columns, rows) in [(0..200, 0..5), (2..5, 1..3), (70..198, 0..2), (199..200, 4..5)] {
+            let singly = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
+            let singly: Vec<u8> = singly.map(|(x, y)| code(&image, x, y)).collect();
+            assert_eq!(codes(&image, columns, rows), singly);
+        }
     }
 
     #[test]

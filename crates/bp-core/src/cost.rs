@@ -63,7 +63,9 @@ impl DataCost {
         for (side, view) in [pair.left(), pair.right()].into_iter().enumerate() {
             match &mut self.planes {
                 Planes::Thesis(planes) => fill(&mut planes[side], view, |image, x, y| image.grey(x, y)),
-                Planes::Census(planes) => fill(&mut planes[side], view, census::code),
+                Planes::Census(planes) => {
+                    census::write_codes(view, 0..view.size().width, 0..view.size().height, &mut planes[side]);
+                }
                 Planes::Mrf(planes) => planes[side].copy_from_slice(view.pixels()),
                 Planes::Census5x5(planes) => fill(&mut planes[side], view, features::census_5x5),
                 Planes::Gradient(planes) => fill(&mut planes[side], view, features::gradient),

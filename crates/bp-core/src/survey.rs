@@ -9,7 +9,6 @@
 //! The survey is plain integer arithmetic on one thread, so it gives the same result on every machine and backend.
 
 mod coarse;
-mod codes;
 mod range;
 mod rows;
 mod shrink;

@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use super::{codes, shrink::LONGEST_SIDE};
-use crate::{DisparityMap, Error, StereoPair, finish, memory};
+use super::shrink::LONGEST_SIDE;
+use crate::{DisparityMap, Error, StereoPair, census, finish, memory};
 
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.
 const RADIUS: usize = 2;
@@ -101,7 +101,7 @@ impl Search {
     fn fill_strips(&mut self, small: &StereoPair, rows_down: isize) {
         let (width, disparities) = (self.width, 2 * self.reach + 1);
         let mut costs = vec![OUTSIDE; width + 2 * RADIUS];
-        let codes = |image| codes::of_rectangle(image, 0..width, 0..self.height);
+        let codes = |image| census::codes(image, 0..width, 0..self.height);
         let (left, right) = (codes(small.left()), codes(small.right()));
         for (y, left) in left.chunks_exact(width).enumerate() {
             let below = y.saturating_add_signed(rows_down).min(self.height - 1);

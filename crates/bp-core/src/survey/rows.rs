@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::{coarse::Matches, codes};
-use crate::{Image, Node, Size, StereoPair};
+use super::coarse::Matches;
+use crate::{Image, Node, Size, StereoPair, census};
 
 /// The number of matches to check. Up to twice as many are checked.
 const POINTS: usize = 256;
@@ -114,6 +114,6 @@ fn costs(pair: &StereoPair, Node { x, y }: Node, column: i64, reach: usize, fact
 fn words(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<Vec<u64>> {
     let width = columns.len();
     let word = |codes: &[u8]| codes.iter().fold(0, |word: u64, &code| word << 8 | u64::from(code));
-    let codes = codes::of_rectangle(image, columns, rows);
+    let codes = census::codes(image, columns, rows);
     codes.chunks_exact(width).map(|row| row.windows(WINDOW_WIDTH).map(word).collect()).collect()
 }

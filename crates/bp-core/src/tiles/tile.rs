@@ -86,8 +86,9 @@ pub(super) fn spans(len: usize, kept: usize, align: usize, Margin { before, afte
     if matched(&equal) <= matched(&spans) + matched(&spans) / MOST_LENGTHENED { equal } else { spans }
 }
 
-/// Spans are made equal if this adds no more than this part of their sum.
-const MOST_LENGTHENED: usize = 32;
+/// Spans are made equal if this adds no more than this part of their sum. Tiles of another size need other memory, which takes
+/// the system about as long to hand out as half a tile takes to match.
+const MOST_LENGTHENED: usize = 12;
 
 /// The first span of each length.
 pub(super) fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {

@@ -276,7 +276,7 @@ mod tests {
         for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
             let plan = plan((1500, 3000), 16, algorithm);
             let tiling = within(&plan, plan.bytes() / 4);
-            assert!(!tiling.is_whole() && tiling.work() < 1.4, "{:?} {}", tiling.counts(), tiling.work());
+            assert!(!tiling.is_whole() && tiling.work() < 1.45, "{:?} {}", tiling.counts(), tiling.work());
         }
     }
 
