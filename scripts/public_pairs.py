@@ -20,22 +20,49 @@ SIX = {name: (112, f"{NEW}/{name}", NEW_FILES) for name in NAMES}
 THIRDS = {name: (80, f"{NEW}-thirdsize/{name}", NEW_FILES) for name in NAMES}
 
 
-def parser(description):
+def parser(description, has_data=True):
     made = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--data", default=DATA, type=pathlib.Path, help="data folder [BP_DATA, else %(default)s]")
+    if has_data:
+        made.add_argument("--data", default=DATA, type=pathlib.Path, help="data folder [BP_DATA, else %(default)s]")
     made.add_argument("--output", metavar="FILE.json", type=pathlib.Path, help="also write everything as JSON")
     return made
 
 
-def enter_venv(folder):
-    """Restarts the script in the virtual environment, and creates that if it is missing."""
+def add_record_options(parser):
+    """Options of scripts that can also print what an earlier run measured."""
+    parser.add_argument("--from", dest="record", metavar="FILE.json", type=pathlib.Path,
+                        help="measure nothing; read a file that --output wrote")
+    parser.add_argument("--readme", metavar="README.md", type=pathlib.Path,
+                        help="with --from: write the summary between this file's markers")
+    parser.add_argument("--check", action="store_true", help="with --readme: write nothing, fail if it would differ")
+
+
+def renew(arguments, name, part):
+    """Writes a part of a page between the markers of that name; with --check, only fails if it would differ."""
+    readme, begin, end = arguments.readme, f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
+    text = readme.read_text()
+    before, found, rest = text.partition(begin)
+    _, ended, after = rest.partition(end)
+    if not (found and ended):
+        raise SystemExit(f"{readme}: the markers {begin.strip()} and {end} are missing")
+    renewed = before + begin + part + end + after
+    if arguments.check and renewed != text:
+        raise SystemExit(f"{readme} differs from its record; run: {' '.join(sys.argv).replace(' --check', '')}")
+    if not arguments.check:
+        readme.write_text(renewed)
+
+
+def enter_venv(folder, *more):
+    """Restarts the script in the virtual environment, and creates that if it is missing. Installs OpenCV and `more`."""
     python = folder / "bin" / "python"
     if pathlib.Path(sys.prefix).resolve() != folder.resolve():
         if not python.exists():
             subprocess.run([sys.executable, "-m", "venv", folder], check=True)
         os.execv(python, [python, *sys.argv])
-    if not all(importlib.util.find_spec(name) for name in ("cv2", "numpy")):
-        subprocess.run([python, "-m", "pip", "install", "--quiet", "opencv-python-headless", "numpy"], check=True)
+    packages = {"cv2": "opencv-python-headless", "numpy": "numpy"} | {name: name for name in more}
+    missing = [package for module, package in packages.items() if not importlib.util.find_spec(module)]
+    if missing:
+        subprocess.run([python, "-m", "pip", "install", "--quiet", *missing], check=True)
 
 
 def build():
@@ -58,8 +85,8 @@ class Pair:
         if missing:
             raise SystemExit(f"--data {data}: {missing[0]} is missing; see scripts/fetch-middlebury")
 
-    def errors(self, path):
-        report = bp("evaluate", path, *self.truth)
+    def errors(self, path, *options):
+        report = bp("evaluate", path, *self.truth, *options)
         half, one = map(report["thresholds_px"].index, (0.5, 1))
         figures = {}
         for region in ("all", "visible"):

@@ -47,6 +47,13 @@ impl DisparityMap {
         self.replaced(|values| values.chunks_exact_mut(width).for_each(<[f32]>::reverse))
     }
 
+    /// The map with its disparities limited to `0..=largest`, as Middlebury's `evaldisp` limits them.
+    #[must_use]
+    pub fn limited(self, largest: f32) -> Self {
+        let limit = |value: &mut f32| *value = value.clamp(0.0, largest);
+        self.replaced(|values| values.iter_mut().filter(|value| value.is_finite()).for_each(limit))
+    }
+
     /// The map after `change` has edited its values. `change` must set non-finite values to [`DisparityMap::UNKNOWN`].
     pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
         change(&mut self.values);

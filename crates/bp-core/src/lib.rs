@@ -67,7 +67,7 @@ pub use error::Error;
 pub use image::{Image, StereoPair};
 pub use label_set::{LabelSet, Patch};
 pub use limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION};
-pub use metrics::{Errors, GroundTruth, MapErrors, THRESHOLDS};
+pub use metrics::{Distribution, Errors, GroundTruth, MapErrors, THRESHOLDS};
 pub use model::{Model, Profile};
 pub use node::Node;
 pub use plan::{Buffer, MAX_GRIDS, Plan};

@@ -1,6 +1,6 @@
 //! The errors of a disparity map against ground truth (Scharstein and Szeliski 2002; the thesis's equations 2.82, 2.83).
 
-use crate::{DisparityMap, Error, Size};
+use crate::{DisparityMap, Error, Size, memory};
 
 /// The error thresholds of the bad-pixel percentages, in pixels.
 pub const THRESHOLDS: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
@@ -71,13 +71,30 @@ impl GroundTruth {
     /// [`Error::WrongSize`] if the map and the truth differ in size.
     pub fn errors(&self, map: &DisparityMap) -> Result<Errors, Error> {
         check_size("the disparity map", map.size(), self.disparities.size())?;
-        let pixels = || map.values().iter().zip(self.disparities.values());
-        let all = MapErrors::over(pixels().map(|(&d, &truth)| (d, truth)));
-        let visible = self.visible.as_ref().map(|visible| {
-            let seen = pixels().zip(visible).filter(|(_, seen)| **seen);
-            MapErrors::over(seen.map(|((&d, &truth), _)| (d, truth)))
-        });
-        Ok(Errors { all, visible })
+        let visible = self.visible.as_ref().map(|_| MapErrors::over(self.visible_pixels(map)));
+        Ok(Errors { all: MapErrors::over(self.pixels(map)), visible })
+    }
+
+    /// How the errors of `map` are distributed over all pixels with known truth, and over the non-occluded ones among them;
+    /// `None` if those are not known.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] if the map and the truth differ in size, [`Error::OutOfMemory`].
+    pub fn distributions(&self, map: &DisparityMap) -> Result<(Distribution, Option<Distribution>), Error> {
+        check_size("the disparity map", map.size(), self.disparities.size())?;
+        let visible = self.visible.as_ref().map(|_| Distribution::over(map.size(), self.visible_pixels(map)));
+        Ok((Distribution::over(map.size(), self.pixels(map))?, visible.transpose()?))
+    }
+
+    /// The disparities of a map with the true ones.
+    fn pixels<'a>(&'a self, map: &'a DisparityMap) -> impl Iterator<Item = (f32, f32)> + 'a {
+        map.values().iter().copied().zip(self.disparities.values().iter().copied())
+    }
+
+    /// Those of the non-occluded pixels.
+    fn visible_pixels<'a>(&'a self, map: &'a DisparityMap) -> impl Iterator<Item = (f32, f32)> + 'a {
+        let visible = self.visible.iter().flatten();
+        self.pixels(map).zip(visible).filter_map(|(pixel, visible)| visible.then_some(pixel))
     }
 }
 
@@ -135,6 +152,89 @@ impl MapErrors {
     }
 }
 
+/// The errors over a set of pixels with known truth, one by one. A figure over no pixels is NaN.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution {
+    /// Absolute errors, from the smallest to the largest. Those of unanswered pixels are infinite.
+    errors: Vec<f32>,
+    answered: usize,
+    outliers: usize,
+}
+
+impl Distribution {
+    fn over(size: Size, pixels: impl Iterator<Item = (f32, f32)>) -> Result<Self, Error> {
+        let mut errors = memory::filled("errors", size.pixels(), 0.0)?;
+        let (mut known, mut answered, mut outliers) = (0, 0, 0);
+        for (disparity, truth) in pixels.filter(|(_, truth)| truth.is_finite()) {
+            let error = if disparity.is_finite() { (disparity - truth).abs() } else { f32::INFINITY };
+            errors[known] = error;
+            known += 1;
+            answered += usize::from(disparity.is_finite());
+            outliers += usize::from(error > 3.0 && error > 0.05 * truth.abs());
+        }
+        errors.truncate(known);
+        errors.sort_unstable_by(f32::total_cmp);
+        Ok(Self { errors, answered, outliers })
+    }
+
+    fn percent(&self, wrong: usize) -> f64 {
+        100.0 * wrong as f64 / self.errors.len() as f64
+    }
+
+    /// The number of pixels with known truth.
+    #[must_use]
+    pub fn known(&self) -> usize {
+        self.errors.len()
+    }
+
+    /// How many of them have a disparity in the map.
+    #[must_use]
+    pub fn answered(&self) -> usize {
+        self.answered
+    }
+
+    /// The mean absolute error over answered pixels, in pixels.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.errors[..self.answered].iter().copied().map(f64::from).sum::<f64>() / self.answered as f64
+    }
+
+    /// The root mean squared error over answered pixels, in pixels.
+    #[must_use]
+    pub fn rmse(&self) -> f64 {
+        let squares = self.errors[..self.answered].iter().map(|&error| f64::from(error) * f64::from(error));
+        (squares.sum::<f64>() / self.answered as f64).sqrt()
+    }
+
+    /// The percentage of answered pixels with an error above `threshold` pixels.
+    #[must_use]
+    pub fn bad(&self, threshold: f32) -> f64 {
+        let right = self.errors[..self.answered].partition_point(|&error| error <= threshold);
+        100.0 * (self.answered - right) as f64 / self.answered as f64
+    }
+
+    /// The percentage of known pixels that are unanswered or have an error above `threshold` pixels.
+    #[must_use]
+    pub fn bad_or_unanswered(&self, threshold: f32) -> f64 {
+        self.percent(self.errors.len() - self.errors.partition_point(|&error| error <= threshold))
+    }
+
+    /// The error that `percent` % of the known pixels do not exceed, in pixels: A50, A90 and so on of Middlebury's evaluation.
+    /// Infinite, if too few are answered.
+    #[must_use]
+    pub fn quantile(&self, percent: u32) -> f64 {
+        let rank = (self.errors.len() * percent as usize).div_ceil(100);
+        self.errors.get(rank.saturating_sub(1)).copied().map_or(f64::NAN, f64::from)
+    }
+
+    /// D1 of the KITTI benchmark (Menze and Geiger 2015): the percentage of known pixels that are unanswered or wrong by more
+    /// than 3 pixels and more than 5 % of the truth.
+    #[must_use]
+    pub fn d1(&self) -> f64 {
+        self.percent(self.outliers)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,11 +276,41 @@ mod tests {
     }
 
     #[test]
+    fn a_distribution_agrees_with_the_errors_and_counts_unanswered_pixels_last() {
+        let truth =
+            GroundTruth::with_mask(map(&[1.0, 2.0, NONE, 4.0, 5.0, 100.0]), vec![true, true, true, false, false, true]);
+        let (truth, map) = (truth.unwrap(), map(&[1.0, 2.5, 9.0, NONE, 8.0, 104.0]));
+        let (all, visible) = truth.distributions(&map).unwrap();
+        let errors = truth.errors(&map).unwrap();
+        for (found, expected) in [(&all, errors.all), (visible.as_ref().unwrap(), errors.visible.unwrap())] {
+            assert_eq!((found.known() as u64, found.answered() as u64), (expected.known, expected.answered));
+            assert_eq!(found.rmse(), expected.rmse);
+            assert_eq!(THRESHOLDS.map(|threshold| found.bad(threshold)), expected.bad);
+            assert_eq!(THRESHOLDS.map(|threshold| found.bad_or_unanswered(threshold)), expected.bad_or_unanswered);
+        }
+        assert_eq!(all.mean(), 7.5 / 4.0);
+        let quantiles = [1, 20, 21, 50, 80, 81, 100].map(|percent| all.quantile(percent));
+        assert_eq!(quantiles, [0.0, 0.0, 0.5, 3.0, 4.0, f64::INFINITY, f64::INFINITY]);
+        // 3 px are not more than 3 px, and 4 px not more than 5 % of 100 px.
+        assert_eq!(all.d1(), 20.0);
+    }
+
+    #[test]
+    fn outliers_are_wrong_by_both_measures() {
+        let (all, _) =
+            GroundTruth::new(map(&[10.0, 60.0, 90.0, 90.0])).distributions(&map(&[13.1, 63.5, 94.4, 94.6])).unwrap();
+        assert_eq!(all.d1(), 75.0);
+    }
+
+    #[test]
     fn nothing_measured_is_not_a_perfect_score() {
         let nothing_known = GroundTruth::new(map(&[NONE])).errors(&map(&[1.0])).unwrap().all;
         assert!(nothing_known.rmse.is_nan() && nothing_known.bad_or_unanswered[1].is_nan());
         let nothing_answered = GroundTruth::new(map(&[1.0])).errors(&map(&[NONE])).unwrap().all;
         assert!(nothing_answered.rmse.is_nan() && nothing_answered.bad[1].is_nan());
         assert_eq!(nothing_answered.bad_or_unanswered, [100.0; 4]);
+        let (nothing, _) = GroundTruth::new(map(&[NONE])).distributions(&map(&[1.0])).unwrap();
+        let figures = [nothing.mean(), nothing.rmse(), nothing.bad(1.0), nothing.quantile(50), nothing.d1()];
+        assert!(figures.into_iter().all(f64::is_nan));
     }
 }

@@ -39,7 +39,8 @@ Examples:
 pub(super) const EVALUATE: &str = "\
 Examples:
   bp evaluate map.pfm truth.png --scale 2
-  bp evaluate map.pfm truth.pfm --mask nonocc.png --json";
+  bp evaluate map.pfm truth.pfm --mask nonocc.png --json
+  bp evaluate map.pfm disp0GT.pfm --mask mask0nocc.png --limit 70 --thresholds 0.125,0.25,0.5,1";
 
 pub(super) const REPRODUCE: &str = "\
 Examples:

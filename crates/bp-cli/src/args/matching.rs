@@ -186,6 +186,15 @@ pub(crate) struct EvaluateArgs {
     /// Divide the map's stored values by N to get pixels; an integer 0 is unanswered. [default: as for --scale]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
     pub(crate) map_scale: Option<f32>,
+    /// Count pixels that are wrong by more than each of these, separated by commas.
+    #[arg(long, value_name = "PX", value_delimiter = ',', default_values_t = bp_core::THRESHOLDS, value_parser = positive)]
+    pub(crate) thresholds: Vec<f32>,
+    /// Limit the map's disparities to 0 to PX first, as Middlebury's evaluation does.
+    #[arg(long, value_name = "PX", value_parser = positive)]
+    pub(crate) limit: Option<f32>,
+    /// Fill the map's unanswered pixels first, with the smaller of the nearest answers in their row.
+    #[arg(long)]
+    pub(crate) fill: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -2,11 +2,10 @@
 
 use std::{fmt::Write as _, io::Write as _, path::Path};
 
-use bp_core::{Errors, GroundTruth, THRESHOLDS};
+use bp_core::{DisparityMap, Distribution, Errors, GroundTruth, MapErrors, THRESHOLDS, finish};
 use serde::Serialize;
 
 use bp_io::{Error, Limits, Mask, read_map, read_mask};
-use bp_stereo::description as record;
 
 use super::{limits::limits, print_json};
 use crate::{
@@ -24,16 +23,91 @@ struct Report {
 }
 
 /// The errors of a map over all pixels of known truth, and over the non-occluded ones (`visible`).
-#[derive(Clone, Copy, Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct ErrorReport {
-    thresholds_px: [f32; 4],
-    all: record::Errors,
-    visible: Option<record::Errors>,
+    thresholds_px: Vec<f32>,
+    all: Measured,
+    visible: Option<Measured>,
+}
+
+/// The errors over a set of pixels, in pixels and percent.
+#[derive(Clone, Serialize)]
+struct Measured {
+    known: usize,
+    answered: usize,
+    rmse: f64,
+    bad: Vec<f64>,
+    bad_or_unanswered: Vec<f64>,
+    #[serde(flatten)]
+    details: Option<Details>,
+}
+
+/// What only `bp evaluate` measures, because it needs all errors in order.
+#[derive(Clone, Copy, Serialize)]
+struct Details {
+    mean: f64,
+    a50: f64,
+    a90: f64,
+    a95: f64,
+    a99: f64,
+    d1: f64,
 }
 
 impl From<Errors> for ErrorReport {
     fn from(errors: Errors) -> Self {
-        Self { thresholds_px: THRESHOLDS, all: errors.all.into(), visible: errors.visible.map(Into::into) }
+        let measured = |MapErrors { known, answered, rmse, bad, bad_or_unanswered }| Measured {
+            known: known as usize,
+            answered: answered as usize,
+            rmse,
+            bad: bad.to_vec(),
+            bad_or_unanswered: bad_or_unanswered.to_vec(),
+            details: None,
+        };
+        let (all, visible) = (measured(errors.all), errors.visible.map(measured));
+        Self { thresholds_px: THRESHOLDS.to_vec(), all, visible }
+    }
+}
+
+impl ErrorReport {
+    /// The names of [`Measured::cells`].
+    fn names(&self) -> Vec<String> {
+        let [first, last]: [&[&str]; 2] = match self.all.details {
+            Some(_) => [&["pixels", "density", "RMSE", "mean error"], &["A50", "A90", "A95", "A99", "D1"]],
+            None => [&["pixels", "density", "RMSE"], &[]],
+        };
+        let thresholds = self.thresholds_px.iter().map(|threshold| format!("> {threshold} px"));
+        let [first, last] = [first, last].map(|names| names.iter().map(|&name| name.to_owned()));
+        first.chain(thresholds).chain(last).collect()
+    }
+}
+
+impl Measured {
+    fn new(errors: &Distribution, thresholds: &[f32]) -> Self {
+        let [a50, a90, a95, a99] = [50, 90, 95, 99].map(|percent| errors.quantile(percent));
+        Self {
+            known: errors.known(),
+            answered: errors.answered(),
+            rmse: errors.rmse(),
+            bad: thresholds.iter().map(|&threshold| errors.bad(threshold)).collect(),
+            bad_or_unanswered: thresholds.iter().map(|&threshold| errors.bad_or_unanswered(threshold)).collect(),
+            details: Some(Details { mean: errors.mean(), a50, a90, a95, a99, d1: errors.d1() }),
+        }
+    }
+
+    /// Each figure over answered pixels, and with unanswered pixels counted as wrong; empty where it would mean nothing.
+    fn cells(&self) -> Vec<[String; 2]> {
+        let answered = |figure: String| [figure, String::new()];
+        let density = 100.0 * self.answered as f64 / self.known as f64;
+        let first = [self.known.to_string(), figure(density, 2, "%"), figure(self.rmse, 3, "px")];
+        let mean = self.details.map(|details| figure(details.mean, 3, "px"));
+        let bad = self.bad.iter().zip(&self.bad_or_unanswered).map(|(&bad, &all)| [bad, all]);
+        let last = self.details.into_iter().flat_map(|Details { a50, a90, a95, a99, d1, .. }| {
+            let quantiles = [a50, a90, a95, a99].map(|quantile| figure(quantile, 3, "px"));
+            quantiles.into_iter().chain([figure(d1, 2, "%")])
+        });
+        let first = first.into_iter().chain(mean).map(answered);
+        let bad = bad.map(|percents| percents.map(|percent| figure(percent, 2, "%")));
+        first.chain(bad).chain(last.map(|figure| [String::new(), figure])).collect()
     }
 }
 
@@ -42,15 +116,21 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     let limit = limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
-    let errors = truth.errors(&map).map_err(|_| {
-        let (map_size, truth_size) = (map.size(), truth.disparities().size());
+    let map = args.limit.into_iter().fold(map, DisparityMap::limited);
+    let map = if args.fill { finish::fill(map) } else { map };
+    let (map_size, truth_size) = (map.size(), truth.disparities().size());
+    if map_size != truth_size {
         let (map, truth) = (args.map.display(), args.truth.display());
-        Failure::input(format!("{map} has {map_size} pixels, but its ground truth {truth} has {truth_size}"))
-    })?;
-    let errors = ErrorReport::from(errors);
+        return Err(Failure::input(format!(
+            "{map} has {map_size} pixels, but its ground truth {truth} has {truth_size}"
+        )));
+    }
+    let (all, visible) = truth.distributions(&map)?;
+    let measured = |errors| Measured::new(errors, &args.thresholds);
+    let (all, visible) = (measured(&all), visible.as_ref().map(measured));
+    let errors = ErrorReport { thresholds_px: args.thresholds.clone(), all, visible };
     if args.json {
-        let size = map.size();
-        return print_json(&Report { width: size.width, height: size.height, errors });
+        return print_json(&Report { width: map_size.width, height: map_size.height, errors });
     }
     Ok(write!(std::io::stdout(), "{}", error_table(&errors))?)
 }
@@ -83,23 +163,15 @@ pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Res
 pub(crate) fn error_table(report: &ErrorReport) -> String {
     let sets = [("all known pixels", Some(&report.all)), ("non-occluded pixels", report.visible.as_ref())];
     let sets: Vec<_> = sets.into_iter().filter_map(|(name, errors)| Some((name, errors?))).collect();
-    let mut text = String::new();
-    let mut line = |name: &str, cells: &dyn Fn(&record::Errors) -> [String; 2]| {
-        let cells: String =
-            sets.iter().map(|(_, errors)| cells(errors).map(|cell| format!("{cell:>19}")).concat()).collect();
-        let _ = writeln!(text, "{name:<12}{cells}");
-    };
-    let pair = |first: String| [first, String::new()];
-    line("pixels", &|errors| pair(errors.known.to_string()));
-    line("density", &|errors| pair(figure(100.0 * errors.answered as f64 / errors.known as f64, 2, "%")));
-    line("RMSE", &|errors| pair(figure(errors.rmse, 3, "px")));
-    for (i, threshold) in THRESHOLDS.iter().enumerate() {
-        let percents = |errors: &record::Errors| [errors.bad[i], errors.bad_or_unanswered[i]];
-        line(&format!("> {threshold} px"), &|errors| percents(errors).map(|percent| figure(percent, 2, "%")));
-    }
     let heads: String = sets.iter().map(|(name, _)| format!("{name:>38}")).collect();
     let columns = format!("{:>19}{:>19}", "answered", "unanswered wrong").repeat(sets.len());
-    format!("{:<12}{heads}\n{:<12}{columns}\n{text}", "errors", "")
+    let mut text = format!("{:<12}{heads}\n{:<12}{columns}\n", "errors", "");
+    let sets: Vec<_> = sets.iter().map(|(_, errors)| errors.cells()).collect();
+    for (i, name) in report.names().iter().enumerate() {
+        let cells: String = sets.iter().flat_map(|cells| &cells[i]).map(|cell| format!("{cell:>19}")).collect();
+        let _ = writeln!(text, "{name:<12}{cells}");
+    }
+    text
 }
 
 /// A figure with its unit; a dash if nothing was measured.

@@ -236,6 +236,29 @@ fn an_image_gives_the_same_messages_from_every_format_that_holds_it() {
 }
 
 #[test]
+fn a_map_is_limited_and_filled_before_it_is_evaluated() {
+    let folder = Folder::new();
+    let grey = |name: &str, values: [u8; 4]| {
+        image::GrayImage::from_raw(4, 1, values.to_vec()).unwrap().save(folder.path(name)).unwrap();
+    };
+    grey("known.png", [10, 10, 10, 10]);
+    grey("holes.png", [90, 0, 12, 0]);
+    let run =
+        |options: &str| folder.json(&format!("evaluate holes.png known.png --thresholds 1,9,60 --json {options}"));
+    let plain = run("");
+    assert_eq!(plain["all"]["answered"], 2);
+    assert_eq!(plain["all"]["bad_or_unanswered"], serde_json::json!([100.0, 75.0, 75.0]));
+    assert_eq!(plain["all"]["mean"], 41.0);
+    assert_eq!((&plain["all"]["a50"], &plain["all"]["a90"]), (&serde_json::json!(80.0), &Value::Null));
+    assert_eq!(run("--limit 30")["all"]["mean"], 11.0);
+    // The hole between 30 and 12 becomes 12, and so does the last pixel.
+    let filled = run("--limit 30 --fill");
+    assert_eq!(filled["all"]["bad_or_unanswered"], serde_json::json!([100.0, 25.0, 0.0]));
+    assert_eq!((&filled["all"]["mean"], &filled["all"]["d1"]), (&serde_json::json!(6.5), &serde_json::json!(25.0)));
+    folder.fails("evaluate holes.png known.png --thresholds 1,-2", 2, &["--thresholds", "above 0"]);
+}
+
+#[test]
 fn jpegs_are_images_and_no_maps_and_cut_ones_neither() {
     let folder = Folder::new();
     for name in ["left", "right"] {
