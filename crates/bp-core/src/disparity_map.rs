@@ -47,10 +47,13 @@ impl DisparityMap {
         self.replaced(|values| values.chunks_exact_mut(width).for_each(<[f32]>::reverse))
     }
 
-    /// The map with its disparities limited to `0..=largest`, as Middlebury's `evaldisp` limits them.
+    /// The map with its known disparities limited to `least..=largest`.
+    ///
+    /// # Panics
+    /// If `least` is above `largest`.
     #[must_use]
-    pub fn limited(self, largest: f32) -> Self {
-        let limit = |value: &mut f32| *value = value.clamp(0.0, largest);
+    pub fn limited(self, least: f32, largest: f32) -> Self {
+        let limit = |value: &mut f32| *value = value.clamp(least, largest);
         self.replaced(|values| values.iter_mut().filter(|value| value.is_finite()).for_each(limit))
     }
 

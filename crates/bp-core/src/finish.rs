@@ -6,6 +6,7 @@ mod check;
 mod confidence;
 mod fill;
 mod median;
+mod offsets;
 mod speckles;
 mod subpixel;
 mod window;
@@ -17,7 +18,7 @@ pub use median::{MEDIANS, median};
 pub use speckles::remove_speckles;
 pub use subpixel::subpixel;
 
-use crate::{DisparityMap, Error};
+use crate::{DisparityMap, Error, StereoPair};
 
 /// The operations that a disparity map goes through after matching; by default none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -38,9 +39,14 @@ impl Finish {
     /// Applies the selected operations to the left image's map. `right` is the right image's map, for the check.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the two maps differ in size; [`Error::Plan`] for a check without the right image's map,
+    /// [`Error::WrongSize`] if the two maps or, for fractions, the pair differ in size; [`Error::Plan`] for a check without the right image's map,
     /// or for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`].
-    pub fn apply(&self, left: DisparityMap, right: Option<&DisparityMap>) -> Result<DisparityMap, Error> {
+    pub fn apply(
+        &self,
+        pair: &StereoPair,
+        left: DisparityMap,
+        right: Option<&DisparityMap>,
+    ) -> Result<DisparityMap, Error> {
         let mut map = match (self.check, right) {
             (false, _) => left,
             (true, Some(right)) => check_left_right(left, right)?,
@@ -55,14 +61,14 @@ impl Finish {
         if let Some(side) = self.median {
             map = median(&map, side)?;
         }
-        if self.subpixel { subpixel(&map) } else { Ok(map) }
+        if self.subpixel { subpixel(pair, map) } else { Ok(map) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Size;
+    use crate::{Image, Size};
 
     const NONE: f32 = DisparityMap::UNKNOWN;
 
@@ -70,10 +76,16 @@ mod tests {
         DisparityMap::new(Size { width, height: values.len() / width }, values.to_vec()).unwrap()
     }
 
+    /// A pair of blank images.
+    fn pair(width: usize) -> StereoPair {
+        let image = || Image::from_grey(width, 1, &vec![0; width]).unwrap();
+        StereoPair::new(image(), image()).unwrap()
+    }
+
     #[test]
     fn nothing_is_done_by_default() {
         let original = map(3, &[1.0, NONE, 7.0]);
-        assert_eq!(Finish::default().apply(original.clone(), None).unwrap(), original);
+        assert_eq!(Finish::default().apply(&pair(3), original.clone(), None).unwrap(), original);
     }
 
     #[test]
@@ -82,15 +94,17 @@ mod tests {
         let left = map(5, &[0.0, 0.0, 0.0, 3.0, 0.0]);
         let right = map(5, &[0.0; 5]);
         let finish = Finish { check: true, fill: true, median: Some(3), ..Finish::default() };
-        assert_eq!(finish.apply(left.clone(), Some(&right)).unwrap(), map(5, &[0.0; 5]));
-        assert!(finish.apply(left.clone(), None).is_err());
-        assert!(finish.apply(left, Some(&map(1, &[0.0]))).is_err());
+        assert_eq!(finish.apply(&pair(5), left.clone(), Some(&right)).unwrap(), map(5, &[0.0; 5]));
+        assert!(finish.apply(&pair(5), left.clone(), None).is_err());
+        assert!(finish.apply(&pair(5), left, Some(&map(1, &[0.0]))).is_err());
     }
 
     #[test]
     fn a_map_of_unknown_pixels_stays_one() {
         let all = Finish { check: true, speckles: Some(2), fill: true, median: Some(5), subpixel: true };
         let unknown = map(2, &[NONE; 4]);
-        assert_eq!(all.apply(unknown.clone(), Some(&unknown)).unwrap(), unknown);
+        let image = || Image::from_grey(2, 2, &[0; 4]).unwrap();
+        let blank = StereoPair::new(image(), image()).unwrap();
+        assert_eq!(all.apply(&blank, unknown.clone(), Some(&unknown)).unwrap(), unknown);
     }
 }

@@ -51,8 +51,9 @@ fn the_mirrored_pair_gives_the_right_images_map() {
 fn what_passes_the_check_is_mostly_right_and_filling_lowers_errors() {
     let [raw, checked, filled] = over_scenes(|scene| {
         let [left, right] = both(&scene.pair);
-        let finished =
-            |fill| Finish { check: true, fill, ..Finish::default() }.apply(left.clone(), Some(&right)).unwrap();
+        let finished = |fill| {
+            Finish { check: true, fill, ..Finish::default() }.apply(&scene.pair, left.clone(), Some(&right)).unwrap()
+        };
         [&left, &finished(false), &finished(true)].map(|map| errors(scene, map).bad[1])
     });
     assert!(checked < 0.6 * raw, "{checked} % of checked pixels against {raw} %");
@@ -78,7 +79,7 @@ fn trusted_pixels_are_right_more_often() {
 fn fractions_are_nearer_to_the_truth_than_labels() {
     let [fractions, labels] = over_scenes(|scene| {
         let [left, _] = both(&scene.pair);
-        [&finish::subpixel(&left).unwrap(), &left].map(|map| errors(scene, map).bad[0])
+        [&finish::subpixel(&scene.pair, left.clone()).unwrap(), &left].map(|map| errors(scene, map).bad[0])
     });
     assert!(fractions < 0.9 * labels, "{fractions} % wrong by more than half a pixel against {labels} %");
 }

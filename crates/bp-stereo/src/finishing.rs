@@ -55,10 +55,10 @@ pub(crate) fn finished(
     let mut confidence = trust.map(|right| finish::confidence(&left, right)).transpose()?;
     let finish: Finish = options.finish();
     let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
-    let judged = judge.apply(left, right.as_ref())?;
+    let judged = judge.apply(pair, left, right.as_ref())?;
     for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
         *trust = 0.0;
     }
-    let map = Finish { check: false, speckles: None, ..finish }.apply(judged, None)?;
+    let map = Finish { check: false, speckles: None, ..finish }.apply(pair, judged, None)?;
     Ok(Finished { map, confidence, times: AnswerTimes { matching, finishing: start.elapsed() - matching.total } })
 }

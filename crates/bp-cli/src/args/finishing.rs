@@ -26,7 +26,7 @@ pub(crate) struct FinishArgs {
     /// Apply a median filter of N x N pixels.
     #[arg(long, value_name = "N", value_parser = named(&MEDIANS, side))]
     pub(crate) median: Option<usize>,
-    /// Refine disparities to fractions of a pixel: the mean over a 9 x 9 window of those within 1 px.
+    /// Refine disparities to fractions of a pixel, by the images.
     #[arg(long, hide_short_help = true)]
     pub(crate) subpixel: bool,
     /// Write a confidence from 0 to 1 for each pixel.

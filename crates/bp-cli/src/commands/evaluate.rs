@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, io::Write as _, path::Path};
 
-use bp_core::{DisparityMap, Distribution, Errors, GroundTruth, MapErrors, THRESHOLDS, finish};
+use bp_core::{Distribution, Errors, GroundTruth, MapErrors, THRESHOLDS, finish};
 use serde::Serialize;
 
 use bp_io::{Error, Limits, Mask, read_map, read_mask};
@@ -116,7 +116,7 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     let limit = limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
-    let map = args.limit.into_iter().fold(map, DisparityMap::limited);
+    let map = args.limit.into_iter().fold(map, |map, largest| map.limited(0.0, largest));
     let map = if args.fill { finish::fill(map) } else { map };
     let (map_size, truth_size) = (map.size(), truth.disparities().size());
     if map_size != truth_size {

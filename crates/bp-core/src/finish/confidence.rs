@@ -2,10 +2,12 @@
 
 use super::{
     check::{AGREE, difference},
-    subpixel::window,
-    window::{Frame, Framed},
+    window::{Frame, Framed, window},
 };
 use crate::{DisparityMap, Error, metrics::check_size};
+
+/// How far the window reaches from its centre.
+const REACH: usize = 4;
 
 /// The confidence of each pixel of the left map, `[height][width]`, from 0 to 1: the mean worth of the pixels in the
 /// 9x9 window around it. A pixel that differs from the centre by no more than [`AGREE`] is worth 1 if its match in the
@@ -23,15 +25,14 @@ pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>,
     let rows = left.values().chunks_exact(size.width).zip(right.values().chunks_exact(size.width));
     let worths: Vec<f32> =
         rows.flat_map(|(left, right)| left.iter().enumerate().map(|(x, &d)| worth(x, d, right))).collect();
-    let reach = window().map(|(dx, _)| dx).max().unwrap_or(0) / 2;
-    let disparities = Framed::new(size, left.values(), reach, Frame::Unknown)?;
-    let worths = Framed::new(size, &worths, reach, Frame::Unknown)?;
+    let disparities = Framed::new(size, left.values(), REACH, Frame::Unknown)?;
+    let worths = Framed::new(size, &worths, REACH, Frame::Unknown)?;
     let mut sums = vec![0.0; size.pixels()];
     for (y, (sums, row)) in sums.chunks_exact_mut(size.width).zip(left.values().chunks_exact(size.width)).enumerate() {
-        for (dx, dy) in window() {
+        for (dx, dy) in window(REACH) {
             add_worth(row, disparities.row(y, dx, dy), worths.row(y, dx, dy), sums);
         }
-        sums.iter_mut().for_each(|sum| *sum /= window().count() as f32);
+        sums.iter_mut().for_each(|sum| *sum /= window(REACH).count() as f32);
     }
     Ok(sums)
 }

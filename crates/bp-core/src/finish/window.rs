@@ -44,3 +44,8 @@ impl Framed {
         &self.values[(y + dy) * (self.width + 2 * self.frame) + dx..][..self.width]
     }
 }
+
+/// The position of each pixel of a window in its frame.
+pub(super) fn window(reach: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..=2 * reach).flat_map(move |dy| (0..=2 * reach).map(move |dx| (dx, dy)))
+}

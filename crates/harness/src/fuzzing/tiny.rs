@@ -63,7 +63,7 @@ fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     let tilings = [Ok(Tiling::cut(plan.clone(), tile.0, tile.1)), Tiling::within(plan, *memory, &needed, &likely)];
     tilings.into_iter().flatten().try_for_each(|tiling| tiles(&tiling, pair, &left, devices))?;
     let map = |labels: &[u16]| DisparityMap::from_labels(pair.size(), plan.model(), labels);
-    finished(drawn.finish, map(&left), &map(&right).mirrored())?;
+    finished(drawn.finish, pair, map(&left), &map(&right).mirrored())?;
     surveyed(pair)
 }
 
@@ -88,11 +88,11 @@ fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Devic
 }
 
 /// Checks that finishing a map keeps its size and range.
-fn finished(finish: Finish, left: DisparityMap, right: &DisparityMap) -> Result<(), Error> {
+fn finished(finish: Finish, pair: &StereoPair, left: DisparityMap, right: &DisparityMap) -> Result<(), Error> {
     let trust = confidence(&left, right)?;
     assert!(trust.len() == left.size().pixels() && trust.iter().all(|share| (0.0..=1.0).contains(share)), "{trust:?}");
     let (size, range) = (left.size(), left.range());
-    let map = finish.apply(left, Some(right))?;
+    let map = finish.apply(pair, left, Some(right))?;
     let inside = |value: f32| range.is_some_and(|(low, high)| (low..=high).contains(&value));
     assert!(map.size() == size && map.values().iter().all(|&v| v == DisparityMap::UNKNOWN || inside(v)), "{map:?}");
     let calibration = Calibration::new(500.0, 60.0, 3.0, [1.0, 2.0])?;
