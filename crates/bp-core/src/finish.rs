@@ -20,6 +20,19 @@ pub use subpixel::subpixel;
 
 use crate::{DisparityMap, Error, StereoPair};
 
+/// Asked before every row of operations that take long: whether to end with [`Error::Stopped`].
+pub type IsStopped<'a> = &'a dyn Fn() -> bool;
+
+/// An [`IsStopped`] for work that is never stopped.
+#[must_use]
+pub fn never() -> bool {
+    false
+}
+
+fn go_on(is_stopped: IsStopped<'_>) -> Result<(), Error> {
+    if is_stopped() { Err(Error::Stopped) } else { Ok(()) }
+}
+
 /// The operations that a disparity map goes through after matching; by default none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Finish {
@@ -40,12 +53,13 @@ impl Finish {
     ///
     /// # Errors
     /// [`Error::WrongSize`] if the two maps or, for fractions, the pair differ in size; [`Error::Plan`] for a check without the right image's map,
-    /// or for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`].
+    /// or for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`]; [`Error::Stopped`].
     pub fn apply(
         &self,
         pair: &StereoPair,
         left: DisparityMap,
         right: Option<&DisparityMap>,
+        is_stopped: IsStopped<'_>,
     ) -> Result<DisparityMap, Error> {
         let mut map = match (self.check, right) {
             (false, _) => left,
@@ -59,9 +73,9 @@ impl Finish {
             map = fill(map);
         }
         if let Some(side) = self.median {
-            map = median(&map, side)?;
+            map = median(&map, side, is_stopped)?;
         }
-        if self.subpixel { subpixel(pair, map) } else { Ok(map) }
+        if self.subpixel { subpixel(pair, map, is_stopped) } else { Ok(map) }
     }
 }
 
@@ -85,7 +99,7 @@ mod tests {
     #[test]
     fn nothing_is_done_by_default() {
         let original = map(3, &[1.0, NONE, 7.0]);
-        assert_eq!(Finish::default().apply(&pair(3), original.clone(), None).unwrap(), original);
+        assert_eq!(Finish::default().apply(&pair(3), original.clone(), None, &never).unwrap(), original);
     }
 
     #[test]
@@ -94,9 +108,24 @@ mod tests {
         let left = map(5, &[0.0, 0.0, 0.0, 3.0, 0.0]);
         let right = map(5, &[0.0; 5]);
         let finish = Finish { check: true, fill: true, median: Some(3), ..Finish::default() };
-        assert_eq!(finish.apply(&pair(5), left.clone(), Some(&right)).unwrap(), map(5, &[0.0; 5]));
-        assert!(finish.apply(&pair(5), left.clone(), None).is_err());
-        assert!(finish.apply(&pair(5), left, Some(&map(1, &[0.0]))).is_err());
+        assert_eq!(finish.apply(&pair(5), left.clone(), Some(&right), &never).unwrap(), map(5, &[0.0; 5]));
+        assert!(finish.apply(&pair(5), left.clone(), None, &never).is_err());
+        assert!(finish.apply(&pair(5), left, Some(&map(1, &[0.0])), &never).is_err());
+    }
+
+    #[test]
+    fn long_operations_can_be_stopped() {
+        let flat = map(5, &[1.0; 5]);
+        for finish in [Finish { median: Some(3), ..Finish::default() }, Finish { subpixel: true, ..Finish::default() }]
+        {
+            let asked = std::cell::Cell::new(0);
+            let second = || asked.replace(asked.get() + 1) == 1;
+            let stopped = finish.apply(&pair(5), flat.clone(), None, &|| true);
+            assert_eq!(stopped, Err(Error::Stopped));
+            let rows = finish.apply(&pair(5), flat.clone(), None, &second);
+            assert_eq!(rows.is_err(), finish.subpixel, "a row of three operations, and one of one");
+        }
+        assert_eq!(confidence(&flat, &flat, &|| true), Err(Error::Stopped));
     }
 
     #[test]
@@ -105,6 +134,6 @@ mod tests {
         let unknown = map(2, &[NONE; 4]);
         let image = || Image::from_grey(2, 2, &[0; 4]).unwrap();
         let blank = StereoPair::new(image(), image()).unwrap();
-        assert_eq!(all.apply(&blank, unknown.clone(), Some(&unknown)).unwrap(), unknown);
+        assert_eq!(all.apply(&blank, unknown.clone(), Some(&unknown), &never).unwrap(), unknown);
     }
 }

@@ -3,7 +3,7 @@
 
 use bp_core::{
     Algorithm, Backend, DisparityMap, Driver, GroundTruth, MapErrors, Model, Plan, Profile, Schedule, StereoPair,
-    finish::{self, Finish},
+    finish::{self, Finish, never},
 };
 use bp_cpu_rayon::Rayon;
 use bp_testkit::synthetic::{self, Scene};
@@ -52,7 +52,9 @@ fn what_passes_the_check_is_mostly_right_and_filling_lowers_errors() {
     let [raw, checked, filled] = over_scenes(|scene| {
         let [left, right] = both(&scene.pair);
         let finished = |fill| {
-            Finish { check: true, fill, ..Finish::default() }.apply(&scene.pair, left.clone(), Some(&right)).unwrap()
+            Finish { check: true, fill, ..Finish::default() }
+                .apply(&scene.pair, left.clone(), Some(&right), &never)
+                .unwrap()
         };
         [&left, &finished(false), &finished(true)].map(|map| errors(scene, map).bad[1])
     });
@@ -64,7 +66,7 @@ fn what_passes_the_check_is_mostly_right_and_filling_lowers_errors() {
 fn trusted_pixels_are_right_more_often() {
     let [trusted, all] = over_scenes(|scene| {
         let [left, right] = both(&scene.pair);
-        let trust = finish::confidence(&left, &right).unwrap();
+        let trust = finish::confidence(&left, &right, &never).unwrap();
         let mut sorted = trust.clone();
         sorted.sort_by(f32::total_cmp);
         let median = sorted[sorted.len() / 2];
@@ -79,7 +81,7 @@ fn trusted_pixels_are_right_more_often() {
 fn fractions_are_nearer_to_the_truth_than_labels() {
     let [fractions, labels] = over_scenes(|scene| {
         let [left, _] = both(&scene.pair);
-        [&finish::subpixel(&scene.pair, left.clone()).unwrap(), &left].map(|map| errors(scene, map).bad[0])
+        [&finish::subpixel(&scene.pair, left.clone(), &never).unwrap(), &left].map(|map| errors(scene, map).bad[0])
     });
     assert!(fractions < 0.9 * labels, "{fractions} % wrong by more than half a pixel against {labels} %");
 }

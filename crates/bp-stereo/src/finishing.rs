@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bp_core::{
     DisparityMap, StereoPair, Times,
-    finish::{self, Finish},
+    finish::{self, Finish, IsStopped},
 };
 
 use crate::{Error, Options};
@@ -40,6 +40,7 @@ pub(crate) struct Finished {
 pub(crate) fn finished(
     options: &Options,
     pair: &StereoPair,
+    is_stopped: IsStopped<'_>,
     mut solve: impl FnMut(&StereoPair) -> Result<(Times, DisparityMap), Error>,
 ) -> Result<Finished, Error> {
     let start = Instant::now();
@@ -52,13 +53,13 @@ pub(crate) fn finished(
     let right = options.needs_right().then(|| matched(&pair.mirrored())).transpose()?.map(DisparityMap::mirrored);
     let left = matched(pair)?;
     let trust = right.as_ref().filter(|_| options.confidence);
-    let mut confidence = trust.map(|right| finish::confidence(&left, right)).transpose()?;
+    let mut confidence = trust.map(|right| finish::confidence(&left, right, is_stopped)).transpose()?;
     let finish: Finish = options.finish();
     let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
-    let judged = judge.apply(pair, left, right.as_ref())?;
+    let judged = judge.apply(pair, left, right.as_ref(), is_stopped)?;
     for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
         *trust = 0.0;
     }
-    let map = Finish { check: false, speckles: None, ..finish }.apply(pair, judged, None)?;
+    let map = Finish { check: false, speckles: None, ..finish }.apply(pair, judged, None, is_stopped)?;
     Ok(Finished { map, confidence, times: AnswerTimes { matching, finishing: start.elapsed() - matching.total } })
 }

@@ -231,7 +231,7 @@ impl Prepared {
         let updates = tiled.tiling().message_updates();
         let total = updates.saturating_mul(if options.needs_right() { 2 } else { 1 });
         let mut done = 0_u64;
-        finished(options, pair, |pair: &StereoPair| -> Result<(Times, DisparityMap), Error> {
+        finished(options, pair, &|| watch.is_stopped(), |pair: &StereoPair| -> Result<(Times, DisparityMap), Error> {
             let observer =
                 &mut |progress: Progress| watch.progress(done.saturating_add(progress.done).min(total), total);
             let times = match start {

@@ -1,7 +1,9 @@
 //! How far a map can be trusted.
 
 use super::{
+    IsStopped,
     check::{AGREE, difference},
+    go_on,
     window::{Frame, Framed, window},
 };
 use crate::{DisparityMap, Error, metrics::check_size};
@@ -18,8 +20,8 @@ const REACH: usize = 4;
 /// measure that we tried (docs/algorithms.md).
 ///
 /// # Errors
-/// [`Error::WrongSize`] if the maps differ in size, [`Error::OutOfMemory`].
-pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>, Error> {
+/// [`Error::WrongSize`] if the maps differ in size, [`Error::OutOfMemory`], [`Error::Stopped`].
+pub fn confidence(left: &DisparityMap, right: &DisparityMap, is_stopped: IsStopped<'_>) -> Result<Vec<f32>, Error> {
     check_size("the right image's map", right.size(), left.size())?;
     let size = left.size();
     let rows = left.values().chunks_exact(size.width).zip(right.values().chunks_exact(size.width));
@@ -29,6 +31,7 @@ pub fn confidence(left: &DisparityMap, right: &DisparityMap) -> Result<Vec<f32>,
     let worths = Framed::new(size, &worths, REACH, Frame::Unknown)?;
     let mut sums = vec![0.0; size.pixels()];
     for (y, (sums, row)) in sums.chunks_exact_mut(size.width).zip(left.values().chunks_exact(size.width)).enumerate() {
+        go_on(is_stopped)?;
         for (dx, dy) in window(REACH) {
             add_worth(row, disparities.row(y, dx, dy), worths.row(y, dx, dy), sums);
         }
@@ -55,7 +58,7 @@ fn add_worth(row: &[f32], neighbours: &[f32], worths: &[f32], sums: &mut [f32]) 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::never, *};
     use crate::Size;
 
     #[test]
@@ -63,14 +66,14 @@ mod tests {
         let size = Size { width: 20, height: 12 };
         let map = |disparity| DisparityMap::new(size, vec![disparity; size.pixels()]).unwrap();
         let at = |sums: Vec<f32>, x: usize, y: usize| sums[y * size.width + x];
-        assert_eq!(at(confidence(&map(0.0), &map(0.0)).unwrap(), 10, 6), 1.0);
-        assert_eq!(at(confidence(&map(0.0), &map(1.0)).unwrap(), 10, 6), 0.5);
-        assert_eq!(at(confidence(&map(0.0), &map(1.5)).unwrap(), 10, 6), 0.0);
-        assert_eq!(at(confidence(&map(DisparityMap::UNKNOWN), &map(0.0)).unwrap(), 10, 6), 0.0);
+        assert_eq!(at(confidence(&map(0.0), &map(0.0), &never).unwrap(), 10, 6), 1.0);
+        assert_eq!(at(confidence(&map(0.0), &map(1.0), &never).unwrap(), 10, 6), 0.5);
+        assert_eq!(at(confidence(&map(0.0), &map(1.5), &never).unwrap(), 10, 6), 0.0);
+        assert_eq!(at(confidence(&map(DisparityMap::UNKNOWN), &map(0.0), &never).unwrap(), 10, 6), 0.0);
         // In the corner 25 of 81 pixels lie in the image; the four left columns have no match at disparity 4.
-        assert_eq!(at(confidence(&map(0.0), &map(0.0)).unwrap(), 0, 0), 25.0 / 81.0);
-        assert_eq!(at(confidence(&map(4.0), &map(4.0)).unwrap(), 4, 6), 45.0 / 81.0);
+        assert_eq!(at(confidence(&map(0.0), &map(0.0), &never).unwrap(), 0, 0), 25.0 / 81.0);
+        assert_eq!(at(confidence(&map(4.0), &map(4.0), &never).unwrap(), 4, 6), 45.0 / 81.0);
         let wrong = DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap();
-        assert!(confidence(&wrong, &map(0.0)).is_err());
+        assert!(confidence(&wrong, &map(0.0), &never).is_err());
     }
 }

@@ -1,6 +1,9 @@
 //! The median filter.
 
-use super::window::{Frame, Framed};
+use super::{
+    IsStopped, go_on,
+    window::{Frame, Framed},
+};
 use crate::{DisparityMap, Error};
 
 /// The window sides that [`median`] supports.
@@ -16,8 +19,8 @@ type Lanes = [f32; LANES];
 /// repeats outward. The median of an even number of values is the smaller of the two in the middle.
 ///
 /// # Errors
-/// [`Error::Plan`] if `side` is not one of [`MEDIANS`], [`Error::OutOfMemory`].
-pub fn median(map: &DisparityMap, side: usize) -> Result<DisparityMap, Error> {
+/// [`Error::Plan`] if `side` is not one of [`MEDIANS`], [`Error::OutOfMemory`], [`Error::Stopped`].
+pub fn median(map: &DisparityMap, side: usize, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     if !MEDIANS.contains(&side) {
         return Err(Error::Plan("a median is over windows of 3, 5 or 7 pixels"));
     }
@@ -25,6 +28,7 @@ pub fn median(map: &DisparityMap, side: usize) -> Result<DisparityMap, Error> {
     let framed = Framed::new(size, map.values(), side / 2, Frame::Repeated)?;
     let mut medians = map.values().to_vec();
     for (y, row) in medians.chunks_exact_mut(size.width).enumerate() {
+        go_on(is_stopped)?;
         let windows: Vec<&[f32]> = (0..side * side).map(|index| framed.row(y, index % side, index / side)).collect();
         for (index, medians) in row.chunks_mut(LANES).enumerate() {
             chunk(&windows, index * LANES, medians);
@@ -85,7 +89,7 @@ fn of_known(values: &[Lanes], lane: usize, own: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::never, *};
     use crate::Size;
 
     const NONE: f32 = DisparityMap::UNKNOWN;
@@ -114,7 +118,7 @@ mod tests {
             for (side, holes) in MEDIANS.into_iter().flat_map(|side| [(side, false), (side, true)]) {
                 let values = (0..width * height).map(value(holes)).collect();
                 let map = DisparityMap::new(Size { width, height }, values).unwrap();
-                let found = median(&map, side).unwrap();
+                let found = median(&map, side, &never).unwrap();
                 assert_eq!(found.values(), plain(&map, side as i64), "{width}x{height}, {side}");
             }
         }
@@ -123,6 +127,6 @@ mod tests {
     #[test]
     fn other_windows_are_refused() {
         let map = DisparityMap::new(Size { width: 1, height: 1 }, vec![1.0]).unwrap();
-        assert!(median(&map, 4).is_err() && median(&map, 0).is_err());
+        assert!(median(&map, 4, &never).is_err() && median(&map, 0, &never).is_err());
     }
 }

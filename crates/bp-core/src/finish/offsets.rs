@@ -1,5 +1,6 @@
 //! Offsets from disparities to those at which the images match best.
 
+use super::{IsStopped, go_on};
 use crate::{DisparityMap, Error, StereoPair, image::grey, memory, metrics::check_size};
 
 /// Disparities are tried in steps of a quarter of a pixel.
@@ -21,14 +22,23 @@ const ROWS: usize = 2 * REACH + 1;
 /// three middle offsets and those beside it gives the fraction. Nothing is added where the right image lacks one of the five.
 ///
 /// # Errors
-/// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`].
-pub(super) fn add_offsets(pair: &StereoPair, map: DisparityMap) -> Result<DisparityMap, Error> {
+/// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
+pub(super) fn add_offsets(
+    pair: &StereoPair,
+    map: DisparityMap,
+    is_stopped: IsStopped<'_>,
+) -> Result<DisparityMap, Error> {
     let (width, height) = (pair.size().width, pair.size().height);
     check_size("the disparity map", map.size(), pair.size())?;
     let mut windows = Windows::new(width)?;
-    Ok(map.replaced(|values| {
+    let mut going = Ok(());
+    let map = map.replaced(|values| {
         // A row is compared before the windows of a row above it change anything.
         for coming in 0..height + REACH {
+            going = go_on(is_stopped);
+            if going.is_err() {
+                return;
+            }
             if coming < height {
                 windows.enter(pair, coming, &values[coming * width..][..width]);
             }
@@ -39,7 +49,8 @@ pub(super) fn add_offsets(pair: &StereoPair, map: DisparityMap) -> Result<Dispar
                 }
             }
         }
-    }))
+    });
+    going.map(|()| map)
 }
 
 /// The differences in the rows of windows whose centres lie in one row.
@@ -140,7 +151,8 @@ fn nearest_step(disparity: f32) -> i64 {
 
 /// Where the tried disparities of a pixel in column x begin in the right image's row in steps; `None` if it lacks one.
 fn first_step(x: usize, disparity: f32, width: usize) -> Option<usize> {
-    let first = (STEPS * x) as i64 - disparity.is_finite().then(|| nearest_step(disparity))? - MIDDLE as i64;
+    let step = disparity.is_finite().then(|| nearest_step(disparity))?;
+    let first = ((STEPS * x) as i64).saturating_sub(step).saturating_sub(MIDDLE as i64);
     usize::try_from(first).ok().filter(|first| first + TRIED <= STEPS * (width - 1) + 1)
 }
 

@@ -1,7 +1,9 @@
 //! Sub-pixel refinement.
 
 use super::{
+    IsStopped,
     check::AGREE,
+    go_on,
     offsets::add_offsets,
     window::{Frame, Framed, window},
 };
@@ -17,16 +19,16 @@ const REACH: usize = 4;
 /// compares this with other ways.
 ///
 /// # Errors
-/// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`].
-pub fn subpixel(pair: &StereoPair, map: DisparityMap) -> Result<DisparityMap, Error> {
+/// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
+pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     let Some((least, largest)) = map.range() else { return Ok(map) };
-    let start = means(&map)?;
+    let start = means(&map, is_stopped)?;
     drop(map);
-    means(&add_offsets(pair, start)?.limited(least, largest))
+    means(&add_offsets(pair, start, is_stopped)?.limited(least, largest), is_stopped)
 }
 
 /// Replaces every disparity by the mean of those in the 9x9 window around it that differ by no more than [`AGREE`].
-fn means(map: &DisparityMap) -> Result<DisparityMap, Error> {
+fn means(map: &DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     let size = map.size();
     let framed = Framed::new(size, map.values(), REACH, Frame::Unknown)?;
     let mut means = memory::filled("a map", size.pixels(), 0.0)?;
@@ -34,6 +36,7 @@ fn means(map: &DisparityMap) -> Result<DisparityMap, Error> {
     let (mut sums, mut counts) = (row_of()?, row_of()?);
     let rows = map.values().chunks_exact(size.width).zip(means.chunks_exact_mut(size.width));
     for (y, (row, means)) in rows.enumerate() {
+        go_on(is_stopped)?;
         sums.fill(0.0);
         counts.fill(0.0);
         for (dx, dy) in window(REACH) {
@@ -59,7 +62,7 @@ fn add_near(row: &[f32], neighbours: &[f32], sums: &mut [f32], counts: &mut [f32
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::never, *};
     use crate::{Image, Size};
 
     const SIZE: Size = Size { width: 160, height: 60 };
@@ -91,7 +94,7 @@ mod tests {
     fn errors(slope: f32, brighter: f32) -> Vec<f32> {
         let plane = |x: usize, y: usize| 12.0 + slope * x as f32 + 0.031 * y as f32;
         let labels = (0..SIZE.pixels()).map(|i| plane(i % SIZE.width, i / SIZE.width).round()).collect();
-        let map = subpixel(&views(plane, brighter), DisparityMap::new(SIZE, labels).unwrap()).unwrap();
+        let map = subpixel(&views(plane, brighter), DisparityMap::new(SIZE, labels).unwrap(), &never).unwrap();
         let inside = (8..SIZE.height - 8).flat_map(|y| (40..SIZE.width - 8).map(move |x| (x, y)));
         inside.map(|(x, y)| map.at(x, y).unwrap() - plane(x, y)).collect()
     }
@@ -120,7 +123,7 @@ mod tests {
     fn all_fractions_occur_nearly_as_often() {
         let plane = |x: usize, y: usize| 10.0 + 0.05 * x as f32 + 0.0071 * y as f32;
         let labels = (0..SIZE.pixels()).map(|i| plane(i % SIZE.width, i / SIZE.width).round()).collect();
-        let map = subpixel(&views(plane, 0.0), DisparityMap::new(SIZE, labels).unwrap()).unwrap();
+        let map = subpixel(&views(plane, 0.0), DisparityMap::new(SIZE, labels).unwrap(), &never).unwrap();
         let mut tenths = [0_usize; 10];
         // Five whole pixels of disparity, so every true fraction is as frequent.
         for (x, y) in (8..SIZE.height - 8).flat_map(|y| (48..148).map(move |x| (x, y))) {
@@ -135,18 +138,18 @@ mod tests {
         let size = Size { width: 64, height: 9 };
         let slope = |x: usize| 10.0 + 0.25 * x as f32;
         let steps = (0..size.pixels()).map(|i| slope(i % size.width).round()).collect();
-        let map = means(&DisparityMap::new(size, steps).unwrap()).unwrap();
+        let map = means(&DisparityMap::new(size, steps).unwrap(), &never).unwrap();
         let worst = (8..56).map(|x| (map.at(x, 4).unwrap() - slope(x)).abs()).fold(0.0, f32::max);
         assert!(worst <= 0.25, "{worst}");
     }
 
     #[test]
     fn edges_and_unknown_pixels_stay() {
-        let values = vec![3.0, 3.0, DisparityMap::UNKNOWN, 8.0, 8.0];
+        let values = vec![3.0, 3.0, DisparityMap::UNKNOWN, f32::MAX, f32::MIN];
         let map = DisparityMap::new(Size { width: 5, height: 1 }, values).unwrap();
         let blank = || Image::from_grey(5, 1, &[9; 5]).unwrap();
         let pair = StereoPair::new(blank(), blank()).unwrap();
-        assert_eq!(subpixel(&pair, map.clone()).unwrap(), map);
-        assert!(subpixel(&pair, DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap()).is_err());
+        assert_eq!(subpixel(&pair, map.clone(), &never).unwrap(), map);
+        assert!(subpixel(&pair, DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap(), &never).is_err());
     }
 }

@@ -4,7 +4,7 @@ use arbitrary::Unstructured;
 use bp_core::{
     Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS, MAX_TRUNCATION,
     MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
-    finish::{Finish, MEDIANS, confidence},
+    finish::{Finish, MEDIANS, confidence, never},
     survey::Survey,
 };
 use bp_cpu_rayon::Rayon;
@@ -89,10 +89,10 @@ fn tiles(tiling: &Tiling, pair: &StereoPair, whole: &[u16], devices: [&dyn Devic
 
 /// Checks that finishing a map keeps its size and range.
 fn finished(finish: Finish, pair: &StereoPair, left: DisparityMap, right: &DisparityMap) -> Result<(), Error> {
-    let trust = confidence(&left, right)?;
+    let trust = confidence(&left, right, &never)?;
     assert!(trust.len() == left.size().pixels() && trust.iter().all(|share| (0.0..=1.0).contains(share)), "{trust:?}");
     let (size, range) = (left.size(), left.range());
-    let map = finish.apply(pair, left, Some(right))?;
+    let map = finish.apply(pair, left, Some(right), &never)?;
     let inside = |value: f32| range.is_some_and(|(low, high)| (low..=high).contains(&value));
     assert!(map.size() == size && map.values().iter().all(|&v| v == DisparityMap::UNKNOWN || inside(v)), "{map:?}");
     let calibration = Calibration::new(500.0, 60.0, 3.0, [1.0, 2.0])?;
