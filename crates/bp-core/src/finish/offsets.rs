@@ -17,9 +17,10 @@ const ROWS: usize = 2 * REACH + 1;
 /// Adds to every known disparity the offset, of about half a pixel at most, at which the right image fits the left one best.
 ///
 /// Every pixel is compared with the right image at its own disparity, to a quarter, plus -1/2, -1/4, 0, 1/4 and 1/2. Grey
-/// values between pixels are cubic interpolations (Keys 1981). An offset is the better, the smaller the variance of grey
-/// differences in the 7x7 window; another brightness of one image does not change that. A parabola through the best of the
-/// three middle offsets and those beside it gives the fraction. Nothing is added where the right image lacks one of the five.
+/// values between pixels are cubic interpolations (Keys 1981). The best offset has the smallest variance of grey differences in
+/// the 7x7 window. The variance stays the same if one image is brighter. Only the three middle offsets can be the best; a parabola
+/// through the variances at the best one, the one before and the one after gives the fraction. A pixel keeps its disparity if
+/// one of the five matches lies outside the right image.
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
