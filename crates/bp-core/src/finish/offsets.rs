@@ -95,11 +95,10 @@ impl Windows {
         let row = &mut self.differences[(y % ROWS) * columns..][..columns];
         let left = &pair.left().pixels()[y * self.width..][..self.width];
         for (x, (&colour, &disparity)) in left.iter().zip(disparities).enumerate() {
-            let first = first_step(x, disparity, self.width);
+            let (first, grey) = (first_step(x, disparity, self.width), 128 * i32::from(grey(colour)));
             for step in 0..TRIED {
                 // A larger disparity lies farther left.
-                let difference = first
-                    .map_or(0, |first| (128 * i32::from(grey(colour)) - self.right[first + TRIED - 1 - step]) >> 4);
+                let difference = first.map_or(0, |first| (grey - self.right[first + TRIED - 1 - step]) >> 4);
                 row[step * (self.width + 2 * REACH) + REACH + x] = difference as i16;
             }
         }
@@ -171,10 +170,11 @@ fn interpolate(row: &[[u8; 3]], steps: &mut [i32]) {
     const WEIGHTS: [[i32; 4]; STEPS] = [[0, 128, 0, 0], [-9, 111, 29, -3], [-8, 72, 72, -8], [-3, 29, 111, -9]];
     let last = row.len() - 1;
     let at = |x: usize| i32::from(grey(row[x.min(last)]));
+    let mut near = [at(0), at(0), at(1), at(2)];
     for (x, steps) in steps.chunks_exact_mut(STEPS).enumerate() {
-        let near = [at(x.saturating_sub(1)), at(x), at(x + 1), at(x + 2)];
         for (step, weights) in steps.iter_mut().zip(WEIGHTS) {
             *step = weights.iter().zip(near).map(|(weight, near)| weight * near).sum();
         }
+        near = [near[1], near[2], near[3], at(x + 3)];
     }
 }
