@@ -54,7 +54,7 @@ fn extend_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let to = receivers(nodes);
     let first = plane_index(nodes.row, nodes.word);
-    let step = splat(parameters.step);
+    let step = splat(parameters.steps[0]);
     var offer = vec4(0xffffffffu);
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let index = first + quad * parameters.words;
@@ -74,6 +74,6 @@ fn extend_messages(@builtin(global_invocation_id) id: vec3<u32>) {
             h[i - 1] = minimum(vec4(h[i - 1]), offer).x;
             offer = sum(vec4(h[i - 1]), step);
         }
-        messages[index] = minimum(h, splat(parameters.truncation)) & vec4(to.exist);
+        messages[index] = minimum(h, splat(parameters.truncations[0])) & vec4(to.exist);
     }
 }

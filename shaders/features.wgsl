@@ -14,25 +14,48 @@ fn grey_aside(x: u32, dx: i32, row: u32) -> u32 {
 
 // The value that the census transform compares: a channel, or the grey value.
 fn lightness(x: u32, row: u32) -> vec3<u32> {
-    if PROFILE == CENSUS_RGB {
+    if PROFILE == CENSUS_32 {
         return colour(x, row);
     }
     return vec3(grey(x, row), 0u, 0u);
 }
 
-// One bit for each neighbour within reach, in row order from the highest bit: 1 if it is lighter (Zabih and Woodfill 1994).
+// One bit for each of the eight neighbours, in row order from the highest bit: 1 if it is lighter (Zabih and Woodfill 1994).
 // The codes of several channels are concatenated.
-fn census(x: u32, row: u32, reach: i32) -> u32 {
+fn census(x: u32, row: u32) -> u32 {
     let centre = lightness(x, row);
     var codes = vec3(0u);
-    for (var dy = -reach; dy <= reach; dy++) {
-        for (var dx = -reach; dx <= reach; dx++) {
+    for (var dy = -1; dy <= 1; dy++) {
+        for (var dx = -1; dx <= 1; dx++) {
             if dx != 0 || dy != 0 {
                 codes = 2 * codes + vec3<u32>(lightness(aside(x, dx), u32(i32(row) + dy)) > centre);
             }
         }
     }
     return codes.x | (codes.y << 8) | (codes.z << 16);
+}
+
+// The neighbours that the outer code compares, in order.
+const OUTER = array(
+    vec2(0, -4),
+    vec2(0, -2),
+    vec2(-4, 0),
+    vec2(-2, 0),
+    vec2(2, 0),
+    vec2(4, 0),
+    vec2(0, 2),
+    vec2(0, 4),
+);
+
+// As census, for grey values two and four pixels away.
+fn outer(x: u32, row: u32) -> u32 {
+    let centre = grey(x, row);
+    var offsets = OUTER;
+    var code = 0u;
+    for (var i = 0u; i < 8; i++) {
+        code = 2 * code + u32(grey_aside(x, offsets[i].x, u32(i32(row) + offsets[i].y)) > centre);
+    }
+    return code;
 }
 
 // Grey value and horizontal gradient.
@@ -54,11 +77,14 @@ fn value(x: u32, row: u32) -> u32 {
         case THESIS: {
             return grey(x, row);
         }
-        case CENSUS, CENSUS_RGB: {
-            return census(x, row, 1);
+        case CENSUS: {
+            return census(x, row);
         }
-        case CENSUS_5X5: {
-            return census(x, row, 2);
+        case CENSUS_16: {
+            return census(x, row) | (outer(x, row) << 8);
+        }
+        case CENSUS_32: {
+            return census(x, row) | (outer(x, row) << 24);
         }
         case GRADIENT: {
             return gradient(x, row);

@@ -1,4 +1,4 @@
-// Grey values of the left image, for the nodes of one colour. They determine the weak edges of grid 0.
+// Grey values of the left image, for the nodes of one colour. They determine the levels of the edges of grid 0.
 
 @group(0) @binding(2) var<storage, read_write> written: array<u32>;
 

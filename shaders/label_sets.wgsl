@@ -1,10 +1,12 @@
-// Label sets of a grid: the labels that differ by at most REACH from that of a node of the coarser grid around the patch.
+// Label sets of a grid: the labels that differ by at most REACH from those of at least AGREEING nodes of the coarser grid around
+// the patch, or, if there is no such label, from that of any.
 
 @group(0) @binding(1) var<storage, read_write> sets: array<u32>;
 // The labels of the coarser grid, in the layout of select_labels.
 @group(0) @binding(2) var<storage, read> labels: array<vec2<u32>>;
 
 const REACH: u32 = 2;
+const AGREEING: u32 = 4;
 // How many coarse nodes are looked at beyond the parents.
 const MARGIN: u32 = 2;
 
@@ -36,6 +38,43 @@ fn bits(label: u32, word: u32) -> u32 {
     return bits;
 }
 
+// The coarse nodes around a patch: first and last column and row.
+struct Region {
+    first: vec2<u32>,
+    last: vec2<u32>,
+}
+
+// The labels of a word that are near those of any node, and of at least AGREEING nodes.
+struct Near {
+    any: u32,
+    agreeing: u32,
+}
+
+fn near(region: Region, word: u32) -> Near {
+    // The labels near those of at least 1, 2, ... nodes.
+    var counts: array<u32, AGREEING>;
+    for (var y = region.first.y; y <= region.last.y; y++) {
+        for (var x = region.first.x; x <= region.last.x; x++) {
+            let found = bits(coarse_label(x, y), word);
+            for (var i = AGREEING - 1; i > 0; i--) {
+                counts[i] |= counts[i - 1] & found;
+            }
+            counts[0] |= found;
+        }
+    }
+    return Near(counts[0], counts[AGREEING - 1]);
+}
+
+// Whether any word has a label near those of AGREEING nodes.
+fn agree(region: Region) -> bool {
+    for (var word = 0u; word < set_words(); word++) {
+        if near(region, word).agreeing != 0 {
+            return true;
+        }
+    }
+    return false;
+}
+
 // An invocation computes one word of the set of a patch.
 @compute @workgroup_size(64)
 fn label_sets(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -53,11 +92,11 @@ fn label_sets(@builtin(global_invocation_id) id: vec3<u32>) {
     let coarse_columns = columns / 2;
     let first = max(vec2(coarse_columns.x, coarse_rows.x), vec2(MARGIN)) - MARGIN;
     let last = min(vec2(coarse_columns.y, coarse_rows.y) + MARGIN, vec2(parameters.other_width, parameters.other_height) - 1);
-    var found = 0u;
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            found |= bits(coarse_label(x, y), word);
-        }
+    let region = Region(first, last);
+    let near = near(region, word);
+    var found = near.agreeing;
+    if found == 0 && near.any != 0 && !agree(region) {
+        found = near.any;
     }
     sets[(window * patches() + patch_index) * words + word] = found;
 }

@@ -51,7 +51,7 @@ fn compare(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
         case THESIS: {
             return (7 * min(difference(a, b), vec4(15u)) + 5) / 10;
         }
-        case CENSUS, CENSUS_5X5, CENSUS_RGB: {
+        case CENSUS, CENSUS_16, CENSUS_32: {
             return min(countOneBits(a ^ b), vec4(LARGEST_COST));
         }
         case GRADIENT: {

@@ -2,7 +2,7 @@
 
 // [colour][row of the grid][word], two bytes for each of the four nodes.
 @group(0) @binding(6) var<storage, read_write> labels: array<vec2<u32>>;
-// Grey values; see weak_edges.wgsl.
+// Grey values; see edge_levels.wgsl.
 @group(0) @binding(7) var<storage, read> greys: array<u32>;
 
 // Enough for 1024 labels and the padding of the last quad.
@@ -34,11 +34,12 @@ fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
     return found;
 }
 
-// Neighbours on one side with decided labels: the labels, which neighbours exist, and which edges are weak.
+// Neighbours on one side with decided labels: the labels, which neighbours exist, and slope and truncation of the edges.
 struct Beside {
     labels: vec4<u32>,
     exist: vec4<bool>,
-    weak: vec4<bool>,
+    slopes: vec4<u32>,
+    truncations: vec4<u32>,
 }
 
 struct Decided {
@@ -50,28 +51,29 @@ struct Decided {
 // The smoothness cost of a label next to these neighbours.
 fn smoothness(label: u32, beside: Beside) -> vec4<u32> {
     let apart = max(vec4(label), beside.labels) - min(vec4(label), beside.labels);
-    var cost = min(parameters.slope * apart, vec4(parameters.truncation));
-    if WEAK {
-        cost = select(cost, min(parameters.weak_slope * apart, vec4(parameters.weak_truncation)), beside.weak);
-    }
-    return select(vec4(0u), cost, beside.exist);
+    return select(vec4(0u), min(beside.slopes * apart, beside.truncations), beside.exist);
 }
 
 fn decided_neighbours(nodes: Nodes) -> Decided {
     let x = columns(nodes);
     let other = 1 - parameters.colour;
     var known: Decided;
-    let weak = weak_edges(nodes);
+    let levels = edge_levels(nodes);
+    let slopes = of_edges(levels, parameters.slopes);
+    let truncations = of_edges(levels, parameters.truncations);
     known.up.exist = vec4(parameters.labels_above != 0 && nodes.y != 0 && nodes.y != parameters.cut_y);
     known.up.labels = decided(other, max(nodes.y, 1) - 1, nodes.word, 0);
-    known.up.weak = unpack(weak[UP]) != vec4(0u);
+    known.up.slopes = unpack(slopes[UP]);
+    known.up.truncations = unpack(truncations[UP]);
     if parameters.colour == 1 {
         known.left.exist = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
         known.right.exist = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
         known.left.labels = decided(other, nodes.y, nodes.word, i32(nodes.parity) - 1);
         known.right.labels = decided(other, nodes.y, nodes.word, i32(nodes.parity));
-        known.left.weak = unpack(weak[LEFT]) != vec4(0u);
-        known.right.weak = unpack(weak[RIGHT]) != vec4(0u);
+        known.left.slopes = unpack(slopes[LEFT]);
+        known.left.truncations = unpack(truncations[LEFT]);
+        known.right.slopes = unpack(slopes[RIGHT]);
+        known.right.truncations = unpack(truncations[RIGHT]);
     }
     return known;
 }

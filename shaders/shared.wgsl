@@ -27,11 +27,12 @@ struct Parameters {
     row: u32,
     row_step: u32,
     rows: u32,
-    // The model: slope and truncation of the smoothness cost, the smaller of the two, the value at which data costs are
-    // clipped, and the disparity of label 0.
-    slope: u32,
-    truncation: u32,
-    step: u32,
+    // The model: slope and truncation of the smoothness cost and the smaller of the two, for each level of edges, the greatest
+    // grey difference of each level, the value at which data costs are clipped, and the disparity of label 0.
+    slopes: array<u32, 4>,
+    truncations: array<u32, 4>,
+    steps: array<u32, 4>,
+    most: array<u32, 4>,
     clip: u32,
     min_disparity: i32,
     // The data cost of labels beyond the last one.
@@ -52,11 +53,6 @@ struct Parameters {
     other_height: u32,
     other_words: u32,
     other_first_row: u32,
-    // Weak edges: slope, truncation, the smaller of the two, and the grey difference above which edges are weak.
-    weak_slope: u32,
-    weak_truncation: u32,
-    weak_step: u32,
-    edge_threshold: u32,
 }
 
 @group(0) @binding(0) var<storage, read> parameters: Parameters;
@@ -65,10 +61,10 @@ struct Parameters {
 const THESIS: u32 = 0;
 const CENSUS: u32 = 1;
 const MRF: u32 = 2;
-const CENSUS_5X5: u32 = 3;
-const GRADIENT: u32 = 4;
-const BIRCHFIELD_TOMASI: u32 = 5;
-const CENSUS_RGB: u32 = 6;
+const GRADIENT: u32 = 3;
+const BIRCHFIELD_TOMASI: u32 = 4;
+const CENSUS_16: u32 = 5;
+const CENSUS_32: u32 = 6;
 override PROFILE: u32 = THESIS;
 
 const LEFT: u32 = 0;

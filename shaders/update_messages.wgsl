@@ -9,7 +9,7 @@
 @group(0) @binding(7) var<storage, read_write> to_right: array<vec4<u32>>;
 @group(0) @binding(8) var<storage, read_write> to_up: array<vec4<u32>>;
 @group(0) @binding(9) var<storage, read_write> to_down: array<vec4<u32>>;
-// Grey values; see weak_edges.wgsl.
+// Grey values; see edge_levels.wgsl.
 @group(0) @binding(10) var<storage, read> greys: array<u32>;
 
 // Whether messages go only to some sides, as under the schedule `sweep`.
@@ -104,8 +104,8 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let first = plane_index(nodes.row, nodes.word);
-    let weak = weak_edges(nodes);
-    let step = of_edges(weak, parameters.step, parameters.weak_step);
+    let levels = edge_levels(nodes);
+    let step = of_edges(levels, parameters.steps);
 
     var least = vec4(0xffffffffu);
     // The envelope at the previous label plus one step.
@@ -122,7 +122,7 @@ fn update_messages(@builtin(global_invocation_id) id: vec3<u32>) {
         store_quad(index, h);
     }
 
-    let truncation = of_edges(weak, parameters.truncation, parameters.weak_truncation);
+    let truncation = of_edges(levels, parameters.truncations);
     let mask = receivers(nodes);
     offer = vec4(0xffffffffu);
     for (var quad = parameters.quads; quad > 0; quad--) {

@@ -48,5 +48,5 @@ wgsl! {
     /// The layout of label sets.
     SETS = "sets.wgsl";
     /// Finds the edges whose smoothness cost is lower.
-    WEAK_EDGES = "weak_edges.wgsl";
+    EDGE_LEVELS = "edge_levels.wgsl";
 }

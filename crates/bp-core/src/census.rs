@@ -34,48 +34,66 @@ impl Seed {
 /// If (x, y) lies outside the image.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    compare_window(image, Node { x, y }, 1, grey) as u8
+    compare(image, (x, y), &INNER, grey)
 }
 
-/// Writes the codes of the pixels at `columns` and `rows`, `[rows][columns]`; see [`code`]. It reads each grey value once, in
-/// runs of columns from top to bottom.
-pub(crate) fn write_codes(image: &Image, columns: Range<usize>, rows: Range<usize>, codes: &mut [u8]) {
+/// The columns and rows of the neighbours that a code compares, relative to the pixel, from the highest bit to the lowest.
+pub(crate) type Neighbours = [(isize, isize); 8];
+
+/// The neighbours of [`code`].
+pub(crate) const INNER: Neighbours = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+
+/// The neighbours of [`outer_code`].
+pub(crate) const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0), (0, 2), (0, 4)];
+
+/// The furthest column or row that a code compares.
+const REACH: usize = 4;
+
+/// Writes the codes of the pixels at `columns` and `rows`, `[rows][columns][table]`. It computes each grey value once, in runs
+/// of columns from top to bottom.
+pub(crate) fn write_codes<const TABLES: usize>(
+    image: &Image,
+    tables: [&Neighbours; TABLES],
+    columns: Range<usize>,
+    rows: Range<usize>,
+    codes: &mut [[u8; TABLES]],
+) {
     const COLUMNS: usize = 64;
     let width = columns.len();
     for (x, first) in columns.zip(0..).step_by(COLUMNS) {
-        let greys = |y: isize| -> [u8; COLUMNS + 2] {
+        let greys = |y: isize| -> [u8; COLUMNS + 2 * REACH] {
             let row = image.row_near(y);
-            array::from_fn(|i| grey(row[(x + i).saturating_sub(1).min(row.len() - 1)]))
+            array::from_fn(|i| grey(row[(x + i).saturating_sub(REACH).min(row.len() - 1)]))
         };
-        let [mut above, mut middle] = [-1, 0].map(|dy| greys(rows.start as isize + dy));
-        for (y, codes) in rows.clone().zip(codes.chunks_exact_mut(width)) {
-            let below = greys(y as isize + 1);
+        // The rows around row y lie at (y + dy) mod 16.
+        let mut around = [[0; COLUMNS + 2 * REACH]; 16];
+        let place = |y: isize| (y & 15) as usize;
+        let reach = REACH as isize;
+        let top = rows.start as isize;
+        (top - reach..top + reach).for_each(|y| around[place(y)] = greys(y));
+        for (y, codes) in (top..).zip(codes.chunks_exact_mut(width)) {
+            around[place(y + reach)] = greys(y + reach);
             let codes = &mut codes[first..width.min(first + COLUMNS)];
-            codes.fill(0);
-            for (row, dx) in [
-                (&above, 0),
-                (&above, 1),
-                (&above, 2),
-                (&middle, 0),
-                (&middle, 2),
-                (&below, 0),
-                (&below, 1),
-                (&below, 2),
-            ] {
-                for ((code, neighbour), centre) in codes.iter_mut().zip(&row[dx..]).zip(&middle[1..]) {
-                    *code = *code << 1 | u8::from(neighbour > centre);
+            for (table, neighbours) in tables.into_iter().enumerate() {
+                let mut of_table = [0; COLUMNS];
+                for &(dx, dy) in neighbours {
+                    let from = REACH.wrapping_add_signed(dx);
+                    let beside = around[place(y + dy)][from..].iter().zip(&around[place(y)][REACH..]);
+                    for (code, (neighbour, centre)) in of_table.iter_mut().zip(beside) {
+                        *code = *code << 1 | u8::from(neighbour > centre);
+                    }
                 }
+                codes.iter_mut().zip(of_table).for_each(|(code, of_table)| code[table] = of_table);
             }
-            (above, middle) = (middle, below);
         }
     }
 }
 
-/// The codes of [`write_codes`].
+/// The codes of [`code`] of the pixels at `columns` and `rows`, `[rows][columns]`.
 pub(crate) fn codes(image: &Image, columns: Range<usize>, rows: Range<usize>) -> Vec<u8> {
-    let mut codes = vec![0; columns.len() * rows.len()];
-    write_codes(image, columns, rows, &mut codes);
-    codes
+    let mut codes = vec![[0]; columns.len() * rows.len()];
+    write_codes(image, [&INNER], columns, rows, &mut codes);
+    codes.into_flattened()
 }
 
 /// The census code computed from a colour channel (0 red, 1 green, 2 blue) instead of grey values.
@@ -84,32 +102,28 @@ pub(crate) fn codes(image: &Image, columns: Range<usize>, rows: Range<usize>) ->
 /// If (x, y) lies outside the image, or `channel` is above 2.
 #[must_use]
 pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
-    compare_window(image, Node { x, y }, 1, |colour| colour[channel]) as u8
+    compare(image, (x, y), &INNER, |colour| colour[channel])
 }
 
-/// The census code of the 24 neighbours in a 5x5 window, in 24 bits.
+/// The census code of the eight neighbours two and four pixels away, left and right, above and below: in row order, from the
+/// highest bit to the lowest, as [`code`].
 ///
 /// # Panics
 /// If (x, y) lies outside the image.
 #[must_use]
-pub fn code_5x5(image: &Image, x: usize, y: usize) -> u32 {
-    compare_window(image, Node { x, y }, 2, grey)
+pub fn outer_code(image: &Image, x: usize, y: usize) -> u8 {
+    compare(image, (x, y), &OUTER, grey)
 }
 
-/// One bit for each neighbour at most `reach` columns and rows away. `value` converts colours to the values compared.
-fn compare_window(image: &Image, node: Node, reach: isize, value: impl Fn([u8; 3]) -> u8) -> u32 {
-    let Node { x, y } = node;
+/// One bit for each neighbour. `value` converts colours to the values compared.
+fn compare(image: &Image, (x, y): (usize, usize), neighbours: &Neighbours, value: impl Fn([u8; 3]) -> u8) -> u8 {
     let centre = value(image.rgb(x, y));
     let last = image.size().width as isize - 1;
-    let mut code = 0;
-    for dy in -reach..=reach {
+    let brighter = |&(dx, dy): &(isize, isize)| {
         let row = image.row_near(y as isize + dy);
-        for dx in (-reach..=reach).filter(|&dx| (dx, dy) != (0, 0)) {
-            let neighbour = value(row[(x as isize + dx).clamp(0, last) as usize]);
-            code = code << 1 | u32::from(neighbour > centre);
-        }
-    }
-    code
+        value(row[(x as isize + dx).clamp(0, last) as usize]) > centre
+    };
+    neighbours.iter().fold(0, |code, neighbour| code << 1 | u8::from(brighter(neighbour)))
 }
 
 /// The match of a left pixel: the label whose strip of 21x3 census codes differs least. The strip is shortened at the border
@@ -169,7 +183,12 @@ mod tests {
         for (columns, rows) in [(0..200, 0..5), (2..5, 1..3), (70..198, 0..2), (199..200, 4..5)] {
             let singly = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
             let singly: Vec<u8> = singly.map(|(x, y)| code(&image, x, y)).collect();
-            assert_eq!(codes(&image, columns, rows), singly);
+            assert_eq!(codes(&image, columns.clone(), rows.clone()), singly);
+            let both = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
+            let both: Vec<_> = both.map(|(x, y)| [code(&image, x, y), outer_code(&image, x, y)]).collect();
+            let mut found = vec![[0; 2]; both.len()];
+            write_codes(&image, [&INNER, &OUTER], columns, rows, &mut found);
+            assert_eq!(found, both);
         }
     }
 
@@ -181,13 +200,14 @@ mod tests {
     }
 
     #[test]
-    fn a_window_of_5x5_is_compared_as_far_as_its_corners() {
-        let mut pixels = [7; 25];
-        (pixels[0], pixels[13], pixels[24]) = (8, 9, 10);
-        let image = Image::from_grey(5, 5, &pixels).unwrap();
-        assert_eq!(code_5x5(&image, 2, 2), 1 << 23 | 1 << 11 | 1);
-        // The corner is repeated outward.
-        assert_eq!(code_5x5(&image, 1, 1), 0b1100_0110_0000_0000_0010_0000);
+    fn the_outer_code_compares_a_cross_of_two_and_four_pixels() {
+        let mut pixels = [7; 81];
+        (pixels[4], pixels[38], pixels[42], pixels[76]) = (8, 9, 3, 10);
+        let image = Image::from_grey(9, 9, &pixels).unwrap();
+        assert_eq!(outer_code(&image, 4, 4), 0b1001_0001);
+        // The pixel at (8, 4) is the right border; the one at (6, 4) is darker, so brighter are all others within reach.
+        assert_eq!(outer_code(&image, 6, 4), 0b1111_1111);
+        assert_eq!(outer_code(&image, 8, 4), 0b0000_0000);
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! Data costs D(p, d) of the profiles, before any normalising or clipping.
 
-use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, features, memory};
+use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, census::Neighbours, features, memory};
 
 /// The per-pixel features that a profile compares, `[height][width]`, of both images.
 #[derive(Clone, Debug)]
 enum Planes {
     Thesis([Vec<u8>; 2]),
-    Census([Vec<u8>; 2]),
+    Census([Vec<[u8; 1]>; 2]),
     Mrf([Vec<[u8; 3]>; 2]),
-    Census5x5([Vec<[u8; 3]>; 2]),
     Gradient([Vec<[u8; 2]>; 2]),
     BirchfieldTomasi([Vec<[u8; 3]>; 2]),
-    CensusRgb([Vec<[u8; 3]>; 2]),
+    Census16([Vec<[u8; 2]>; 2]),
+    Census32([Vec<[u8; 4]>; 2]),
 }
 
 /// The data costs of all pixels and labels of a pair. It is allocated once and loaded with one pair after another.
@@ -33,10 +33,10 @@ impl DataCost {
             Profile::Thesis => Planes::Thesis(planes(size)?),
             Profile::Census => Planes::Census(planes(size)?),
             Profile::Mrf => Planes::Mrf(planes(size)?),
-            Profile::Census5x5 => Planes::Census5x5(planes(size)?),
             Profile::Gradient => Planes::Gradient(planes(size)?),
             Profile::BirchfieldTomasi => Planes::BirchfieldTomasi(planes(size)?),
-            Profile::CensusRgb => Planes::CensusRgb(planes(size)?),
+            Profile::Census16 => Planes::Census16(planes(size)?),
+            Profile::Census32 => Planes::Census32(planes(size)?),
         };
         Ok(Self { size, model, planes, seed: None })
     }
@@ -63,14 +63,12 @@ impl DataCost {
         for (side, view) in [pair.left(), pair.right()].into_iter().enumerate() {
             match &mut self.planes {
                 Planes::Thesis(planes) => fill(&mut planes[side], view, |image, x, y| image.grey(x, y)),
-                Planes::Census(planes) => {
-                    census::write_codes(view, 0..view.size().width, 0..view.size().height, &mut planes[side]);
-                }
+                Planes::Census(planes) => write_codes(view, [&census::INNER], &mut planes[side]),
                 Planes::Mrf(planes) => planes[side].copy_from_slice(view.pixels()),
-                Planes::Census5x5(planes) => fill(&mut planes[side], view, features::census_5x5),
                 Planes::Gradient(planes) => fill(&mut planes[side], view, features::gradient),
                 Planes::BirchfieldTomasi(planes) => fill(&mut planes[side], view, features::half_samples),
-                Planes::CensusRgb(planes) => fill(&mut planes[side], view, features::census_rgb),
+                Planes::Census16(planes) => write_codes(view, [&census::INNER, &census::OUTER], &mut planes[side]),
+                Planes::Census32(planes) => fill(&mut planes[side], view, features::census_32),
             }
         }
         Ok(())
@@ -95,12 +93,11 @@ impl DataCost {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         match &self.planes {
-            Planes::Thesis(planes) | Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Gradient(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Mrf(planes)
-            | Planes::Census5x5(planes)
-            | Planes::BirchfieldTomasi(planes)
-            | Planes::CensusRgb(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Thesis(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Gradient(planes) | Planes::Census16(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Census32(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Mrf(planes) | Planes::BirchfieldTomasi(planes) => planes.iter().map(memory::bytes).sum(),
         }
     }
 
@@ -108,12 +105,12 @@ impl DataCost {
     fn compare(&self, l: usize, r: usize) -> u16 {
         match &self.planes {
             Planes::Thesis([left, right]) => features::truncated_difference(left[l], right[r]),
-            Planes::Census([left, right]) => ((left[l] ^ right[r]).count_ones() as u16).min(6),
+            Planes::Census([left, right]) => features::hamming_distance(left[l], right[r]).min(6),
             Planes::Mrf([left, right]) => features::sum_of_differences(left[l], right[r]),
-            Planes::Census5x5([left, right]) => features::hamming_distance(left[l], right[r]).min(20),
             Planes::Gradient([left, right]) => features::gradient_difference(left[l], right[r]),
             Planes::BirchfieldTomasi([left, right]) => features::sampling_insensitive_difference(left[l], right[r]),
-            Planes::CensusRgb([left, right]) => features::hamming_distance(left[l], right[r]).min(18),
+            Planes::Census16([left, right]) => features::hamming_distance(left[l], right[r]).min(15),
+            Planes::Census32([left, right]) => features::hamming_distance(left[l], right[r]),
         }
     }
 }
@@ -121,6 +118,10 @@ impl DataCost {
 fn planes<T: Copy + Default>(size: Size) -> Result<[Vec<T>; 2], Error> {
     let plane = || memory::filled("images", size.pixels(), T::default());
     Ok([plane()?, plane()?])
+}
+
+fn write_codes<const TABLES: usize>(view: &Image, tables: [&Neighbours; TABLES], plane: &mut [[u8; TABLES]]) {
+    census::write_codes(view, tables, 0..view.size().width, 0..view.size().height, plane);
 }
 
 fn fill<T>(plane: &mut [T], view: &Image, value: impl Fn(&Image, usize, usize) -> T) {
@@ -151,12 +152,8 @@ mod tests {
 
     #[test]
     fn costs_outside_the_right_image_are_the_profiles() {
-        let halves = [
-            (Profile::Census5x5, 10),
-            (Profile::Gradient, 10),
-            (Profile::BirchfieldTomasi, 15),
-            (Profile::CensusRgb, 9),
-        ];
+        let halves =
+            [(Profile::Gradient, 10), (Profile::BirchfieldTomasi, 15), (Profile::Census16, 6), (Profile::Census32, 12)];
         let wholes = [(Profile::Thesis, 11), (Profile::Census, 3), (Profile::Mrf, 765)];
         for (profile, expected) in wholes.into_iter().chain(halves) {
             let cost = cost(profile, &[9, 9], &[9, 9], None);
@@ -167,11 +164,13 @@ mod tests {
     }
 
     #[test]
-    fn census_codes_of_equal_channels_count_thrice() {
-        let views = [&[9, 9, 9, 0, 0], &[0, 9, 0, 9, 5]];
-        let [grey, rgb] = [Profile::Census, Profile::CensusRgb].map(|profile| cost(profile, views[0], views[1], None));
-        let found: Vec<_> = (0..5).map(|x| (grey.at(x, 0, 0), rgb.at(x, 0, 0))).collect();
-        assert_eq!(found, [(3, 9), (0, 0), (6, 18), (3, 9), (3, 9)]);
+    fn inner_codes_of_equal_channels_count_thrice() {
+        let of = |profile| cost(profile, &[9, 9, 9, 0, 0], &[0, 9, 0, 9, 5], None);
+        let [census, both, rgb] = [Profile::Census, Profile::Census16, Profile::Census32].map(of);
+        assert_eq!([0, 1, 2, 3, 4].map(|x| census.at(x, 0, 0)), [3, 0, 6, 3, 3]);
+        for x in 0..5 {
+            assert_eq!(rgb.at(x, 0, 0), both.at(x, 0, 0) + 2 * census.at(x, 0, 0), "{x}");
+        }
     }
 
     /// Matching an image in tiles relies on this.
@@ -189,6 +188,20 @@ mod tests {
                 assert_eq!(found, whole.at(x, y, label), "{} {rows:?} ({x}, {y})", profile.name());
             }
         }
+    }
+
+    #[test]
+    fn codes_of_16_bits_count_to_15_and_those_of_32_to_32() {
+        // In the middle of the left image all neighbours are brighter, in the right one none.
+        let mut views = [[9; 81], [9; 81]];
+        (views[0][40], views[1][40]) = (0, 10);
+        let [left, right] = views.map(|view| Image::from_grey(9, 9, &view).unwrap());
+        let pair = StereoPair::new(left, right).unwrap();
+        let at = |profile, x, y| DataCost::of_pair(&pair, Model::new(profile, 1).unwrap()).unwrap().at(x, y, 0);
+        assert_eq!([Profile::Census16, Profile::Census32].map(|profile| at(profile, 4, 4)), [15, 32]);
+        // Beside it, only the middle differs; it counts in all three channels, or four columns further, once.
+        assert_eq!([Profile::Census16, Profile::Census32].map(|profile| at(profile, 5, 4)), [1, 3]);
+        assert_eq!([Profile::Census16, Profile::Census32].map(|profile| at(profile, 8, 4)), [1, 1]);
     }
 
     #[test]

@@ -67,6 +67,9 @@ pub enum Error {
         /// The requested truncation.
         truncation: u8,
     },
+    /// Edge levels in the wrong order.
+    #[error("the edge levels' grey differences must ascend to 255, and their slopes and truncations must not rise")]
+    EdgeLevels,
     /// A calibration that no pair of cameras can have.
     #[error("{0}")]
     Calibration(&'static str),

@@ -43,7 +43,7 @@
 //! cost 255, which no sum of a label in it reaches.
 //!
 //! **Messages for other labels.** A message M that its receiver holds for the labels S rises by at most s from one label to the
-//! next, times their distance: it is an envelope of slope s, or s div 2 over a weak edge, cut at a constant, or the rounded
+//! next, times their distance: it is an envelope of the slope of its edge's level, at most s, cut at a constant, or the rounded
 //! mean of such. So the least `M(e) + s |d - e|` over e in S is offered by the nearest label of S below d or above it.
 //!
 //! **Coarser grids.** A coarse node's cost is the sum of its children's. Subtracting a child's least cost first shifts
@@ -51,8 +51,8 @@
 //! are normalised and clipped. The lower clip of [`crate::Settings::coarse_clip`] changes what is computed, not how:
 //! with it, D of a coarse grid means the clipped cost.
 //!
-//! **Weak edges** ([`crate::Model::with_weak_edges`]) have their own slope and truncation, at most s and K. A message
-//! over a weak edge lies in 0..=K div 2, hence in 0..=K. Its truncation limits the minimum to `h_min + K div 2`, so an
+//! **Edge levels** ([`crate::EdgeLevels`]). Above, s and K are those of the first level; no level has greater ones. A message
+//! over an edge with the truncation K' lies in 0..=K', hence in 0..=K. Its truncation limits the minimum to `h_min + K'`, so an
 //! entry above `h_min + K` matters even less. All bounds here hold with s and K.
 //!
 //! **Plain adds.** A sum never exceeds `4K + 1 + 3K + min(s, K)` in a message update and `4K + 1 + 4K` in a belief.

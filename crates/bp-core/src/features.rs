@@ -2,17 +2,6 @@
 
 use crate::{Image, census};
 
-/// The 24 bits of the 5x5 census code.
-pub(crate) fn census_5x5(image: &Image, x: usize, y: usize) -> [u8; 3] {
-    let [_, code @ ..] = census::code_5x5(image, x, y).to_be_bytes();
-    code
-}
-
-/// The 8 bits of the census code of each channel.
-pub(crate) fn census_rgb(image: &Image, x: usize, y: usize) -> [u8; 3] {
-    [0, 1, 2].map(|channel| census::code_of_channel(image, x, y, channel))
-}
-
 /// Grey value and horizontal gradient: half the difference of the two neighbours, offset so that 128 means equal.
 pub(crate) fn gradient(image: &Image, x: usize, y: usize) -> [u8; 2] {
     let beside = |dx| u16::from(image.grey_near(x as isize + dx, y as isize));
@@ -37,9 +26,15 @@ pub(crate) fn sum_of_differences(left: [u8; 3], right: [u8; 3]) -> u16 {
     left.into_iter().zip(right).map(|(left, right)| difference(left, right)).sum()
 }
 
-/// The number of bits in which two codes of [`census_5x5`] or [`census_rgb`] differ.
-pub(crate) fn hamming_distance([a, b, c]: [u8; 3], [d, e, f]: [u8; 3]) -> u16 {
-    (u32::from_be_bytes([0, a, b, c]) ^ u32::from_be_bytes([0, d, e, f])).count_ones() as u16
+/// The census codes of the channels, and the outer code.
+pub(crate) fn census_32(image: &Image, x: usize, y: usize) -> [u8; 4] {
+    let [red, green, blue] = [0, 1, 2].map(|channel| census::code_of_channel(image, x, y, channel));
+    [red, green, blue, census::outer_code(image, x, y)]
+}
+
+/// The number of bits in which two codes differ.
+pub(crate) fn hamming_distance<const BYTES: usize>(left: [u8; BYTES], right: [u8; BYTES]) -> u16 {
+    left.into_iter().zip(right).map(|(left, right)| (left ^ right).count_ones() as u16).sum()
 }
 
 /// The cost of two features of [`gradient`] under [`crate::Profile::Gradient`].

@@ -60,6 +60,10 @@ impl LabelSet {
     /// How far a label may lie from a coarser label.
     const REACH: usize = 2;
 
+    /// How many nodes must have such a label. The labels of fewer are mostly mistakes in hidden areas, each of which would add
+    /// five labels; four nodes are as small as what the coarser grids find at all.
+    const AGREEING: u16 = 4;
+
     /// The number of grids that have label sets with so many labels, from the finest one on, if there are coarser ones: two, and
     /// from 448 on three, because the third one's labels would be most of the work.
     #[must_use]
@@ -77,9 +81,9 @@ impl LabelSet {
         Self { words: array::from_fn(word) }
     }
 
-    /// The set of a patch of `grid`: the labels of `plan` that differ by at most 2 from that of a node of
-    /// [`Patch::region`]. `coarser` are the labels decided on the next coarser grid, `[height][width]`. On a grid without
-    /// label sets, all labels.
+    /// The set of a patch of `grid`: the labels of `plan` that differ by at most 2 from those of at least four nodes of
+    /// [`Patch::region`], or, if there is no such label, from that of any. `coarser` are the labels decided on the next coarser
+    /// grid, `[height][width]`. On a grid without label sets, all labels.
     ///
     /// # Panics
     /// If `coarser` is shorter than that grid.
@@ -91,22 +95,24 @@ impl LabelSet {
         }
         let size = plan.size(grid + 1);
         let region = patch.region(size);
-        let mut set = Self { words: [0; MAX_LABELS / 64] };
+        let mut nodes = [0; MAX_LABELS];
         for y in region.rows {
-            coarser[y * size.width..][region.columns.clone()].iter().for_each(|&label| set.insert(label.into()));
+            coarser[y * size.width..][region.columns.clone()].iter().for_each(|&label| nodes[usize::from(label)] += 1);
         }
-        (0..Self::REACH).for_each(|_| set.spread());
-        Self { words: array::from_fn(|i| set.words[i] & Self::all(labels).words[i]) }
+        let near = |least| Self::near(&nodes[..labels], least);
+        Some(near(Self::AGREEING)).filter(|set| set.count() > 0).unwrap_or_else(|| near(1))
     }
 
-    /// Adds the labels next to those that it holds.
-    fn spread(&mut self) {
-        let before = self.words;
-        for (i, word) in self.words.iter_mut().enumerate() {
-            let lower = i.checked_sub(1).map_or(0, |i| before[i]);
-            let upper = before.get(i + 1).copied().unwrap_or(0);
-            *word |= *word << 1 | lower >> 63 | *word >> 1 | upper << 63;
+    /// The labels that differ by at most 2 from those of at least so many nodes, given how many have each label.
+    fn near(nodes: &[u16], least: u16) -> Self {
+        let mut set = Self { words: [0; MAX_LABELS / 64] };
+        for label in 0..nodes.len() {
+            let reach = label.saturating_sub(Self::REACH)..nodes.len().min(label + Self::REACH + 1);
+            if nodes[reach].iter().sum::<u16>() >= least {
+                set.insert(label);
+            }
         }
+        set
     }
 
     fn insert(&mut self, label: usize) {
@@ -163,15 +169,34 @@ mod tests {
     }
 
     #[test]
-    fn a_set_reaches_two_labels_from_every_coarser_one() {
+    fn a_set_reaches_two_labels_from_those_of_four_coarser_nodes() {
         let (plan, patch) = (plan(true), Patch { columns: 0..64, rows: 0..32 });
         let mut coarser = vec![40; plan.size(1).pixels()];
-        coarser[0] = 1;
-        coarser[33] = 69;
+        let set = |coarser: &[u16]| LabelSet::of(&plan, 0, &patch, coarser);
+        for (node, label) in [1, 1, 2, 69, 69, 67].into_iter().enumerate() {
+            coarser[node] = label;
+        }
         coarser[34] = 20;
-        let set = LabelSet::of(&plan, 0, &patch, &coarser);
-        assert_eq!(set.labels().collect::<Vec<_>>(), [0, 1, 2, 3, 38, 39, 40, 41, 42, 67, 68, 69]);
-        assert_eq!((set.count(), set.contains(3), set.contains(4), set.contains(5000)), (12, true, false, false));
+        // One node more has a label near 69, but beyond the region.
+        coarser[75 + 34] = 69;
+        assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [38, 39, 40, 41, 42]);
+        (coarser[6], coarser[7]) = (3, 68);
+        // Only 1 to 3 are near all four low labels, and 67 to 69 near all four high ones.
+        assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [1, 2, 3, 38, 39, 40, 41, 42, 67, 68, 69]);
+        assert_eq!((set(&coarser).count(), set(&coarser).contains(3), set(&coarser).contains(5000)), (11, true, false));
+    }
+
+    #[test]
+    fn where_no_four_nodes_agree_all_count() {
+        let plan = {
+            let size = Size { width: 5, height: 3 };
+            let settings = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
+            let settings = Settings { label_sets: true, grids: 3, ..settings };
+            Plan::new(size, Model::new(Profile::Census, 70).unwrap(), settings).unwrap()
+        };
+        let patch = Patch { columns: 0..5, rows: 0..3 };
+        let set = LabelSet::of(&plan, 0, &patch, &[0, 0, 0, 30, 40, 69]);
+        assert_eq!(set.labels().collect::<Vec<_>>(), [0, 1, 2, 28, 29, 30, 31, 32, 38, 39, 40, 41, 42, 67, 68, 69]);
     }
 
     #[test]

@@ -75,6 +75,6 @@ pub use seam::Seam;
 pub use settings::{Algorithm, BAND_ROWS, Cut, MessageStart, Schedule, Settings};
 pub use side::Side;
 pub use size::Size;
-pub use smoothness::Smoothness;
+pub use smoothness::{EdgeLevels, Smoothness};
 pub use stage::Stage;
 pub use tiles::{HALO, Needed, Span, Tile, Tiled, Tiling};

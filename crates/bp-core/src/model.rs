@@ -1,7 +1,7 @@
 //! The model: labels, data cost profile and smoothness of a Markov random field on a grid.
 
 use crate::{
-    Error, Smoothness,
+    EdgeLevels, Error, Smoothness,
     limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
 };
 
@@ -17,8 +17,6 @@ pub enum Profile {
     /// The sum of absolute differences over R, G and B, not truncated: the default energy of the Middlebury MRF code
     /// (Szeliski et al. 2008).
     Mrf,
-    /// `min(Hamming distance of 5x5 census codes, 20)`; see [`Profile::Census`].
-    Census5x5,
     /// Truncated absolute differences of grey values and of their horizontal gradients,
     /// `(3 min(|Il - Ir|, 20) + 35 min(|Gl - Gr|, 4) + 5) div 10` with `G(x) = (256 + I(x + 1) - I(x - 1)) div 2`.
     /// Scharstein (1994) matched by gradients, Bleyer, Rhemann and Rother (2011) by a truncated sum of both; the
@@ -29,21 +27,18 @@ pub enum Profile {
     /// spans I(x) and the half-pixel values `(I(x) + I(x - 1) + 1) div 2` and `(I(x) + I(x + 1) + 1) div 2`. Of the two
     /// directions, the smaller distance counts.
     BirchfieldTomasi,
-    /// `min(sum over R, G, B of the Hamming distances of 3x3 census codes, 18)`; see [`Profile::Census`].
-    CensusRgb,
+    /// `min(Hamming distance of census codes of 16 bits, 15)`: the 3x3 code, and eight neighbours two and four pixels away; see
+    /// [`Profile::Census`] and [`crate::census::outer_code`]. With 15, and not 16, a byte holds the sum of 16 pixels.
+    Census16,
+    /// The sum of the Hamming distances of the 3x3 census codes of R, G and B, and of the outer code of the grey values; see
+    /// [`Profile::Census16`].
+    Census32,
 }
 
 impl Profile {
     /// All profiles.
-    pub const ALL: [Self; 7] = [
-        Self::Thesis,
-        Self::Census,
-        Self::Mrf,
-        Self::Census5x5,
-        Self::Gradient,
-        Self::BirchfieldTomasi,
-        Self::CensusRgb,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Thesis, Self::Census, Self::Mrf, Self::Gradient, Self::BirchfieldTomasi, Self::Census16, Self::Census32];
 
     /// The name used in options and records.
     #[must_use]
@@ -52,10 +47,10 @@ impl Profile {
             Self::Thesis => "thesis",
             Self::Census => "census",
             Self::Mrf => "mrf",
-            Self::Census5x5 => "census5x5",
             Self::Gradient => "gradient",
             Self::BirchfieldTomasi => "birchfield-tomasi",
-            Self::CensusRgb => "census-rgb",
+            Self::Census16 => "census16",
+            Self::Census32 => "census32",
         }
     }
 
@@ -64,8 +59,9 @@ impl Profile {
     pub fn channels(self) -> usize {
         match self {
             Self::Thesis | Self::Census => 1,
-            Self::Gradient => 2,
-            Self::Mrf | Self::Census5x5 | Self::BirchfieldTomasi | Self::CensusRgb => 3,
+            Self::Gradient | Self::Census16 => 2,
+            Self::Mrf | Self::BirchfieldTomasi => 3,
+            Self::Census32 => 4,
         }
     }
 
@@ -76,9 +72,10 @@ impl Profile {
             Self::Thesis => 11,
             Self::Census => 6,
             Self::Mrf => 765,
-            Self::Census5x5 | Self::Gradient => 20,
+            Self::Gradient => 20,
             Self::BirchfieldTomasi => 30,
-            Self::CensusRgb => 18,
+            Self::Census16 => 15,
+            Self::Census32 => 32,
         }
     }
 
@@ -87,37 +84,36 @@ impl Profile {
     pub fn out_of_range_cost(self) -> u16 {
         match self {
             Self::Thesis | Self::Mrf => self.max_cost(),
-            Self::Census | Self::Census5x5 | Self::Gradient | Self::BirchfieldTomasi | Self::CensusRgb => {
-                self.max_cost() / 2
-            }
+            Self::Census | Self::Gradient | Self::BirchfieldTomasi => self.max_cost() / 2,
+            Self::Census16 => 6,
+            Self::Census32 => 12,
         }
     }
 
-    /// Slope s and truncation K of the smoothness cost.
-    fn smoothness(self) -> (u8, u8) {
+    /// The smoothness costs of its edges.
+    fn edges(self) -> EdgeLevels {
+        let uniform = |slope, truncation| EdgeLevels::uniform(Smoothness { slope, truncation });
         match self {
-            Self::Thesis => (10, 17),
-            Self::Census => (2, 10),
-            Self::Mrf => (20, 40),
-            Self::Census5x5 => (5, 20),
-            Self::Gradient => (7, 50),
-            Self::BirchfieldTomasi => (10, 60),
-            Self::CensusRgb => (4, 24),
+            Self::Thesis => uniform(10, 17),
+            Self::Census => uniform(2, 10),
+            Self::Mrf => uniform(20, 40),
+            Self::Gradient => uniform(7, 50),
+            Self::BirchfieldTomasi => uniform(10, 60),
+            Self::Census16 => EdgeLevels::by_grey([(3, 22), (2, 15), (2, 10), (1, 5)]),
+            Self::Census32 => EdgeLevels::by_grey([(6, 40), (4, 28), (3, 18), (2, 10)]),
         }
     }
 }
 
 /// The labels, and the energy that matching minimises:
-/// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q), with
-/// half of s and K on weak edges; see [`Model::with_weak_edges`].
+/// `E(f) = sum_p D(p, f_p) + sum_(p,q) min(s |f_p - f_q|, K)` over the pixels p and the 4-neighbour pairs (p, q). The slope s and
+/// the truncation K are those of the edge's level; see [`EdgeLevels`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Model {
     profile: Profile,
     labels: u16,
     min_disparity: i32,
-    slope: u8,
-    truncation: u8,
-    weak_edges: Option<u8>,
+    edges: EdgeLevels,
 }
 
 impl Model {
@@ -129,8 +125,7 @@ impl Model {
         if labels == 0 || labels > MAX_LABELS {
             return Err(Error::Labels { labels });
         }
-        let (slope, truncation) = profile.smoothness();
-        Ok(Self { profile, labels: labels as u16, min_disparity: 0, slope, truncation, weak_edges: None })
+        Ok(Self { profile, labels: labels as u16, min_disparity: 0, edges: profile.edges() })
     }
 
     /// The same model, but label i is a disparity of `min_disparity + i` pixels.
@@ -144,7 +139,7 @@ impl Model {
         Ok(Self { min_disparity, ..self })
     }
 
-    /// The same model with another slope s and truncation K, in the units of the profile's data cost.
+    /// The same model with one slope s and truncation K for all edges, in the units of the profile's data cost.
     ///
     /// # Errors
     /// [`Error::Truncation`] if K exceeds [`MAX_TRUNCATION`].
@@ -152,16 +147,14 @@ impl Model {
         if truncation > MAX_TRUNCATION {
             return Err(Error::Truncation { truncation });
         }
-        Ok(Self { slope, truncation, ..self })
+        Ok(self.with_edges(EdgeLevels::uniform(Smoothness { slope, truncation })))
     }
 
-    /// The same model with *weak edges*. Surfaces tend to end where the image changes. So an edge between two nodes
-    /// whose grey values in the left image differ by more than `threshold` has slope s div 2 and truncation K div 2
-    /// (after Boykov, Veksler and Zabih 2001). Every grid uses its own grey values; see [`Model::coarse_grey`]. With
-    /// `None`, the default, no edge is weak.
+    /// The same model with other smoothness costs. Every grid uses its own grey values to find the level of an edge; see
+    /// [`Model::coarse_grey`].
     #[must_use]
-    pub fn with_weak_edges(self, threshold: Option<u8>) -> Self {
-        Self { weak_edges: threshold, ..self }
+    pub fn with_edges(self, edges: EdgeLevels) -> Self {
+        Self { edges, ..self }
     }
 
     /// The data cost profile.
@@ -188,35 +181,34 @@ impl Model {
         self.min_disparity + i32::from(label)
     }
 
-    /// Slope s of the smoothness cost.
+    /// The smoothness costs by level.
     #[must_use]
-    pub fn slope(&self) -> u8 {
-        self.slope
+    pub fn edges(&self) -> &EdgeLevels {
+        &self.edges
     }
 
-    /// Truncation K of the smoothness cost.
-    #[must_use]
-    pub fn truncation(&self) -> u8 {
-        self.truncation
-    }
-
-    /// The grey difference above which edges are weak; `None` if no edge is.
-    #[must_use]
-    pub fn weak_edges(&self) -> Option<u8> {
-        self.weak_edges
-    }
-
-    /// The smoothness cost of edges that are not weak.
+    /// The smoothness cost of the first level: no other has a greater slope or truncation.
     #[must_use]
     pub fn smoothness(&self) -> Smoothness {
-        Smoothness { slope: self.slope, truncation: self.truncation }
+        self.edges.usual()
+    }
+
+    /// Its slope s.
+    #[must_use]
+    pub fn slope(&self) -> u8 {
+        self.smoothness().slope
+    }
+
+    /// Its truncation K.
+    #[must_use]
+    pub fn truncation(&self) -> u8 {
+        self.smoothness().truncation
     }
 
     /// The smoothness cost of an edge between nodes of these grey values.
     #[must_use]
     pub fn smoothness_between(&self, a: u8, b: u8) -> Smoothness {
-        let is_weak = self.weak_edges.is_some_and(|threshold| a.abs_diff(b) > threshold);
-        if is_weak { self.smoothness().weakened() } else { self.smoothness() }
+        self.edges.smoothness()[self.edges.level(a.abs_diff(b))]
     }
 
     /// The grey value of a node of a coarser grid: the mean of its `count` children's grey values, whose sum is `sum`,
@@ -233,7 +225,7 @@ impl Model {
     /// [`crate::Plan::clip`].
     #[must_use]
     pub fn clip(&self) -> u8 {
-        4 * self.truncation + 1
+        4 * self.truncation() + 1
     }
 
     /// The largest data cost on `grid`, where a node sums up to `4^grid` pixels.
@@ -267,15 +259,24 @@ mod tests {
     }
 
     #[test]
-    fn edges_are_weak_above_the_threshold_only() {
-        let plain = Model::new(Profile::Census, 4).unwrap().with_smoothness(3, 11).unwrap();
-        let model = plain.with_weak_edges(Some(10));
+    fn grey_values_choose_the_smoothness() {
+        let usual = Smoothness { slope: 3, truncation: 11 };
+        let model = Model::new(Profile::Census, 4).unwrap().with_edges(EdgeLevels::halved_above(10, usual));
         let weak = Smoothness { slope: 1, truncation: 5 };
-        assert_eq!([(50, 60), (60, 50)].map(|(a, b)| model.smoothness_between(a, b)), [plain.smoothness(); 2]);
+        assert_eq!([(50, 60), (60, 50)].map(|(a, b)| model.smoothness_between(a, b)), [usual; 2]);
         assert_eq!([(50, 61), (61, 50)].map(|(a, b)| model.smoothness_between(a, b)), [weak; 2]);
-        assert_eq!(plain.smoothness_between(0, 255), plain.smoothness());
+        let uniform = model.with_smoothness(3, 11).unwrap();
+        assert_eq!(uniform.smoothness_between(0, 255), usual);
         assert_eq!((weak.of(2, 9), weak.of(9, 6), weak.step()), (5, 3, 1));
         assert_eq!([(3, 2), (5, 4), (6, 4), (1020, 4)].map(|(sum, n)| Model::coarse_grey(sum, n)), [2, 1, 2, 255]);
+    }
+
+    #[test]
+    fn the_profiles_own_levels_are_valid() {
+        for edges in Profile::ALL.map(Profile::edges) {
+            let [first, second, third, last] = std::array::from_fn(|i| (edges.most()[i], edges.smoothness()[i]));
+            assert_eq!(EdgeLevels::new([first, second, third, last]), Ok(edges));
+        }
     }
 
     #[test]

@@ -225,13 +225,14 @@ impl Plan {
         buffers
     }
 
-    /// The bytes of the grey values that determine the weak edges of a grid: one per node, or 0 without weak edges.
+    /// The bytes of the grey values that determine the levels of a grid's edges: one per node, or 0 if all edges have the same
+    /// cost.
     ///
     /// # Panics
     /// If there is no such grid.
     #[must_use]
     pub fn grey_bytes(&self, grid: usize) -> u64 {
-        if self.model.weak_edges().is_some() { self.sizes[grid].pixels() as u64 } else { 0 }
+        if self.model.edges().is_uniform() { 0 } else { self.sizes[grid].pixels() as u64 }
     }
 
     /// The bytes of all [`Plan::buffers`].

@@ -251,7 +251,7 @@ pub struct Settings {
     /// - A message has a value for each label of the receiver's set: the least, over the labels a of the sender's set, of
     ///   `h(a) + min(s |a - d|, K)`, less the least h.
     /// - Where a message is used for other labels than those of its receiver's set S, its value at d is the least
-    ///   `min(M(e) + s |d - e|, K)` over e in S, with s and K of the model. This applies to the messages that the first messages
+    ///   `min(M(e) + s |d - e|, K)` over e in S, with s and K of the first level of edges. This applies to the messages that the first messages
     ///   of the finer grid are made from, and to those of a seam, whose rows have other sets than the bands. Where nothing was
     ///   received, it is zeros for all labels.
     /// - A label is the smallest of its node's set that minimises what it minimises otherwise.

@@ -25,10 +25,10 @@ macro_rules! compare_by {
         use $crate::compare;
         match $profile {
             Profile::Census => with!(compare::hamming_distance::<_, $vector>),
-            Profile::Census5x5 => with!(compare::hamming_distance_of_24::<_, $vector, 20>),
             Profile::Gradient => with!(compare::gradient_difference::<_, $vector>),
             Profile::BirchfieldTomasi => with!(compare::sampling_insensitive_difference::<_, $vector>),
-            Profile::CensusRgb => with!(compare::hamming_distance_of_24::<_, $vector, 18>),
+            Profile::Census16 => with!(compare::hamming_distance_of_16::<_, $vector>),
+            Profile::Census32 => with!(compare::hamming_distance_of_32::<_, $vector>),
             // `mrf` has costs above 8 bits and never gets here.
             Profile::Thesis | Profile::Mrf => with!(compare::truncated_difference::<_, $vector>),
         }
@@ -43,14 +43,22 @@ pub(crate) fn hamming_distance<S: Simd, V: Vector<S>>(simd: S, [left]: [V; 1], [
     (left ^ right).count_ones().min(V::splat(simd, 6))
 }
 
-/// [`bp_core::Profile::Census5x5`] and [`bp_core::Profile::CensusRgb`]: the Hamming distance of 24 bits, at most `MOST`.
+/// [`bp_core::Profile::Census16`].
 #[inline(always)]
-pub(crate) fn hamming_distance_of_24<S: Simd, V: Vector<S>, const MOST: u8>(simd: S, left: [V; 3], right: [V; 3]) -> V {
-    let [a, b, c] = [left[0] ^ right[0], left[1] ^ right[1], left[2] ^ right[2]];
+pub(crate) fn hamming_distance_of_16<S: Simd, V: Vector<S>>(simd: S, left: [V; 2], right: [V; 2]) -> V {
+    let [a, b] = [left[0] ^ right[0], left[1] ^ right[1]];
+    (a.count_ones() + b.count_ones()).min(V::splat(simd, 15))
+}
+
+/// [`bp_core::Profile::Census32`].
+#[inline(always)]
+pub(crate) fn hamming_distance_of_32<S: Simd, V: Vector<S>>(_: S, left: [V; 4], right: [V; 4]) -> V {
+    let [[a, b, c, d], [e, f, g, h]] = [left, right];
+    let [a, b, c] = [a ^ e, b ^ f, c ^ g];
     // A full adder per bit gives a sum and a carry that counts twice. That leaves two vectors of bits to count, not three.
     let (sum, carry) = (a ^ b ^ c, a & b | c & (a ^ b));
     let twice = carry.count_ones();
-    (sum.count_ones() + twice + twice).min(V::splat(simd, MOST))
+    sum.count_ones() + twice + twice + (d ^ h).count_ones()
 }
 
 /// [`bp_core::Profile::Thesis`], with a table.

@@ -101,12 +101,12 @@ fn padded_bytes(size: Size, profile: Profile) -> usize {
     padded_planes(profile) * (size.height + 2 * APRON) * (size.width + 2 * APRON)
 }
 
-/// The number of planes in which a profile compares neighbours: one of grey values, or one per colour channel.
+/// The number of planes in which a profile compares neighbours: one of grey values, or one per colour channel and one of grey values.
 fn padded_planes(profile: Profile) -> usize {
     match profile {
         Profile::Thesis | Profile::Mrf => 0,
-        Profile::Census | Profile::Census5x5 | Profile::Gradient | Profile::BirchfieldTomasi => 1,
-        Profile::CensusRgb => 3,
+        Profile::Census | Profile::Gradient | Profile::BirchfieldTomasi | Profile::Census16 => 1,
+        Profile::Census32 => 4,
     }
 }
 
@@ -122,7 +122,7 @@ fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row:
     simd.vectorize(
         #[inline(always)]
         || match profile {
-            Profile::CensusRgb => values.for_each(|(out, pixel)| *out = pixel[plane]),
+            Profile::Census32 if plane < 3 => values.for_each(|(out, pixel)| *out = pixel[plane]),
             _ => values.for_each(|(out, &pixel)| *out = grey(pixel)),
         },
     );
@@ -130,18 +130,14 @@ fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row:
     after.fill(own[width - 1]);
 }
 
-/// The columns and rows of eight neighbours, relative to the pixel [`APRON`] columns and rows before the centre.
-type Neighbours = [(usize, usize); 8];
+/// The columns and rows of eight neighbours, relative to the pixel.
+type Neighbours = [(isize, isize); 8];
 
 /// The neighbours that a census code compares, in order.
-const CENSUS: Neighbours = [(1, 1), (2, 1), (3, 1), (1, 2), (3, 2), (1, 3), (2, 3), (3, 3)];
+const CENSUS: Neighbours = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
 
-/// The neighbours that each byte of the 5x5 code compares.
-const CENSUS_5X5: [Neighbours; 3] = [
-    [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (0, 1), (1, 1), (2, 1)],
-    [(3, 1), (4, 1), (0, 2), (1, 2), (3, 2), (4, 2), (0, 3), (1, 3)],
-    [(2, 3), (3, 3), (4, 3), (0, 4), (1, 4), (2, 4), (3, 4), (4, 4)],
-];
+/// The neighbours that the outer code compares.
+const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0), (0, 2), (0, 4)];
 
 /// Rows of features to be written.
 struct Rows<'a> {
@@ -186,30 +182,33 @@ impl View<'_> {
                         every_second(odd, &pixels[1..], |pixel| pixel[channel]);
                     }
                     Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, 0, Node { x, y }, out)),
-                    Profile::Census5x5 => {
-                        deal(even, odd, |x, out| self.census(&CENSUS_5X5[channel], 0, Node { x, y }, out))
-                    }
                     Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, Node { x, y }, out)),
                     Profile::BirchfieldTomasi => {
                         deal(even, odd, |x, out| self.half_samples(channel, Node { x, y }, out))
                     }
-                    Profile::CensusRgb => deal(even, odd, |x, out| self.census(&CENSUS, channel, Node { x, y }, out)),
+                    Profile::Census16 => {
+                        deal(even, odd, |x, out| self.census([&CENSUS, &OUTER][channel], 0, Node { x, y }, out))
+                    }
+                    Profile::Census32 => deal(even, odd, |x, out| {
+                        self.census([&CENSUS, &CENSUS, &CENSUS, &OUTER][channel], channel, Node { x, y }, out)
+                    }),
                 },
             );
         }
     }
 
-    /// The values of a plane `dx - APRON` columns and `dy - APRON` rows away from consecutive pixels, starting at `at`.
+    /// The values of a plane `dx` columns and `dy` rows away from consecutive pixels, starting at `at`.
     #[inline(always)]
-    fn near(&self, plane: usize, at: Node, (dx, dy): (usize, usize), columns: usize) -> &[u8] {
-        let row = self.image.size().width + 2 * APRON;
-        &self.padded[((at.y + dy) * padded_planes(self.profile) + plane) * row + at.x + dx..][..columns]
+    fn near(&self, plane: usize, at: Node, (dx, dy): (isize, isize), columns: usize) -> &[u8] {
+        let width = self.image.size().width + 2 * APRON;
+        let [column, row] = [(at.x, dx), (at.y, dy)].map(|(at, by)| (at + APRON).wrapping_add_signed(by));
+        &self.padded[(row * padded_planes(self.profile) + plane) * width + column..][..columns]
     }
 
     /// Computes a byte of the census codes of pixels from `at` on, from the values of a plane; see [`bp_core::census`].
     #[inline(always)]
     fn census(&self, neighbours: &Neighbours, plane: usize, at: Node, codes: &mut [u8]) {
-        let middle = self.near(plane, at, (APRON, APRON), codes.len());
+        let middle = self.near(plane, at, (0, 0), codes.len());
         for &offset in neighbours {
             let neighbours = self.near(plane, at, offset, codes.len());
             for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
@@ -250,7 +249,7 @@ impl View<'_> {
     /// The grey values for pixels from `at` on: of their left neighbours, of the pixels, and of their right neighbours.
     #[inline(always)]
     fn row_near(&self, at: Node, columns: usize) -> [&[u8]; 3] {
-        [APRON - 1, APRON, APRON + 1].map(|dx| self.near(0, at, (dx, APRON), columns))
+        [-1, 0, 1].map(|dx| self.near(0, at, (dx, 0), columns))
     }
 }
 

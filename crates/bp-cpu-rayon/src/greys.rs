@@ -1,17 +1,20 @@
-//! The grey values of a grid. They determine which edges are weak; see [`bp_core::Model::with_weak_edges`].
+//! The grey values of a grid. They determine the levels of edges; see [`bp_core::EdgeLevels`].
 
-use bp_core::{Error, Image, Model, Plan, image::grey, memory};
-use fearless_simd::{Level, Select, Simd, SimdInt, dispatch};
+use bp_core::{EdgeLevels, Error, Image, Model, Plan, image::grey, memory};
+use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, dispatch, u8x16, u32x4};
 use rayon::prelude::*;
 
-use crate::shape::{BLOCK, Column, MIN_ROWS, Shape, every_second};
+use crate::{
+    compare::Vector,
+    shape::{BLOCK, Column, MIN_ROWS, Shape, every_second},
+};
 
-/// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes. Empty if the model
-/// has no weak edges.
+/// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes. Empty if all
+/// edges have the same cost.
 #[derive(Debug)]
 pub(crate) struct Greys {
     shape: Shape,
-    threshold: u8,
+    most: [u8; EdgeLevels::COUNT],
     values: Vec<u8>,
 }
 
@@ -19,7 +22,7 @@ impl Greys {
     /// Allocates room for the grey values of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let values = memory::filled("grey values", bytes(plan, grid) as usize, 0)?;
-        Ok(Self { shape: Shape::new(plan, grid), threshold: plan.model().weak_edges().unwrap_or(u8::MAX), values })
+        Ok(Self { shape: Shape::new(plan, grid), most: plan.model().edges().most(), values })
     }
 
     /// Loads the grey values of an image.
@@ -51,7 +54,7 @@ impl Greys {
         });
     }
 
-    /// The grey values around the nodes of `plane` in row `y`; `None` if the model has no weak edges.
+    /// The grey values around the nodes of `plane` in row `y`; `None` if all edges have the same cost.
     pub(crate) fn around(&self, plane: usize, y: usize) -> Option<Around<'_>> {
         if self.values.is_empty() {
             return None;
@@ -63,7 +66,7 @@ impl Greys {
         // An even column has its left neighbour in the pair before it, an odd one its right neighbour in the pair after it.
         let next = if plane == 0 { &beside[BLOCK - 1..] } else { &beside[BLOCK + 1..] };
         let neighbours = [same, next, self.lanes(plane, above), self.lanes(plane, below)];
-        Some(Around { threshold: self.threshold, own: self.lanes(plane, y), neighbours })
+        Some(Around { most: self.most, own: self.lanes(plane, y), neighbours })
     }
 
     /// The values of `plane` in row `y` from lane 0 on.
@@ -85,7 +88,7 @@ impl Greys {
 /// The bytes that [`Greys`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let shape = Shape::new(plan, grid);
-    if plan.model().weak_edges().is_some() { (shape.size.height * 2 * stride(&shape)) as u64 } else { 0 }
+    if plan.model().edges().is_uniform() { 0 } else { (shape.size.height * 2 * stride(&shape)) as u64 }
 }
 
 /// The distance from one row of lanes to the next.
@@ -114,7 +117,8 @@ fn deal<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
 /// The grey values of the nodes of a plane in a row, and those of their neighbours by slot, each `[lane]`.
 #[derive(Clone, Copy)]
 pub(crate) struct Around<'a> {
-    threshold: u8,
+    /// The greatest difference of each level.
+    most: [u8; EdgeLevels::COUNT],
     own: &'a [u8],
     neighbours: [&'a [u8]; 4],
 }
@@ -126,23 +130,32 @@ impl Around<'_> {
         self
     }
 
-    /// Whether the edge of this slot is weak.
-    pub(crate) fn is_weak(&self, slot: usize, lane: usize) -> bool {
-        self.own[lane].abs_diff(self.neighbours[slot][lane]) > self.threshold
+    /// The level of the edge of this slot.
+    pub(crate) fn level(&self, slot: usize, lane: usize) -> usize {
+        let difference = self.own[lane].abs_diff(self.neighbours[slot][lane]);
+        self.most.iter().filter(|&&most| difference > most).count()
     }
 
-    /// Chooses one of two values for each node of a vector from `lane` on: `weak` if the edge of this slot is weak.
+    /// The levels of the edges of this slot, for the nodes of a vector from `lane` on.
     #[inline(always)]
-    pub(crate) fn choose<S: Simd, V: SimdInt<S, Element = u8>>(
-        &self,
-        simd: S,
-        slot: usize,
-        lane: usize,
-        [usual, weak]: [u8; 2],
-    ) -> V {
+    pub(crate) fn levels<S: Simd, V: Vector<S>>(&self, simd: S, slot: usize, lane: usize) -> V {
         let load = |values: &[u8]| V::from_slice(simd, &values[lane..lane + V::LEN]);
         let (own, other) = (load(self.own), load(self.neighbours[slot]));
         let difference = own.saturating_sub(other) | other.saturating_sub(own);
-        difference.simd_gt(V::splat(simd, self.threshold)).select(V::splat(simd, weak), V::splat(simd, usual))
+        let [one, none] = [1, 0].map(|count| V::splat(simd, count));
+        // No difference exceeds that of the last level.
+        let [first, second, third, _] = self.most;
+        let mut level = none;
+        for most in [first, second, third] {
+            level += difference.simd_gt(V::splat(simd, most)).select(one, none);
+        }
+        level
     }
+}
+
+/// The value of each lane's level.
+#[inline(always)]
+pub(crate) fn of_levels<S: Simd, V: Vector<S>>(simd: S, levels: V, values: [u8; EdgeLevels::COUNT]) -> V {
+    let table = u32x4::splat(simd, u32::from_ne_bytes(values));
+    V::block_splat(table.bitcast::<u8x16<S>>()).swizzle_dyn_within_blocks(levels)
 }

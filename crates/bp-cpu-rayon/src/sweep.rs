@@ -9,6 +9,7 @@
 mod block;
 mod costs;
 mod decode;
+mod edges;
 mod lists;
 mod match_cost;
 mod messages;
@@ -141,7 +142,7 @@ impl Sweep<'_> {
         lists.fill(self.plan, self.grid, rows.clone(), self.coarser_labels)?;
         messages.fit(rows.len(), lists.entries())?;
         work.fit(rows.len(), lists.entries())?;
-        work.crossings.find(lists, self.plan.model().smoothness());
+        work.crossings.find(lists, self.plan.model().edges());
         Ok(())
     }
 

@@ -1,8 +1,8 @@
-//! The grey values of one grid. They determine which edges are weak.
+//! The grey values of one grid. They determine the levels of edges; see [`bp_core::EdgeLevels`].
 
 use bp_core::{Error, Image, Model, Plan, Size, Smoothness, memory};
 
-/// Grey values `[node]`; empty if the model has no weak edges.
+/// Grey values `[node]`; empty if all edges have the same cost.
 pub(crate) struct Greys {
     model: Model,
     size: Size,

@@ -21,11 +21,11 @@ use Access::{Read, Write};
 pub enum Kernel {
     /// The features that the profile compares, for every pixel of one image; part of the stage `match_cost`.
     Features,
-    /// Grey values of the left image, if the model has weak edges; part of the stage `match_cost`.
+    /// Grey values of the left image, if the model has edges of several levels; part of the stage `match_cost`.
     Greys,
     /// Data costs of the image.
     MatchCost,
-    /// Grey values of a coarser grid, if the model has weak edges; part of the stage `coarsen`.
+    /// Grey values of a coarser grid, if the model has edges of several levels; part of the stage `coarsen`.
     CoarsenGreys,
     /// Data costs of a coarser grid.
     Coarsen,
@@ -96,7 +96,7 @@ impl Kernel {
         let of_several = match self {
             Self::Features | Self::Greys => [bp_shaders::IMAGE, ""],
             Self::MatchCost | Self::Coarsen => [bp_shaders::COSTS, ""],
-            Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::WEAK_EDGES],
+            Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
             Self::CoarsenGreys | Self::Refine => ["", ""],
             Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => [bp_shaders::SETS, ""],
         };

@@ -1,5 +1,6 @@
 //! The parameters of a dispatch.
 
+use bp_core::EdgeLevels;
 use bytemuck::{Pod, Zeroable};
 
 /// Declares the struct, and a list of its fields that a test compares with the WGSL struct.
@@ -41,12 +42,14 @@ parameters! {
     row_step: u32,
     /// Number of its rows.
     rows: u32,
-    /// Slope of the smoothness cost.
-    slope: u32,
-    /// Truncation of the smoothness cost.
-    truncation: u32,
-    /// The smaller of the two.
-    step: u32,
+    /// Slope of the smoothness cost by level of edges.
+    slopes: [u32; EdgeLevels::COUNT],
+    /// Truncation of the smoothness cost by level.
+    truncations: [u32; EdgeLevels::COUNT],
+    /// The smaller of the two by level.
+    steps: [u32; EdgeLevels::COUNT],
+    /// The greatest grey difference of each level.
+    most: [u32; EdgeLevels::COUNT],
     /// The value at which data costs are clipped.
     clip: u32,
     /// Disparity of label 0.
@@ -73,12 +76,4 @@ parameters! {
     other_words: u32,
     /// First row of its strip, in that grid.
     other_first_row: u32,
-    /// Slope of the smoothness cost of weak edges.
-    weak_slope: u32,
-    /// Truncation of the smoothness cost of weak edges.
-    weak_truncation: u32,
-    /// The smaller of the two.
-    weak_step: u32,
-    /// Grey difference above which edges are weak.
-    edge_threshold: u32,
 }

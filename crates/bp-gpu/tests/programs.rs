@@ -3,12 +3,13 @@
 
 use std::collections::HashMap;
 
-use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
+use bp_core::{Algorithm, EdgeLevels, Error, Model, Plan, Profile, Schedule, Settings, Size};
 use bp_gpu::{Access, Command, Kernel, Limits, Parameters, Program};
 
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
-    let weak_edges = (profile == Profile::Census).then_some(10);
-    let model = Model::new(profile, 30).unwrap().with_weak_edges(weak_edges);
+    let model = Model::new(profile, 30).unwrap();
+    let levels = EdgeLevels::halved_above(10, model.smoothness());
+    let model = if profile == Profile::Census { model.with_edges(levels) } else { model };
     Plan::new(size, model, algorithm.settings(size, 20, 2, schedule)).unwrap()
 }
 
@@ -126,8 +127,8 @@ fn every_row_is_computed_as_often_as_it_should_be() {
         let sum = |wanted| rows.iter().filter(|((kernel, ..), _)| *kernel == wanted).map(|(_, &n)| n as usize).sum();
         let coarse: usize = (1..plan.grids()).map(height).sum();
         assert_eq!(2 * coarse, sum(Kernel::Coarsen), "{plan:?}");
-        let weak = plan.model().weak_edges().is_some();
-        let greys = if weak { [2 * size.height, 2 * coarse] } else { [0, 0] };
+        let uniform = plan.model().edges().is_uniform();
+        let greys = if uniform { [0, 0] } else { [2 * size.height, 2 * coarse] };
         assert_eq!([sum(Kernel::Greys), sum(Kernel::CoarsenGreys)], greys, "{plan:?}");
         if plan.settings().schedule != Schedule::Sweep {
             let fine: usize = (0..plan.grids() - 1).map(height).sum();

@@ -15,12 +15,15 @@ pub struct Settings {
     pub labels: usize,
     /// Disparity of the first label in pixels.
     pub min_disparity: i32,
-    /// Slope of the smoothness cost.
+    /// Slope of the smoothness cost, of the first level of edges.
     pub slope: u8,
-    /// Truncation of the smoothness cost (K).
+    /// Truncation of the smoothness cost (K), of the first level.
     pub truncation: u8,
-    /// Grey difference above which edges are weak, if that option is used. Records from before the option lack it.
+    /// The smoothness costs by grey difference, if not all edges have the same. Records from before 2026-11-23 lack it.
     #[serde(default)]
+    pub edge_levels: Vec<EdgeLevel>,
+    /// Only in records from before 2026-11-23: the grey difference above which slope and truncation were halved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_threshold: Option<u8>,
     /// Algorithm.
     pub algorithm: String,
@@ -51,6 +54,19 @@ pub struct Settings {
     pub message_updates: u64,
     /// Predicted bytes on the device, or in general if no device is given. With label sets, the most that there may be.
     pub planned_bytes: u64,
+}
+
+/// The smoothness cost of some edges; see [`bp_core::EdgeLevels`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct EdgeLevel {
+    /// The greatest difference of the two nodes' grey values.
+    pub most: u8,
+    /// Slope of the smoothness cost.
+    pub slope: u8,
+    /// Truncation of the smoothness cost.
+    pub truncation: u8,
 }
 
 /// The operations on a map after matching, in this order.
@@ -224,7 +240,8 @@ impl Settings {
             min_disparity: model.min_disparity(),
             slope: model.slope(),
             truncation: model.truncation(),
-            edge_threshold: model.weak_edges(),
+            edge_levels: edge_levels(model.edges()),
+            edge_threshold: None,
             algorithm: algorithm.name().to_owned(),
             k: None,
             z: None,
@@ -240,6 +257,14 @@ impl Settings {
             planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),
         }
     }
+}
+
+/// Describes the levels up to the one that holds every difference; nothing if all edges have the same cost.
+fn edge_levels(edges: &bp_core::EdgeLevels) -> Vec<EdgeLevel> {
+    let levels = edges.most().into_iter().zip(edges.smoothness());
+    let levels = levels.map(|(most, bp_core::Smoothness { slope, truncation })| EdgeLevel { most, slope, truncation });
+    let last = edges.level(u8::MAX);
+    if edges.is_uniform() { Vec::new() } else { levels.take(last + 1).collect() }
 }
 
 impl Finish {

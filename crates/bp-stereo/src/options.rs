@@ -26,12 +26,13 @@ pub struct Options {
     pub algorithm: Algorithm,
     /// The data cost and its default smoothness.
     pub profile: Profile,
-    /// Slope of the smoothness cost in units of the data cost; `None` means the profile's.
+    /// Slope of the smoothness cost in units of the data cost; `None` means the profile's. If this or the truncation is given,
+    /// all edges have the same cost, unless there is an edge threshold too.
     pub slope: Option<u8>,
     /// Truncation K of the smoothness cost, at most [`bp_core::MAX_TRUNCATION`]; `None` means the profile's.
     pub truncation: Option<u8>,
-    /// Weak edges: halves slope and truncation where neighbouring grey values of the left image differ by more than
-    /// this.
+    /// Halves slope and truncation where neighbouring grey values of the left image differ by more than this; 255 gives all
+    /// edges the same cost. `None` means the profile's levels; see [`bp_core::EdgeLevels`].
     pub edge_threshold: Option<u8>,
     /// The labels.
     pub labels: Labels,
@@ -78,7 +79,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             algorithm: Algorithm::default(),
-            profile: Profile::Census,
+            profile: Profile::Census16,
             slope: None,
             truncation: None,
             edge_threshold: None,

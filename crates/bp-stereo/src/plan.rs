@@ -1,7 +1,7 @@
 //! Makes the plan of a pair from options.
 
 use bp_core::{
-    MAX_LABELS, Model, Plan, Size, Tiling,
+    EdgeLevels, MAX_LABELS, Model, Plan, Size, Tiling,
     survey::{DisparityRange, SeenDisparities, Survey},
 };
 
@@ -10,10 +10,18 @@ use crate::{Error, Labels, Options, algorithm::Derived, description, devices::Op
 /// The plan for images of this size with these labels.
 pub(crate) fn plan(options: &Options, size: Size, range: DisparityRange) -> Result<Plan, Error> {
     let model = Model::new(options.profile, range.labels)?.with_min_disparity(range.min_disparity)?;
-    let slope = options.slope.unwrap_or(model.slope());
-    let model = model.with_smoothness(slope, options.truncation.unwrap_or(model.truncation()))?;
-    let model = model.with_weak_edges(options.edge_threshold);
-    Ok(Plan::new(size, model, options.algorithm.settings(size, range.labels))?)
+    Ok(Plan::new(size, with_edges(options, model)?, options.algorithm.settings(size, range.labels))?)
+}
+
+/// The model with the smoothness costs that the options ask for.
+fn with_edges(options: &Options, model: Model) -> Result<Model, Error> {
+    let Options { slope, truncation, edge_threshold, .. } = *options;
+    let model = match (slope, truncation) {
+        (None, None) => model,
+        _ => model.with_smoothness(slope.unwrap_or(model.slope()), truncation.unwrap_or(model.truncation()))?,
+    };
+    let halved = |threshold| EdgeLevels::halved_above(threshold, model.smoothness());
+    Ok(edge_threshold.map_or(model, |threshold| model.with_edges(halved(threshold))))
 }
 
 /// The labels that the options ask for. `hold` says whether the outputs can hold a first disparity. `None` if

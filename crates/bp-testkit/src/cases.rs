@@ -1,11 +1,13 @@
 //! The cases that backends are compared on.
 
-use bp_core::{Algorithm, Cut, MessageStart, Model, Profile, Schedule, Settings, Size, StereoPair};
+use bp_core::{
+    Algorithm, Cut, EdgeLevels, Error, MessageStart, Model, Profile, Schedule, Settings, Size, Smoothness, StereoPair,
+};
 
 use crate::{Case, noise_pair, stepped_pair};
 
 /// All cases. They cover every algorithm, profile, schedule and message start at tiny, odd and prime sizes, with few
-/// and many labels, with weak edges, and with the smoothness that strains 8 bits most. Strips of a higher image with
+/// and many labels, with edges of several levels, and with the smoothness that strains 8 bits most. Strips of a higher image with
 /// every kind of apron follow.
 pub fn cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (5, 4), (13, 11), (17, 8)];
@@ -20,7 +22,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let wide_or_high = [(131, 35), (256, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
-        let weak = Model::new(Profile::Census, 5).map(|model| model.with_weak_edges(Some(25)));
+        let weak = Model::new(Profile::Census, 5).map(|model| weakened(model, 25));
         plain.chain(weak).map(move |model| (size, model))
     });
     let whole = every.chain(large).flat_map(|((width, height), model)| {
@@ -46,11 +48,14 @@ fn label_sets() -> impl Iterator<Item = Case> {
 
 fn stepped_label_sets() -> impl Iterator<Item = Case> {
     let plain = |profile, labels| Model::new(profile, labels);
-    let weak = |profile, slope, truncation| {
-        Ok(plain(profile, 30)?.with_smoothness(slope, truncation)?.with_weak_edges(Some(30)))
-    };
+    let weak = |profile, slope, truncation| Ok(weakened(plain(profile, 30)?.with_smoothness(slope, truncation)?, 30));
+    let steep =
+        steep_levels().ok_or(Error::EdgeLevels).and_then(|edges| Ok(plain(Profile::Mrf, 30)?.with_edges(edges)));
     let models = [
         ((131, 70), plain(Profile::Census, 40)),
+        ((131, 40), plain(Profile::Census16, 34)),
+        ((70, 40), plain(Profile::Census32, 34)),
+        ((140, 20), steep),
         ((65, 135), weak(Profile::Census, 4, 15)),
         ((200, 40), plain(Profile::Gradient, 33)),
         ((135, 9), weak(Profile::Mrf, 3, 63)),
@@ -73,7 +78,7 @@ fn strips() -> impl Iterator<Item = Case> {
     let strips = rows.map(|rows| pair.strip(rows)).into_iter();
     strips.flat_map(|strip| Profile::ALL.map(|profile| (strip.clone(), profile))).flat_map(|(strip, profile)| {
         let settings = Schedule::ALL.map(|schedule| Algorithm::Cfbp.settings(strip.size(), 7, 2, schedule));
-        let model = Model::new(profile, 6).map(|model| model.with_weak_edges(Some(20))).ok();
+        let model = Model::new(profile, 6).map(|model| weakened(model, 20)).ok();
         settings.into_iter().filter_map(move |settings| case(&strip, model?, settings))
     })
 }
@@ -93,10 +98,28 @@ fn models(labels: usize) -> Vec<Model> {
     let weak = weak.into_iter().flat_map(move |(profile, slope, truncation, threshold)| {
         of(profile)
             .filter_map(move |model| model.with_smoothness(slope, truncation).ok())
-            .map(move |model| model.with_weak_edges(Some(threshold)))
+            .map(move |model| weakened(model, threshold))
     });
+    let levels = [steep_levels(), flat_levels()].into_iter().flatten();
+    let levels = levels.flat_map(move |edges| of(Profile::Mrf).map(move |model| model.with_edges(edges)));
     let negative = of(Profile::Census).filter_map(|model| model.with_min_disparity(-2).ok());
-    plain.chain(strained).chain(weak).chain(negative).collect()
+    plain.chain(strained).chain(weak).chain(levels).chain(negative).collect()
+}
+
+fn weakened(model: Model, threshold: u8) -> Model {
+    model.with_edges(EdgeLevels::halved_above(threshold, model.smoothness()))
+}
+
+/// Four levels, the first of which strains 8 bits most.
+fn steep_levels() -> Option<EdgeLevels> {
+    let of = |slope, truncation| Smoothness { slope, truncation };
+    EdgeLevels::new([(20, of(255, 63)), (40, of(63, 63)), (90, of(5, 63)), (255, of(1, 20))]).ok()
+}
+
+/// Four levels, of which one has no slope and one no cost at all; one is never reached.
+fn flat_levels() -> Option<EdgeLevels> {
+    let of = |slope, truncation| Smoothness { slope, truncation };
+    EdgeLevels::new([(30, of(9, 40)), (60, of(0, 40)), (60, of(0, 9)), (255, of(0, 0))]).ok()
 }
 
 fn settings(size: Size) -> Vec<Settings> {

@@ -2,7 +2,10 @@
 
 use fastrand::Rng;
 
-use bp_core::{Cut, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, image::APRON};
+use bp_core::{
+    Cut, EdgeLevels, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Smoothness,
+    image::APRON,
+};
 
 use crate::{Case, noise_pair};
 
@@ -11,7 +14,7 @@ const VOLUME: usize = 60_000;
 
 /// A random case. The same seed gives the same case as long as `fastrand` does not change. Sizes lie around one and
 /// several vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, and
-/// half of the models have weak edges.
+/// half of the models have edges of several levels; see [`EdgeLevels`].
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
@@ -20,8 +23,7 @@ pub fn random_case(seed: u64) -> Case {
     let [above, below] = if random.bool() { [random.usize(..=APRON), random.usize(..=APRON)] } else { [0, 0] };
     let pair = noise_pair(width, above + height + below, random.u32(..).into()).strip(above..above + height);
     let settings = settings(&mut random, width, height);
-    let weak_edges = random.bool().then(|| random.u8(..120));
-    let plan = Plan::new(pair.size(), model.with_weak_edges(weak_edges), settings);
+    let plan = Plan::new(pair.size(), model, settings);
     Case { plan: plan.unwrap_or_else(|error| panic!("{error}")), pair }
 }
 
@@ -51,7 +53,23 @@ fn model(random: &mut Rng) -> Model {
         Some((slope, truncation)) => model.with_smoothness(slope, truncation),
         None => Ok(model),
     });
-    model.unwrap_or_else(|error| panic!("{error}"))
+    let model = model.unwrap_or_else(|error| panic!("{error}"));
+    if random.bool() { model.with_edges(edges(random, model.smoothness())) } else { model }
+}
+
+/// Levels of differences up to 120 and more.
+fn edges(random: &mut Rng, usual: Smoothness) -> EdgeLevels {
+    let mut smoothness = usual;
+    let mut most = [0; 3].map(|_| random.u8(..120));
+    most.sort_unstable();
+    let [first, second, third] = most;
+    let levels = [first, second, third, u8::MAX].map(|most| {
+        let level = (most, smoothness);
+        let Smoothness { slope, truncation } = smoothness;
+        smoothness = Smoothness { slope: random.u8(..=slope), truncation: random.u8(..=truncation) };
+        level
+    });
+    EdgeLevels::new(levels).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn settings(random: &mut Rng, width: usize, height: usize) -> Settings {
@@ -97,9 +115,9 @@ mod tests {
             let is_it = |plan: &Plan| (plan.model().profile(), plan.settings().schedule) == (profile, schedule);
             assert!(plans.iter().any(is_it), "{profile:?} {schedule:?}");
         }
-        let weak = |plan: &&Plan| plan.model().weak_edges().is_some();
-        assert!(Profile::ALL.iter().all(|&p| plans.iter().filter(weak).any(|plan| plan.model().profile() == p)));
-        assert!(Schedule::ALL.iter().all(|&s| plans.iter().filter(weak).any(|plan| plan.settings().schedule == s)));
+        let leveled = |plan: &&Plan| !plan.model().edges().is_uniform();
+        assert!(Profile::ALL.iter().all(|&p| plans.iter().filter(leveled).any(|plan| plan.model().profile() == p)));
+        assert!(Schedule::ALL.iter().all(|&s| plans.iter().filter(leveled).any(|plan| plan.settings().schedule == s)));
         assert!([127, 129, 300, 512, 1024].iter().all(|&labels| any_model(&|model| model.labels() == labels)));
         assert!([1 << 24, -(1 << 24)].iter().all(|&min| any_model(&|model| model.min_disparity() == min)));
         assert!(any_model(&|model| model.truncation() == MAX_TRUNCATION && model.profile() == Profile::Mrf));

@@ -85,7 +85,7 @@ pub(crate) struct PlanArgs {
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
     pub(crate) min_disparity: Option<i32>,
     /// Data cost and its default smoothness.
-    #[arg(long, default_value = "census", value_parser = named(&Profile::ALL, Profile::name))]
+    #[arg(long, default_value = "census16", value_parser = named(&Profile::ALL, Profile::name))]
     pub(crate) profile: Profile,
     /// Algorithm: sweep is ours, the others are the thesis's. [default: sweep]
     ///
@@ -142,16 +142,20 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) seed_start: Option<bool>,
     /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
+    ///
+    /// With --slope or --truncation, all edges have the same smoothness cost.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) slope: Option<u8>,
     /// Truncation K of the smoothness cost. [default: the profile's]
     #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true,
         value_parser = clap::value_parser!(u8).range(0..=i64::from(MAX_TRUNCATION)))]
     pub(crate) truncation: Option<u8>,
-    /// Let disparities jump where grey values differ by more than N; try 10. [default: off]
+    /// Let disparities jump where grey values differ by more than N: there, slope and truncation are halved. [default:
+    /// the profile's levels]
     ///
-    /// At such weak edges, slope and truncation of the smoothness cost are halved.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=254))]
+    /// The profiles census16 and census32 have four levels of their own, which this replaces; the others have one. 255
+    /// gives all edges the same smoothness cost.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) edge_threshold: Option<u8>,
 }
 

@@ -7,11 +7,13 @@ use sha2::{Digest, Sha256};
 use crate::{check, folder, json, run_in};
 
 /// Options of `bp match`.
-const PLANS: [&str; 17] = [
+const PLANS: [&str; 20] = [
     "",
+    "--profile census",
+    "--profile census32",
     "--loops 3 --grids 4",
     "--labels 40 --label-sets on",
-    "--profile census-rgb --edge-threshold 10",
+    "--profile census32 --edge-threshold 10",
     "--profile mrf --labels 16 --min-disparity -3",
     "--profile gradient --coarse-clip off",
     "--algorithm bp --profile thesis --loops 12",
@@ -19,7 +21,8 @@ const PLANS: [&str; 17] = [
     "--algorithm cfbp --profile thesis",
     "--algorithm cfbp --profile census --grids 5 --half-steps 10",
     "--algorithm cfbp --profile mrf --grids 3 --loops 2 --message-start sender",
-    "--algorithm cfbp --profile census5x5 --loops 20 --schedule sweep",
+    "--algorithm cfbp --profile census16 --loops 20 --schedule sweep",
+    "--algorithm ctbp --profile census16 --loops 4",
     "--algorithm cfcsbp --profile thesis --z 3",
     "--algorithm cfcsbp --profile birchfield-tomasi --grids 5 --half-steps 3 --coarse-clip on",
     "--algorithm ctbp --profile thesis --loops 9",

@@ -45,7 +45,7 @@ impl Plan {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Model, Plan, Profile, Schedule, Settings, Size};
+    use crate::{EdgeLevels, Model, Plan, Profile, Schedule, Settings, Size};
 
     fn moved(schedule: Schedule, grids: u32, steps: u32) -> Option<[u64; 5]> {
         let size = Size { width: 4, height: 2 };
@@ -75,14 +75,16 @@ mod tests {
 
     /// Counted by hand: each node's grey value is written once, read by the coarser grid, and read in every step.
     #[test]
-    fn weak_edges_cost_a_byte_a_node() {
+    fn edge_levels_cost_a_byte_a_node() {
         let size = Size { width: 4, height: 2 };
         let settings = crate::Algorithm::Bp.settings(size, 1, 1, Schedule::Sync);
-        let plan = |weak_edges| {
-            let model = Model::new(Profile::Thesis, 3).unwrap().with_weak_edges(weak_edges);
+        let model = Model::new(Profile::Thesis, 3).unwrap();
+        let plan = |edges: EdgeLevels| {
+            let model = model.with_edges(edges);
             Plan::new(size, model, Settings { grids: 2, steps: 3, ..settings }).unwrap()
         };
-        let (with, without) = (plan(Some(10)), plan(None));
+        let usual = model.smoothness();
+        let (with, without) = (plan(EdgeLevels::halved_above(10, usual)), plan(EdgeLevels::uniform(usual)));
         let moved = with.moved_bytes().unwrap().into_iter().zip(without.moved_bytes().unwrap());
         assert_eq!(moved.map(|(with, without)| with - without).collect::<Vec<_>>(), [8, 8 + 2, 0, 3 * (8 + 2), 0]);
         assert_eq!(with.bytes() - without.bytes(), 8 + 2);

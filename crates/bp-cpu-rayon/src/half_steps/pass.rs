@@ -42,7 +42,7 @@ impl Pass<'_> {
             masks: layout.masks(plane),
             nodes: layout.nodes(plane),
             lanes: layout.lanes,
-            smoothness: model.smoothness(),
+            edges: model.edges(),
             around: layout.around(plane, y),
         }
     }

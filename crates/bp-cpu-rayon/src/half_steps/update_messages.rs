@@ -15,10 +15,13 @@
 //! Here one lane of a vector is one node, and all sides are computed together: [`pass_up`] runs the upward loop and
 //! [`pass_down`] the downward one. An edge has one slot. It holds the message received until `pass_up` overwrites it.
 
-use bp_core::Smoothness;
-use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch, u8x16};
+use bp_core::{EdgeLevels, Smoothness};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, u8x16};
 
-use crate::greys::Around;
+use crate::{
+    compare::Vector,
+    greys::{Around, of_levels},
+};
 
 /// The nodes of one plane in one row, with everything that their messages depend on.
 pub(crate) struct Nodes<'a> {
@@ -30,9 +33,9 @@ pub(crate) struct Nodes<'a> {
     pub(crate) nodes: usize,
     /// Lanes from one label to the next.
     pub(crate) lanes: usize,
-    /// The smoothness cost of edges that are not weak.
-    pub(crate) smoothness: Smoothness,
-    /// The grey values that determine which edges are weak; `None` if no edge is.
+    /// The smoothness costs of edges.
+    pub(crate) edges: &'a EdgeLevels,
+    /// The grey values that determine the levels of edges; `None` if all have the same cost.
     pub(crate) around: Option<Around<'a>>,
 }
 
@@ -41,21 +44,21 @@ impl Nodes<'_> {
         self.costs.len() / self.lanes
     }
 
-    /// A value of the smoothness cost for the edges of `W` vectors of nodes, by slot. Without weak edges, every edge has
-    /// the same value.
+    /// A value of the smoothness cost for the edges of `W` vectors of nodes, by slot. Without `LEVELS`, every edge has the
+    /// same value.
     #[inline(always)]
-    fn of_edges<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
+    fn of_edges<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
         &self,
         simd: S,
         at: usize,
         value: impl Fn(Smoothness) -> u8,
     ) -> [[V; 4]; W] {
-        let mut values = [[V::splat(simd, value(self.smoothness)); 4]; W];
-        if let Some(around) = self.around.filter(|_| WEAK) {
-            let usual_and_weak = [value(self.smoothness), value(self.smoothness.weakened())];
+        let by_level = self.edges.smoothness().map(value);
+        let mut values = [[V::splat(simd, by_level[0]); 4]; W];
+        if let Some(around) = self.around.filter(|_| LEVELS) {
             for (w, values) in values.iter_mut().enumerate() {
                 for (slot, out) in values.iter_mut().enumerate() {
-                    *out = around.choose(simd, slot, at + w * V::LEN, usual_and_weak);
+                    *out = of_levels(simd, around.levels(simd, slot, at + w * V::LEN), by_level);
                 }
             }
         }
@@ -74,22 +77,22 @@ pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: [&mut [u8]
 
 /// Processes a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
 #[inline(always)]
-fn row<S: Simd, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
+fn row<S: Simd, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     let [same, next, up, down] = slots;
     // Slices of one known length let the compiler drop the bounds checks in the loops.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
     let mut at = 0;
     while at + 2 * S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 2, WEAK>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 2, LEVELS>(simd, nodes, &mut slots, at);
         at += 2 * S::u8s::LEN;
     }
     while at + S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 1, WEAK>(simd, nodes, &mut slots, at);
+        vectors::<S, S::u8s, 1, LEVELS>(simd, nodes, &mut slots, at);
         at += S::u8s::LEN;
     }
     while at < nodes.nodes {
-        vectors::<S, u8x16<S>, 1, WEAK>(simd, nodes, &mut slots, at);
+        vectors::<S, u8x16<S>, 1, LEVELS>(simd, nodes, &mut slots, at);
         at += u8x16::<S>::LEN;
     }
 }
@@ -98,25 +101,25 @@ fn row<S: Simd, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8];
 /// envelope; a pass down finishes it (Felzenszwalb and Huttenlocher 2006). Between the two passes, the slots hold the
 /// envelope.
 #[inline(always)]
-fn vectors<S, V, const W: usize, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
+fn vectors<S, V, const W: usize, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
 where
     S: Simd,
-    V: SimdInt<S, Element = u8>,
+    V: Vector<S>,
 {
-    let least = pass_up::<S, V, W, WEAK>(simd, nodes, slots, at);
-    pass_down::<S, V, W, WEAK>(simd, nodes, slots, at, least);
+    let least = pass_up::<S, V, W, LEVELS>(simd, nodes, slots, at);
+    pass_down::<S, V, W, LEVELS>(simd, nodes, slots, at, least);
 }
 
 /// Writes the upward envelopes to the slots and returns the least entry of each side's h.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
-fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
+fn pass_up<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
     at: usize,
 ) -> [[V; 4]; W] {
-    let step = nodes.of_edges::<S, V, W, WEAK>(simd, at, Smoothness::step);
+    let step = nodes.of_edges::<S, V, W, LEVELS>(simd, at, Smoothness::step);
     let mut masks = [[V::splat(simd, 0); 2]; W];
     for w in 0..W {
         let from = at + w * V::LEN;
@@ -146,15 +149,15 @@ fn pass_up<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: boo
 
 /// Turns the upward envelopes into messages.
 #[inline(always)]
-fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: bool>(
+fn pass_down<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
     at: usize,
     least: [[V; 4]; W],
 ) {
-    let step = nodes.of_edges::<S, V, W, WEAK>(simd, at, Smoothness::step);
-    let truncation = nodes.of_edges::<S, V, W, WEAK>(simd, at, |smoothness| smoothness.truncation);
+    let step = nodes.of_edges::<S, V, W, LEVELS>(simd, at, Smoothness::step);
+    let truncation = nodes.of_edges::<S, V, W, LEVELS>(simd, at, |smoothness| smoothness.truncation);
     let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
     let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
@@ -181,7 +184,7 @@ fn pass_down<S: Simd, V: SimdInt<S, Element = u8>, const W: usize, const WEAK: b
 /// Computes h for each side: the data cost plus the messages received from the other three sides. The sum of two
 /// messages is at most 2K, so only additions to the data cost can saturate.
 #[inline(always)]
-fn gather<S: Simd, V: SimdInt<S, Element = u8>>(
+fn gather<S: Simd, V: Vector<S>>(
     simd: S,
     nodes: &Nodes<'_>,
     masks: [V; 2],

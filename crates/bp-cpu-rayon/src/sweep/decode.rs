@@ -16,6 +16,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
 
 use super::{
     block::{Block, Bytes, LANES, Padded},
+    edges::{levels, of_sides},
     lists::List,
     messages::Place,
     pass::Pass,
@@ -110,7 +111,7 @@ struct Undecided<'a> {
 impl Undecided<'_> {
     /// Decides their labels, one chunk of labels at a time. `known` are the labels on both sides and above.
     #[inline(always)]
-    fn decide<S: Simd, const ODD: bool, const WEAK: bool>(&self, simd: S, known: &[Labels; 3]) -> Labels {
+    fn decide<S: Simd, const ODD: bool, const LEVELS: bool>(&self, simd: S, known: &[Labels; 3]) -> Labels {
         let mut labels = [0; LANES];
         let mut best = Bytes::<S>::splat(simd, u8::MAX);
         let mut entry = 0;
@@ -118,7 +119,7 @@ impl Undecided<'_> {
             let from = usize::from(self.list.labels[entry]);
             let end = entry + self.list.labels[entry..].partition_point(|&label| usize::from(label) < from + CHUNK);
             let before = best;
-            let index = self.chunk::<S, ODD, WEAK>(simd, entry..end, known, &mut best);
+            let index = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &mut best);
             let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
             for lane in 0..LANES {
                 if better[lane] > 0 {
@@ -132,7 +133,7 @@ impl Undecided<'_> {
 
     /// Compares these entries with the best so far, and returns for each node the best of them, counted from the first.
     #[inline(always)]
-    fn chunk<S: Simd, const ODD: bool, const WEAK: bool>(
+    fn chunk<S: Simd, const ODD: bool, const LEVELS: bool>(
         &self,
         simd: S,
         entries: Range<usize>,
@@ -143,7 +144,7 @@ impl Undecided<'_> {
         let decided = if ODD { 0..3 } else { 2..3 };
         let near = known.each_ref().map(|labels| near(simd, labels, from));
         let exist = self.masks.map(|mask| Bytes::from_slice(simd, &mask[self.lane..self.lane + LANES]));
-        let smoothness = Edges::<S>::new::<WEAK>(simd, self.model, self.greys, self.lane);
+        let smoothness = Edges::<S>::new::<LEVELS>(simd, self.model, self.greys, self.lane);
         let len = entries.len();
         let (labels, costs) = (&self.list.labels[entries.clone()], &self.costs[entries.clone()]);
         let (same, next) = (&self.same[entries.clone()], &self.next[entries.clone()]);
@@ -159,7 +160,7 @@ impl Undecided<'_> {
             }
             for side in decided.clone() {
                 let distance = here.saturating_sub(near[side]) | near[side].saturating_sub(here);
-                sum += smoothness.of::<WEAK>(side, distance) & exist[side];
+                sum += smoothness.of(side, distance) & exist[side];
             }
             // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
             let belief = costs[i].load(simd).saturating_add(sum);
@@ -172,34 +173,29 @@ impl Undecided<'_> {
 
 /// The smoothness costs of the edges of a block's nodes to the neighbours that have labels.
 struct Edges<S: Simd> {
-    far: Bytes<S>,
+    /// The distance from which on an edge costs its truncation.
+    far: [Bytes<S>; 3],
     steps: [Bytes<S>; 3],
     truncations: [Bytes<S>; 3],
 }
 
 impl<S: Simd> Edges<S> {
     #[inline(always)]
-    fn new<const WEAK: bool>(simd: S, model: &Model, greys: Option<Around<'_>>, lane: usize) -> Self {
-        let usual = model.smoothness();
-        let of_edges = |value: fn(Smoothness) -> u8| match greys.filter(|_| WEAK) {
-            Some(around) => {
-                [0, 1, 2].map(|slot| around.choose(simd, slot, lane, [value(usual), value(usual.weakened())]))
-            }
-            None => [Bytes::splat(simd, value(usual)); 3],
-        };
+    fn new<const LEVELS: bool>(simd: S, model: &Model, greys: Option<Around<'_>>, lane: usize) -> Self {
+        let levels = levels(simd, greys.filter(|_| LEVELS), lane, [0, 1, 2]);
+        let edges = model.edges().smoothness();
         let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
-        let far = if WEAK { far(usual).max(far(usual.weakened())) } else { far(usual) };
         Self {
-            far: Bytes::splat(simd, far),
-            steps: of_edges(Smoothness::step),
-            truncations: of_edges(|smoothness| smoothness.truncation),
+            far: of_sides::<S, LEVELS>(simd, levels, edges.map(far)),
+            steps: of_sides::<S, LEVELS>(simd, levels, edges.map(Smoothness::step)),
+            truncations: of_sides::<S, LEVELS>(simd, levels, edges.map(|edge| edge.truncation)),
         }
     }
 
-    /// The product of [`Self::far`] with a step fits 8 bits, because s div 2 is at least a third of s, or 0.
+    /// The product of [`Self::far`] with a step is at most the truncation and a step, which fits 8 bits.
     #[inline(always)]
-    fn of<const WEAK: bool>(&self, side: usize, distance: Bytes<S>) -> Bytes<S> {
-        (distance.min(self.far) * self.steps[side]).min(self.truncations[side])
+    fn of(&self, side: usize, distance: Bytes<S>) -> Bytes<S> {
+        (distance.min(self.far[side]) * self.steps[side]).min(self.truncations[side])
     }
 }
 

@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, LabelSet, Patch, Plan, Smoothness, memory};
+use bp_core::{EdgeLevels, Error, LabelSet, Patch, Plan, Smoothness, memory};
+
+/// What the smoothness costs over edges of each level.
+pub(crate) type Steps = [u8; EdgeLevels::COUNT];
 
 /// The lists of the patches of some rows, one after another. An *entry* is a label of a list.
 #[derive(Default)]
@@ -10,7 +13,7 @@ pub(crate) struct Lists {
     /// The label of each entry. They ascend within a patch.
     labels: Vec<u16>,
     /// For each patch the steps of its entries, and one more. See [`List::steps`].
-    steps: Vec<[u8; 2]>,
+    steps: Vec<Steps>,
     /// The first entry of each patch, and the number of entries.
     starts: Vec<usize>,
 }
@@ -20,15 +23,15 @@ pub(crate) struct Lists {
 pub(crate) struct List<'a> {
     /// The labels.
     pub(crate) labels: &'a [u16],
-    /// What the smoothness costs from the entry before to this one, over usual and over weak edges. The first and the last
-    /// value, after the last entry, mean nothing.
-    pub(crate) steps: &'a [[u8; 2]],
+    /// What the smoothness costs from the entry before to this one. The first and the last value, after the last entry, mean
+    /// nothing.
+    pub(crate) steps: &'a [Steps],
 }
 
 /// The bytes of lists with this many patches and entries.
 pub(crate) fn bytes(patches: usize, entries: usize) -> u64 {
-    (entries * (size_of::<u16>() + size_of::<[u8; 2]>())
-        + patches * size_of::<[u8; 2]>()
+    (entries * (size_of::<u16>() + size_of::<Steps>())
+        + patches * size_of::<Steps>()
         + (patches + 1) * size_of::<usize>()) as u64
 }
 
@@ -40,7 +43,7 @@ impl Lists {
         for patch in patches {
             let set = LabelSet::of(plan, grid, &patch, coarser);
             self.reserve(0, set.count())?;
-            self.push(plan.model().smoothness(), set);
+            self.push(plan.model().edges(), set);
         }
         Ok(())
     }
@@ -67,17 +70,17 @@ impl Lists {
         reserved.map_err(|_| Error::OutOfMemory { what: "label sets", needed, available: None })
     }
 
-    fn push(&mut self, smoothness: Smoothness, set: LabelSet) {
+    fn push(&mut self, edges: &EdgeLevels, set: LabelSet) {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
         let mut before = 0;
         for label in set.labels() {
             self.labels.push(label as u16);
-            self.steps.push([smoothness, smoothness.weakened()].map(|s| cost_of(s, label - before)));
+            self.steps.push(edges.smoothness().map(|smoothness| cost_of(smoothness, label - before)));
             before = label;
         }
-        self.steps.push([0; 2]);
+        self.steps.push(Steps::default());
         self.starts.push(self.labels.len());
     }
 
@@ -118,43 +121,43 @@ fn cost_of(smoothness: Smoothness, distance: usize) -> u8 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Source {
     entries: [u16; 2],
-    /// What the smoothness costs from either, over usual and over weak edges.
-    costs: [[u8; 2]; 2],
+    /// What the smoothness costs from either.
+    costs: [Steps; 2],
 }
 
 impl Source {
-    pub(crate) const NONE: Self = Self { entries: [0; 2], costs: [[0; 2]; 2] };
+    pub(crate) const NONE: Self = Self { entries: [0; 2], costs: [[0; EdgeLevels::COUNT]; 2] };
 
-    /// The entry, if the value is that of an entry, over usual edges.
+    /// The entry, if the value is that of an entry, over edges of the first level.
     #[inline(always)]
     pub(crate) fn exact(self) -> Option<usize> {
         (self.entries[0] == self.entries[1] && self.costs[0][0] == 0).then_some(usize::from(self.entries[0]))
     }
 
-    /// Both entries and what the smoothness costs from them.
+    /// Both entries and what the smoothness costs from them over edges of this level.
     #[inline(always)]
-    pub(crate) fn nearest(self, weak: bool) -> [(usize, u8); 2] {
-        [0, 1].map(|i| (usize::from(self.entries[i]), self.costs[i][usize::from(weak)]))
+    pub(crate) fn nearest(self, level: usize) -> [(usize, u8); 2] {
+        [0, 1].map(|i| (usize::from(self.entries[i]), self.costs[i][level]))
     }
 
     /// The value for this label.
     #[inline(always)]
-    pub(crate) fn value(self, weak: bool, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
-        let [below, above] = self.nearest(weak).map(|(entry, cost)| message(entry).saturating_add(cost));
+    pub(crate) fn value(self, level: usize, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
+        let [below, above] = self.nearest(level).map(|(entry, cost)| message(entry).saturating_add(cost));
         below.min(above).min(truncation)
     }
 }
 
 /// The sources of the labels `to` in a list of the labels `from`. Both ascend.
-pub(crate) fn sources(from: &[u16], to: &[u16], smoothness: Smoothness) -> impl Iterator<Item = Source> {
-    let both = [smoothness, smoothness.weakened()];
+pub(crate) fn sources(from: &[u16], to: &[u16], edges: &EdgeLevels) -> impl Iterator<Item = Source> {
+    let smoothness = edges.smoothness();
     let mut above = 0;
     to.iter().map(move |&label| {
         while above + 1 < from.len() && from[above] < label {
             above += 1;
         }
         let below = if from[above] > label { above.saturating_sub(1) } else { above };
-        let costs = |entry: usize| both.map(|smoothness| cost_of(smoothness, from[entry].abs_diff(label).into()));
+        let costs = |entry: usize| smoothness.map(|smoothness| cost_of(smoothness, from[entry].abs_diff(label).into()));
         Source { entries: [below as u16, above as u16], costs: [costs(below), costs(above)] }
     })
 }
@@ -165,10 +168,10 @@ mod tests {
 
     #[test]
     fn sources_are_the_nearest_entries_on_both_sides() {
-        let smoothness = Smoothness { slope: 2, truncation: 10 };
-        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20], smoothness).collect();
-        let source =
-            |entries, [below, above]: [u8; 2]| Source { entries, costs: [[2 * below, below], [2 * above, above]] };
+        let edges = EdgeLevels::halved_above(7, Smoothness { slope: 2, truncation: 10 });
+        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20], &edges).collect();
+        let costs = |distance: u8| [2 * distance, distance, distance, distance];
+        let source = |entries, distances: [u8; 2]| Source { entries, costs: distances.map(costs) };
         let expected = [
             source([0, 0], [2, 2]),
             source([0, 0], [0, 0]),

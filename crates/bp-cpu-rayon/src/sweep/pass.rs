@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Smoothness, memory};
+use bp_core::{EdgeLevels, Error, memory};
 use fearless_simd::dispatch;
 
 use super::{
@@ -45,13 +45,13 @@ impl Crossings {
     }
 
     /// Finds the sources of all entries.
-    pub(crate) fn find(&mut self, lists: &Lists, smoothness: Smoothness) {
+    pub(crate) fn find(&mut self, lists: &Lists, edges: &EdgeLevels) {
         for patch in 0..lists.patches() {
             let labels = lists.list(patch).labels;
             let beside = [patch.checked_sub(1), Some(patch + 1).filter(|&next| next < lists.patches())];
             for (index, other) in beside.into_iter().enumerate() {
                 let Some(other) = other else { continue };
-                let sources = sources(lists.list(other).labels, labels, smoothness);
+                let sources = sources(lists.list(other).labels, labels, edges);
                 let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
                 all.for_each(|(sources, source)| sources[index] = source);
             }
@@ -196,7 +196,7 @@ impl Pass<'_> {
             plane,
             list: self.lists.list(patch),
             costs: &self.work.costs[(2 * row + plane) * entries..][range.clone()],
-            smoothness: self.sweep.plan.model().smoothness(),
+            edges: self.sweep.plan.model().edges(),
             greys: greys.map(|around| (around, LANES * patch)),
         };
         let (behind, ahead) = match way {
@@ -235,9 +235,8 @@ impl Pass<'_> {
     fn cross(&mut self, patch: usize, plane: usize, y: usize) {
         let Some(before) = patch.checked_sub(1) else { return };
         let lane = LANES * patch;
-        let weak = self.sweep.layout.around(0, y).is_some_and(|around| around.is_weak(1, lane));
-        let usual = self.sweep.plan.model().smoothness();
-        let truncation = if weak { usual.weakened() } else { usual }.truncation;
+        let level = self.sweep.layout.around(0, y).map_or(0, |around| around.level(1, lane));
+        let truncation = self.sweep.plan.model().edges().smoothness()[level].truncation;
         let inside = (y - self.rows.start) * self.lists.entries();
         let next = &mut self.messages.next[inside..inside + self.lists.entries()];
         let (left, right) = next[self.lists.range(before).start..self.lists.range(patch).end]
@@ -245,24 +244,24 @@ impl Pass<'_> {
         let end = LANES as isize - 1;
         if plane == 1 {
             let sources = &self.work.crossings.sources[self.lists.range(patch)];
-            carry(weak, truncation, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
+            carry(level, truncation, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
         } else {
             let sources = &self.work.crossings.sources[self.lists.range(before)];
-            carry(weak, truncation, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
+            carry(level, truncation, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
         }
     }
 }
 
 /// Writes the messages of a lane for the labels of another patch.
 fn carry(
-    weak: bool,
+    level: usize,
     truncation: u8,
     sources: impl Iterator<Item = Source>,
     (from, from_lane): (&mut [Padded], isize),
     (to, to_lane): (&mut [Padded], isize),
 ) {
     for (source, out) in sources.zip(to) {
-        *out.lane_mut(to_lane) = source.value(weak, truncation, |entry| from[entry].lane(from_lane));
+        *out.lane_mut(to_lane) = source.value(level, truncation, |entry| from[entry].lane(from_lane));
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::cmp::Ordering;
 
-use bp_core::{BAND_ROWS, Error, MAX_TRUNCATION, Smoothness, memory};
+use bp_core::{BAND_ROWS, EdgeLevels, Error, MAX_TRUNCATION, memory};
 use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdInt, dispatch, u8x16};
 
 use super::{
@@ -47,7 +47,7 @@ pub(crate) fn bytes(entries: usize) -> u64 {
 pub(crate) struct Coarser<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) bands: &'a [Band],
-    pub(crate) smoothness: Smoothness,
+    pub(crate) edges: &'a EdgeLevels,
 }
 
 /// A coarse row to be read for one finer patch.
@@ -96,7 +96,7 @@ impl CoarseRows {
                 self.find_sources(coarser, band, lists, patch);
             }
             let width = coarser.layout.size.width;
-            let truncation = coarser.smoothness.truncation;
+            let truncation = coarser.edges.usual().truncation;
             let reading = Reading { band, width, row: y % BAND_ROWS, y, patch };
             for side in 0..SIDES {
                 let range = lists.range(patch);
@@ -123,7 +123,7 @@ impl CoarseRows {
         let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
         for (index, from) in patches.into_iter().enumerate() {
             let Some(from) = from else { continue };
-            let sources = sources(band.lists.list(from).labels, labels, coarser.smoothness);
+            let sources = sources(band.lists.list(from).labels, labels, coarser.edges);
             let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
             all.for_each(|(sources, source)| sources[index] = source);
         }
@@ -206,7 +206,7 @@ impl Reading<'_> {
             let value = match source.exact() {
                 Some(entry) => self.columns::<S, SIDE>(simd, first + entry),
                 None => {
-                    let [below, above] = source.nearest(false).map(|(entry, cost)| {
+                    let [below, above] = source.nearest(0).map(|(entry, cost)| {
                         let value: Bytes<S> = self.columns::<S, SIDE>(simd, first + entry);
                         value.saturating_add(Bytes::splat(simd, cost))
                     });
@@ -327,13 +327,13 @@ impl Reading<'_> {
         let in_pair = (SIDE == LEFT) == (plane == 1);
         if SIDE == BELOW {
             let below = &messages.vertical[(2 * self.row + 2 + plane) * entries..][range];
-            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| below[entry].0[from]));
+            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| below[entry].0[from]));
         } else if in_pair {
             let same = &messages.same[inside];
-            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| same[entry].0[from]));
+            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| same[entry].0[from]));
         } else {
             let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
-            out.for_each(|(source, out)| *out = source.value(false, truncation, |entry| next[entry].lane(from)));
+            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| next[entry].lane(from)));
         }
     }
 }

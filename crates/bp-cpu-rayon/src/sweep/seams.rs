@@ -66,13 +66,13 @@ impl Prepared {
         for patch in 0..lists.patches() {
             let own = self.lists.range(patch);
             let messages = [0, 1].map(|plane| &self.messages[from][plane * self.lists.entries()..][own.clone()]);
-            let smoothness = plan.model().smoothness();
-            let sources = sources(self.lists.list(patch).labels, lists.list(patch).labels, smoothness);
+            let edges = plan.model().edges();
+            let sources = sources(self.lists.list(patch).labels, lists.list(patch).labels, edges);
             for (entry, source) in lists.range(patch).zip(sources) {
                 for (plane, messages) in messages.into_iter().enumerate() {
                     out[plane * lists.entries() + entry] = match source.exact() {
                         Some(entry) => messages[entry],
-                        None => between(source.nearest(false), plan, messages),
+                        None => between(source.nearest(0), plan, messages),
                     };
                 }
             }

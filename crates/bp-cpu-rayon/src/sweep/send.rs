@@ -3,11 +3,12 @@
 //! It computes what `update_messages` of the half-steps does, in a layout where each walk over the labels is contiguous, and
 //! for lists of labels: between two entries, the envelope rises by what the smoothness costs from one label to the other.
 
-use bp_core::Smoothness;
+use bp_core::EdgeLevels;
 use fearless_simd::{Simd, SimdBase, SimdInt};
 
 use super::{
     block::{Block, Bytes, LANES, Padded},
+    edges::{levels, of_edges, of_sides},
     lists::List,
 };
 use crate::greys::Around;
@@ -17,8 +18,8 @@ pub(crate) struct Nodes<'a> {
     pub(crate) plane: usize,
     pub(crate) list: List<'a>,
     pub(crate) costs: &'a [Block],
-    pub(crate) smoothness: Smoothness,
-    /// The grey values that determine which edges are weak, from the block's first lane on. Slot 2 is the edge behind, slot
+    pub(crate) edges: &'a EdgeLevels,
+    /// The grey values that determine the levels of edges, from the block's first lane on. Slot 2 is the edge behind, slot
     /// 3 the one ahead.
     pub(crate) greys: Option<(Around<'a>, usize)>,
 }
@@ -32,35 +33,31 @@ pub(crate) struct Slots<'a> {
 }
 
 impl Nodes<'_> {
-    /// For the edges to the sides and ahead, 255 where they are weak.
+    /// The levels of the edges to the sides and ahead.
     #[inline(always)]
-    fn weak<S: Simd, const WEAK: bool>(&self, simd: S) -> [Bytes<S>; 3] {
-        match self.greys.filter(|_| WEAK) {
-            Some((around, lane)) => [0, 1, 3].map(|slot| around.choose(simd, slot, lane, [0, u8::MAX])),
-            None => [Bytes::splat(simd, 0); 3],
-        }
+    fn levels<S: Simd, const LEVELS: bool>(&self, simd: S) -> [Bytes<S>; 3] {
+        let greys = self.greys.filter(|_| LEVELS);
+        levels(simd, greys.map(|(around, _)| around), greys.map_or(0, |(_, lane)| lane), [0, 1, 3])
     }
-}
 
-/// One of two values for each lane: the second where the edge is weak.
-#[inline(always)]
-fn of_edges<S: Simd, const WEAK: bool>(simd: S, weak: Bytes<S>, [usual, weakened]: [u8; 2]) -> Bytes<S> {
-    let usual = Bytes::splat(simd, usual);
-    if WEAK { (usual & !weak) | (Bytes::splat(simd, weakened) & weak) } else { usual }
+    #[inline(always)]
+    fn truncations<S: Simd, const LEVELS: bool>(&self, simd: S, levels: [Bytes<S>; 3]) -> [Bytes<S>; 3] {
+        of_sides::<S, LEVELS>(simd, levels, self.edges.smoothness().map(|smoothness| smoothness.truncation))
+    }
 }
 
 /// Sends to both sides and, if `AHEAD`, in the direction of the pass. Each message replaces what its edge held.
 #[inline(always)]
-pub(crate) fn to_sides<S: Simd, const WEAK: bool, const AHEAD: bool>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
+pub(crate) fn to_sides<S: Simd, const LEVELS: bool, const AHEAD: bool>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
     if nodes.plane == 0 {
-        to_sides_of::<S, WEAK, AHEAD, -1>(simd, nodes, slots);
+        to_sides_of::<S, LEVELS, AHEAD, -1>(simd, nodes, slots);
     } else {
-        to_sides_of::<S, WEAK, AHEAD, 0>(simd, nodes, slots);
+        to_sides_of::<S, LEVELS, AHEAD, 0>(simd, nodes, slots);
     }
 }
 
 #[inline(always)]
-fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
+fn to_sides_of<S: Simd, const LEVELS: bool, const AHEAD: bool, const NEXT: isize>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: Slots<'_>,
@@ -70,7 +67,7 @@ fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
     let (costs, steps) = (&nodes.costs[..len], &nodes.list.steps[..len + 1]);
     let (same, next) = (&mut slots.same[..len], &mut slots.next[..len]);
     let (behind, ahead) = (&slots.behind[..len], &mut slots.ahead[..len]);
-    let weak = nodes.weak::<S, WEAK>(simd);
+    let levels = nodes.levels::<S, LEVELS>(simd);
     let sent = if AHEAD { 3 } else { 2 };
     let mut envelope = [Bytes::<S>::splat(simd, u8::MAX); 3];
     let mut least = envelope;
@@ -83,7 +80,7 @@ fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
         let onward = cost.saturating_add(from_same + from_next).saturating_add(from_behind);
         let h = [vertical.saturating_add(from_next), vertical.saturating_add(from_same), onward];
         for side in 0..sent {
-            let step = of_edges::<S, WEAK>(simd, weak[side], steps[entry]);
+            let step = of_edges::<S, LEVELS>(simd, levels[side], steps[entry]);
             envelope[side] = envelope[side].saturating_add(step).min(h[side]);
             least[side] = least[side].min(envelope[side]);
         }
@@ -93,7 +90,7 @@ fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
             ahead[entry].store(envelope[2]);
         }
     }
-    let truncation = truncation::<S, WEAK>(simd, nodes, weak);
+    let truncation = nodes.truncations::<S, LEVELS>(simd, levels);
     envelope = [Bytes::splat(simd, u8::MAX); 3];
     for entry in (0..len).rev() {
         let mut half = [same[entry].load(simd), next[entry].load::<S, NEXT>(simd), envelope[2]];
@@ -101,7 +98,7 @@ fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
             half[2] = ahead[entry].load(simd);
         }
         for side in 0..sent {
-            let step = of_edges::<S, WEAK>(simd, weak[side], steps[entry + 1]);
+            let step = of_edges::<S, LEVELS>(simd, levels[side], steps[entry + 1]);
             envelope[side] = envelope[side].saturating_add(step).min(half[side]);
         }
         same[entry].store((envelope[0] - least[0]).min(truncation[0]));
@@ -114,43 +111,37 @@ fn to_sides_of<S: Simd, const WEAK: bool, const AHEAD: bool, const NEXT: isize>(
 
 /// Sends only in the direction of the pass.
 #[inline(always)]
-pub(crate) fn ahead<S: Simd, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
+pub(crate) fn ahead<S: Simd, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
     if nodes.plane == 0 {
-        ahead_of::<S, WEAK, -1>(simd, nodes, slots);
+        ahead_of::<S, LEVELS, -1>(simd, nodes, slots);
     } else {
-        ahead_of::<S, WEAK, 0>(simd, nodes, slots);
+        ahead_of::<S, LEVELS, 0>(simd, nodes, slots);
     }
 }
 
 #[inline(always)]
-fn ahead_of<S: Simd, const WEAK: bool, const NEXT: isize>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
+fn ahead_of<S: Simd, const LEVELS: bool, const NEXT: isize>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
     let len = nodes.list.labels.len();
     let (costs, steps) = (&nodes.costs[..len], &nodes.list.steps[..len + 1]);
     let (same, next) = (&slots.same[..len], &slots.next[..len]);
     let (behind, ahead) = (&slots.behind[..len], &mut slots.ahead[..len]);
-    let weak = nodes.weak::<S, WEAK>(simd);
+    let levels = nodes.levels::<S, LEVELS>(simd);
     let mut envelope = Bytes::<S>::splat(simd, u8::MAX);
     let mut least = envelope;
     for entry in 0..len {
         let sides = same[entry].load(simd) + next[entry].load::<S, NEXT>(simd);
         let h = costs[entry].load(simd).saturating_add(sides).saturating_add(behind[entry].load(simd));
-        envelope = envelope.saturating_add(of_edges::<S, WEAK>(simd, weak[2], steps[entry])).min(h);
+        envelope = envelope.saturating_add(of_edges::<S, LEVELS>(simd, levels[2], steps[entry])).min(h);
         least = least.min(envelope);
         ahead[entry].store(envelope);
     }
-    let truncation = truncation::<S, WEAK>(simd, nodes, weak);
+    let truncation = nodes.truncations::<S, LEVELS>(simd, levels);
     envelope = Bytes::splat(simd, u8::MAX);
     for entry in (0..len).rev() {
-        let step = of_edges::<S, WEAK>(simd, weak[2], steps[entry + 1]);
+        let step = of_edges::<S, LEVELS>(simd, levels[2], steps[entry + 1]);
         envelope = envelope.saturating_add(step).min(ahead[entry].load(simd));
         ahead[entry].store((envelope - least).min(truncation[2]));
     }
-}
-
-#[inline(always)]
-fn truncation<S: Simd, const WEAK: bool>(simd: S, nodes: &Nodes<'_>, weak: [Bytes<S>; 3]) -> [Bytes<S>; 3] {
-    let values = [nodes.smoothness, nodes.smoothness.weakened()].map(|smoothness| smoothness.truncation);
-    weak.map(|weak| of_edges::<S, WEAK>(simd, weak, values))
 }
 
 const _: () = assert!(LANES == 32, "a block is one vector of 32 bytes");

@@ -119,7 +119,7 @@ impl Swept {
 
     fn sweep<'a>(&'a self, grid: &'a Grid<'a>) -> Sweep<'a> {
         let Grid { level, plan, index, layouts, costs } = grid;
-        let smoothness = plan.model().smoothness();
+        let edges = plan.model().edges();
         let coarser = layouts.get(index + 1);
         let cut = plan.settings().cut.map(|cut| cut.x);
         Sweep {
@@ -128,7 +128,7 @@ impl Swept {
             grid: *index,
             layout: &layouts[*index],
             costs,
-            coarser: coarser.map(|layout| Coarser { layout, bands: &self.bands[(index + 1) % 2], smoothness }),
+            coarser: coarser.map(|layout| Coarser { layout, bands: &self.bands[(index + 1) % 2], edges }),
             coarser_labels: self.labels.get(index + 1).map_or(&[], Vec::as_slice),
             windows: &self.windows,
             gaps: gaps(plan.size(*index).width, cut),

@@ -36,7 +36,7 @@ pub(crate) struct Buffers {
     /// Bound in place of sums that are not kept: one buffer to read, one to write.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
-    /// Grey values of the whole grid, `[grid]`, if the model has weak edges.
+    /// Grey values of the whole grid, `[grid]`, if the model has edges of several levels.
     pub(crate) greys: Option<Vec<usize>>,
     /// `[grid][strip]`.
     pub(crate) strips: Vec<Vec<StripBuffers>>,
@@ -67,10 +67,8 @@ impl Buffers {
             label_sets: plan.has_label_sets(0).then(|| device("label sets", label_set_bytes(plan))),
             unused: device("unused", 16),
             unused_written: device("unused", 16),
-            greys: plan
-                .model()
-                .weak_edges()
-                .map(|_| grids.iter().map(|grid| device("grey values", grid.grey_bytes())).collect()),
+            greys: (!plan.model().edges().is_uniform())
+                .then(|| grids.iter().map(|grid| device("grey values", grid.grey_bytes())).collect()),
             strips: grids.iter().map(|grid| strips(plan, grid, &mut device)).collect(),
             list,
         }

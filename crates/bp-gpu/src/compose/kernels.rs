@@ -9,21 +9,21 @@ use super::{
 use crate::{Kernel, Pipeline};
 
 impl Composer<'_> {
-    /// The buffer of the grid's grey values. Without weak edges no kernel reads it, and a buffer of costs is bound.
+    /// The buffer of the grid's grey values. If all edges have the same cost, no kernel reads it, and a buffer of costs is bound.
     pub(super) fn greys_read(&self, nodes: Nodes) -> usize {
         self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
     }
 
-    /// The constant that tells kernels to look for weak edges.
-    fn looks_for_weak_edges(&self) -> (&'static str, u32) {
-        ("WEAK", self.buffers.greys.is_some().into())
+    /// The constant that tells kernels to find the levels of edges.
+    fn finds_levels(&self) -> (&'static str, u32) {
+        ("LEVELS", self.buffers.greys.is_some().into())
     }
 
     pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
         let constants = vec![
             ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
             ("SELECTIVE", selective.into()),
-            self.looks_for_weak_edges(),
+            self.finds_levels(),
         ];
         Pipeline { kernel: Kernel::UpdateMessages, constants }
     }
@@ -47,8 +47,7 @@ impl Composer<'_> {
 
     pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
         let sweep = self.plan.settings().schedule == Schedule::Sweep;
-        let constants =
-            vec![("SATURATING", self.saturates(4, 0)), ("SWEEP", sweep.into()), self.looks_for_weak_edges()];
+        let constants = vec![("SATURATING", self.saturates(4, 0)), ("SWEEP", sweep.into()), self.finds_levels()];
         let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);

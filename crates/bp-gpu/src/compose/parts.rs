@@ -55,7 +55,7 @@ impl Composer<'_> {
         }
     }
 
-    /// The grey values of the left image, if the model has weak edges.
+    /// The grey values of the left image, if the model has edges of several levels.
     fn greys(&mut self, part: &mut PartRecorder) {
         let Some(greys) = &self.buffers.greys else { return };
         let pipeline = Pipeline { kernel: Kernel::Greys, constants: vec![("APRON", APRON as u32)] };

@@ -1,6 +1,6 @@
 //! The state of the oracle between two kernels, and the message as defined.
 
-use bp_core::{LabelSet, Node, Plan, Side};
+use bp_core::{LabelSet, Node, Plan, Side, Smoothness};
 
 /// The data cost of a label that a node's set lacks.
 const IMPOSSIBLE: i64 = 1 << 40;
@@ -69,12 +69,12 @@ impl State {
 
     /// The smoothness cost of labels a and d at the ends of the edge from `node` to that side.
     pub(super) fn smoothness(&self, grid: usize, node: Node, side: Side) -> impl Fn(usize, usize) -> i64 + use<> {
-        let model = self.plan.model();
-        let (slope, truncation) = (i64::from(model.slope()), i64::from(model.truncation()));
         let grey = |node| self.grids[grid].greys[self.index(grid, node)];
-        let difference = self.plan.neighbour(grid, node, side).map_or(0, |other| grey(node) - grey(other));
-        let is_weak = model.weak_edges().is_some_and(|threshold| difference.abs() > threshold.into());
-        let (slope, truncation) = if is_weak { (slope / 2, truncation / 2) } else { (slope, truncation) };
+        let difference = self.plan.neighbour(grid, node, side).map_or(0, |other| grey(node) - grey(other)).abs();
+        let edges = self.plan.model().edges();
+        let level = edges.most().into_iter().position(|most| difference <= most.into()).unwrap_or(0);
+        let Smoothness { slope, truncation } = edges.smoothness()[level];
+        let (slope, truncation) = (i64::from(slope), i64::from(truncation));
         move |a, d| (slope * a.abs_diff(d) as i64).min(truncation)
     }
 
