@@ -5,6 +5,7 @@
 mod check;
 mod confidence;
 mod fill;
+mod means;
 mod median;
 mod offsets;
 mod speckles;
@@ -20,8 +21,8 @@ pub use subpixel::subpixel;
 
 use crate::{DisparityMap, Error, StereoPair};
 
-/// Asked before every row of operations that take long: whether to end with [`Error::Stopped`].
-pub type IsStopped<'a> = &'a dyn Fn() -> bool;
+/// Asked before every row of operations that take long, by several threads: whether to end with [`Error::Stopped`].
+pub type IsStopped<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// An [`IsStopped`] for work that is never stopped.
 #[must_use]
@@ -81,6 +82,8 @@ impl Finish {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
     use crate::{Image, Size};
 
@@ -118,8 +121,8 @@ mod tests {
         let flat = map(5, &[1.0; 5]);
         for finish in [Finish { median: Some(3), ..Finish::default() }, Finish { subpixel: true, ..Finish::default() }]
         {
-            let asked = std::cell::Cell::new(0);
-            let second = || asked.replace(asked.get() + 1) == 1;
+            let asked = AtomicUsize::new(0);
+            let second = || asked.fetch_add(1, Ordering::Relaxed) == 1;
             let stopped = finish.apply(&pair(5), flat.clone(), None, &|| true);
             assert_eq!(stopped, Err(Error::Stopped));
             let rows = finish.apply(&pair(5), flat.clone(), None, &second);

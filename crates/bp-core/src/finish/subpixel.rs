@@ -1,16 +1,7 @@
 //! Sub-pixel refinement.
 
-use super::{
-    IsStopped,
-    check::AGREE,
-    go_on,
-    offsets::add_offsets,
-    window::{Frame, Framed, window},
-};
-use crate::{DisparityMap, Error, StereoPair, memory};
-
-/// How far windows reach from their centres.
-const REACH: usize = 4;
+use super::{IsStopped, means::means, offsets::add_offsets};
+use crate::{DisparityMap, Error, StereoPair};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
@@ -24,40 +15,7 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
     let Some((least, largest)) = map.range() else { return Ok(map) };
     let start = means(&map, is_stopped)?;
     drop(map);
-    means(&add_offsets(pair, start, is_stopped)?.limited(least, largest), is_stopped)
-}
-
-/// Replaces every disparity by the mean of those in the 9x9 window around it that differ by no more than [`AGREE`].
-fn means(map: &DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
-    let size = map.size();
-    let framed = Framed::new(size, map.values(), REACH, Frame::Unknown)?;
-    let mut means = memory::filled("a map", size.pixels(), 0.0)?;
-    let row_of = || memory::filled("sums", size.width, 0.0);
-    let (mut sums, mut counts) = (row_of()?, row_of()?);
-    let rows = map.values().chunks_exact(size.width).zip(means.chunks_exact_mut(size.width));
-    for (y, (row, means)) in rows.enumerate() {
-        go_on(is_stopped)?;
-        sums.fill(0.0);
-        counts.fill(0.0);
-        for (dx, dy) in window(REACH) {
-            add_near(row, framed.row(y, dx, dy), &mut sums, &mut counts);
-        }
-        for (((mean, &d), sum), count) in means.iter_mut().zip(row).zip(&sums).zip(&counts) {
-            // An unknown pixel is near nothing, not even itself.
-            *mean = if *count > 0.0 { d + sum / count } else { d };
-        }
-    }
-    DisparityMap::new(size, means)
-}
-
-/// Adds the differences to neighbours with a similar disparity, and counts these neighbours.
-fn add_near(row: &[f32], neighbours: &[f32], sums: &mut [f32], counts: &mut [f32]) {
-    for (((&own, &other), sum), count) in row.iter().zip(neighbours).zip(sums).zip(counts) {
-        let difference = other - own;
-        let near = difference.abs() <= AGREE;
-        *sum += if near { difference } else { 0.0 };
-        *count += if near { 1.0 } else { 0.0 };
-    }
+    means(&add_offsets(pair, &start, is_stopped)?.limited(least, largest), is_stopped)
 }
 
 #[cfg(test)]
