@@ -1,7 +1,7 @@
 //! Sub-pixel refinement.
 
-use super::{IsStopped, means::means, offsets::add_offsets};
-use crate::{DisparityMap, Error, StereoPair};
+use super::{IsStopped, means::write_means, offsets::write_offsets};
+use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
@@ -12,10 +12,18 @@ use crate::{DisparityMap, Error, StereoPair};
 /// # Errors
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
 pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
+    check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range() else { return Ok(map) };
-    let start = means(&map, is_stopped)?;
-    drop(map);
-    means(&add_offsets(pair, &start, is_stopped)?.limited(least, largest), is_stopped)
+    let mut other = memory::filled("a map", map.values().len(), 0.0)?;
+    let mut refined = Ok(());
+    let map = map.replaced(|map| {
+        let width = pair.size().width;
+        refined = write_means(width, map, &mut other, is_stopped)
+            .and_then(|()| write_offsets(pair, &other, least..=largest, map, is_stopped))
+            .and_then(|()| write_means(width, map, &mut other, is_stopped));
+        map.copy_from_slice(&other);
+    });
+    refined.map(|()| map)
 }
 
 #[cfg(test)]
@@ -95,9 +103,10 @@ mod tests {
     fn a_staircase_becomes_a_slope() {
         let size = Size { width: 64, height: 9 };
         let slope = |x: usize| 10.0 + 0.25 * x as f32;
-        let steps = (0..size.pixels()).map(|i| slope(i % size.width).round()).collect();
-        let map = means(&DisparityMap::new(size, steps).unwrap(), &never).unwrap();
-        let worst = (8..56).map(|x| (map.at(x, 4).unwrap() - slope(x)).abs()).fold(0.0, f32::max);
+        let steps: Vec<f32> = (0..size.pixels()).map(|i| slope(i % size.width).round()).collect();
+        let mut means = vec![0.0; size.pixels()];
+        write_means(size.width, &steps, &mut means, &never).unwrap();
+        let worst = (8..56).map(|x| (means[4 * size.width + x] - slope(x)).abs()).fold(0.0, f32::max);
         assert!(worst <= 0.25, "{worst}");
     }
 

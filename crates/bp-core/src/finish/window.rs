@@ -38,12 +38,6 @@ impl Framed {
         Ok(Self { width: size.width, frame, values: framed })
     }
 
-    /// A row of the frame, `[width + 2 frame]`: row y of the map is row y + frame.
-    pub(super) fn whole_row(&self, y: usize) -> &[f32] {
-        let width = self.width + 2 * self.frame;
-        &self.values[y * width..][..width]
-    }
-
     /// A shifted row: entry x is the value (dx - frame) columns and (dy - frame) rows away from pixel (x, y), for dx and dy in
     /// `0..=2 frame`.
     pub(super) fn row(&self, y: usize, dx: usize, dy: usize) -> &[f32] {

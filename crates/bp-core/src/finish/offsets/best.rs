@@ -1,10 +1,18 @@
 //! The offset with the least variance.
 
+use std::ops::RangeInclusive;
+
 use super::{MIDDLE, STEPS, TRIED};
 
 /// Writes disparities at the least variances, `[tried][column]`, where the tried disparities have a first step.
 #[inline(always)]
-pub(super) fn write_best(variances: &[f32], first: &[i32], disparities: &[f32], refined: &mut [f32]) {
+pub(super) fn write_best(
+    variances: &[f32],
+    first: &[i32],
+    disparities: &[f32],
+    limits: &RangeInclusive<f32>,
+    refined: &mut [f32],
+) {
     let width = disparities.len();
     // Slices of one known length let the compiler drop the bounds checks in the loop.
     let mut rows = [&variances[..width]; TRIED];
@@ -16,6 +24,7 @@ pub(super) fn write_best(variances: &[f32], first: &[i32], disparities: &[f32], 
         let steps = best_step([rows[0][x], rows[1][x], rows[2][x], rows[3][x], rows[4][x]]);
         let nearest = (STEPS * x) as i32 - MIDDLE as i32 - first[x];
         let found = (nearest as f32 + steps) / STEPS as f32;
+        let found = found.max(*limits.start()).min(*limits.end());
         refined[x] = if first[x] >= 0 { found } else { disparities[x] };
     }
 }

@@ -1,5 +1,7 @@
 //! Variances of grey differences in windows, from sums that rows enter and leave.
 
+use std::ops::RangeInclusive;
+
 use fearless_simd::Simd;
 
 use super::{
@@ -107,13 +109,19 @@ impl Windows {
 
     /// Writes the refined disparities of the row in the middle.
     #[inline(always)]
-    pub(super) fn refine<S: Simd>(&mut self, simd: S, disparities: &[f32], refined: &mut [f32]) {
+    pub(super) fn refine<S: Simd>(
+        &mut self,
+        simd: S,
+        disparities: &[f32],
+        limits: &RangeInclusive<f32>,
+        refined: &mut [f32],
+    ) {
         simd.vectorize(
             #[inline(always)]
             || {
                 self.write_variances();
                 first_steps(disparities, &mut self.first);
-                write_best(&self.variances, &self.first, disparities, refined);
+                write_best(&self.variances, &self.first, disparities, limits, refined);
             },
         );
     }
