@@ -63,7 +63,7 @@ class Command:
 MATCH = f"{BP} match {{left}} {{right}} --output {{output}} --labels {{labels}} --no-sidecar --quiet"
 KNOWN = {
     "bp": Command("bp", MATCH),
-    "bp, checked": Command("bp, checked", f"{MATCH} --check left-right --median 3 --subpixel"),
+    "bp, checked": Command("bp, checked", f"{MATCH} --check left-right --median 3"),
 } | {f"OpenCV SGBM, {mode}": Sgbm(mode) for mode in SGBM_MODES}
 
 

@@ -1,12 +1,11 @@
-// Label sets of a grid: the labels that differ by at most REACH from those of at least AGREEING nodes of the coarser grid around
-// the patch, or, if there is no such label, from that of any.
+// Label sets of a grid: the labels that differ by at most REACH from those of at least four nodes of the coarser grid around the
+// patch, or, if there is no such label, from that of any.
 
 @group(0) @binding(1) var<storage, read_write> sets: array<u32>;
 // The labels of the coarser grid, in the layout of select_labels.
 @group(0) @binding(2) var<storage, read> labels: array<vec2<u32>>;
 
 const REACH: u32 = 2;
-const AGREEING: u32 = 4;
 // How many coarse nodes are looked at beyond the parents.
 const MARGIN: u32 = 2;
 
@@ -44,31 +43,34 @@ struct Region {
     last: vec2<u32>,
 }
 
-// The labels of a word that are near those of any node, and of at least AGREEING nodes.
+// The labels of a word that are near those of at least one node, and of at least four.
 struct Near {
-    any: u32,
-    agreeing: u32,
+    one: u32,
+    four: u32,
 }
 
 fn near(region: Region, word: u32) -> Near {
-    // The labels near those of at least 1, 2, ... nodes.
-    var counts: array<u32, AGREEING>;
+    // Not an array: Mesa's CPU driver does not clear it again when the function is called in a loop.
+    var one = 0u;
+    var two = 0u;
+    var three = 0u;
+    var four = 0u;
     for (var y = region.first.y; y <= region.last.y; y++) {
         for (var x = region.first.x; x <= region.last.x; x++) {
             let found = bits(coarse_label(x, y), word);
-            for (var i = AGREEING - 1; i > 0; i--) {
-                counts[i] |= counts[i - 1] & found;
-            }
-            counts[0] |= found;
+            four |= three & found;
+            three |= two & found;
+            two |= one & found;
+            one |= found;
         }
     }
-    return Near(counts[0], counts[AGREEING - 1]);
+    return Near(one, four);
 }
 
-// Whether any word has a label near those of AGREEING nodes.
+// Whether any word has a label near those of four nodes.
 fn agree(region: Region) -> bool {
     for (var word = 0u; word < set_words(); word++) {
-        if near(region, word).agreeing != 0 {
+        if near(region, word).four != 0 {
             return true;
         }
     }
@@ -94,9 +96,9 @@ fn label_sets(@builtin(global_invocation_id) id: vec3<u32>) {
     let last = min(vec2(coarse_columns.y, coarse_rows.y) + MARGIN, vec2(parameters.other_width, parameters.other_height) - 1);
     let region = Region(first, last);
     let near = near(region, word);
-    var found = near.agreeing;
-    if found == 0 && near.any != 0 && !agree(region) {
-        found = near.any;
+    var found = near.four;
+    if found == 0 && near.one != 0 && !agree(region) {
+        found = near.one;
     }
     sets[(window * patches() + patch_index) * words + word] = found;
 }

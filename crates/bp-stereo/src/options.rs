@@ -47,7 +47,7 @@ pub struct Options {
     pub fill: bool,
     /// Side of a median filter's window: 3, 5 or 7.
     pub median: Option<usize>,
-    /// Whether disparities are refined to fractions of a pixel.
+    /// Whether disparities are refined to fractions of a pixel, by the images; otherwise they are whole.
     pub subpixel: bool,
     /// Whether each pixel gets a confidence from 0 to 1; matches the right image too.
     pub confidence: bool,
@@ -89,7 +89,7 @@ impl Default for Options {
             speckle: None,
             fill: true,
             median: None,
-            subpixel: false,
+            subpixel: true,
             confidence: false,
             backend: devices::DEFAULT.to_owned(),
             device: None,

@@ -26,9 +26,9 @@ pub(crate) struct FinishArgs {
     /// Apply a median filter of N x N pixels.
     #[arg(long, value_name = "N", value_parser = named(&MEDIANS, side))]
     pub(crate) median: Option<usize>,
-    /// Refine disparities to fractions of a pixel, by the images.
+    /// Keep disparities in whole pixels. Otherwise they are refined to fractions of a pixel, by the images.
     #[arg(long, hide_short_help = true)]
-    pub(crate) subpixel: bool,
+    pub(crate) whole_pixels: bool,
     /// Write a confidence from 0 to 1 for each pixel.
     ///
     /// The confidence is the share of a 9 x 9 window that agrees with its centre and with the right image's map, as

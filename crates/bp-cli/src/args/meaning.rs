@@ -34,7 +34,7 @@ impl MatchArgs {
             speckle: finish.speckle.map(|least| least as usize),
             fill: finish.fill.unwrap_or(true),
             median: finish.median,
-            subpixel: finish.subpixel,
+            subpixel: !finish.whole_pixels,
             confidence: finish.confidence.is_some() || self.many.also.contains(&Also::Confidence),
             backend: plan.backend.clone(),
             device: plan.device.clone(),
