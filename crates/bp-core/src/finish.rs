@@ -2,6 +2,7 @@
 //!
 //! [`Finish`] selects some of them and applies them in a fixed order: left-right check, speckles, fill, median, sub-pixel.
 
+mod border;
 mod check;
 mod confidence;
 mod fill;
@@ -12,6 +13,7 @@ mod speckles;
 mod subpixel;
 mod window;
 
+pub use border::fill_border;
 pub use check::{AGREE, check_left_right};
 pub use confidence::confidence;
 pub use fill::fill;
@@ -41,7 +43,8 @@ pub struct Finish {
     pub check: bool,
     /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
     pub speckles: Option<usize>,
-    /// Whether unknown pixels are filled after the check and the speckles; see [`fill()`].
+    /// Whether unknown pixels are filled after the check and the speckles; see [`fill_border`]
+    /// and [`fill()`].
     pub fill: bool,
     /// The side of the window of [`median`], one of [`MEDIANS`].
     pub median: Option<usize>,
@@ -71,7 +74,7 @@ impl Finish {
             map = remove_speckles(map, least)?;
         }
         if self.fill {
-            map = fill(map);
+            map = fill(fill_border(map)?);
         }
         if let Some(side) = self.median {
             map = median(&map, side, is_stopped)?;

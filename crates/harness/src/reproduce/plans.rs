@@ -42,7 +42,12 @@ pub fn all() -> Vec<Planned> {
     plans.push(Planned { fixed: Some((5, 2)), ..census(CENSUS, Algorithm::Cfbp) });
     let half_steps = Planned { schedule: Schedule::Checkerboard, ..census("hierarchy", Algorithm::Cfbp) };
     plans.push(Planned { fixed: Some((5, 10)), ..half_steps });
-    let sweep = |name| Planned { schedule: Schedule::Sweep, fixed: Some((5, 1)), ..census(name, Algorithm::Sweep) };
+    let sweep = |name| Planned {
+        profile: Profile::Census16,
+        schedule: Schedule::Sweep,
+        fixed: Some((5, 1)),
+        ..thesis(name, Algorithm::Sweep, Z)
+    };
     plans.push(Planned { label_sets: true, ..sweep("sweep") });
     plans.push(sweep("sweep-all-labels"));
     plans

@@ -36,6 +36,13 @@ enum Passing {
     Sweep,
 }
 
+impl Passing {
+    /// The data cost of problems with census costs: that of the default matcher, or the one without edge levels.
+    fn profile(self) -> Profile {
+        if self == Self::Sweep { Profile::Census16 } else { Profile::Census }
+    }
+}
+
 impl Problem {
     /// The groups that `--problem` accepts. Those after the first `BY_DEFAULT` take long, or are informative on fast
     /// devices only. They run only if named.
@@ -72,7 +79,7 @@ impl Problem {
     /// The problems of a group.
     fn group(group: &'static str) -> Vec<Self> {
         let half_steps = |grids, steps| Passing::HalfSteps { grids, steps };
-        let census = |size, labels, passing| vec![Self::new(group, size, labels, Profile::Census, passing)];
+        let census = |size, labels, passing: Passing| vec![Self::new(group, size, labels, passing.profile(), passing)];
         let thesis = |labels, passing| vec![Self::new(group, BABY1, labels, Profile::Thesis, passing)];
         match group {
             "update" => thesis(64, Passing::Loops(10)),
@@ -99,7 +106,7 @@ impl Problem {
             family: Some(family),
             ..Self::new(family.name(), size, labels, Profile::Thesis, passing).named(&name)
         };
-        let census = |problem: Self| Self { profile: Profile::Census, ..problem };
+        let census = |problem: Self| Self { profile: problem.passing.profile(), ..problem };
         let large = |passing| {
             let problem = |megapixels: f64| {
                 let width = (megapixels * 1e6 * 4.0 / 3.0).sqrt().round();

@@ -1,0 +1,120 @@
+//! Filling the left border, which the right camera does not see.
+
+use crate::{DisparityMap, Error, memory};
+
+/// How many rows above and below, and how many columns, tell the slope of a surface.
+const ROWS: usize = 16;
+const COLUMNS: usize = 24;
+
+/// The fewest columns of a row that tell anything.
+const FEWEST: usize = 8;
+
+/// The steepest slope, in pixels of disparity a column.
+const STEEPEST: f64 = 0.5;
+
+/// How much of the slope is believed. Beyond the known pixels, surfaces tend to be flatter.
+const BELIEVED: f64 = 0.75;
+
+/// Fills unknown pixels at the left border by continuing the surface beside them, in whole pixels. Rows of which nothing is
+/// known stay as they are.
+///
+/// The first known pixel of a row is its anchor. In the 16 rows above and below, and in its own, a run of up to 24 pixels begins
+/// in the anchor's column if the disparity there differs from the anchor's by at most 1 px; it ends before an unknown pixel or
+/// a step of more than 1 px. A line is fitted to all runs of at least 8 pixels, each about its own mean. Three quarters of its
+/// slope, at most half a pixel a column, lead from the anchor to the border. The range of disparities stays.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
+    let Some((least, largest)) = map.range() else { return Ok(map) };
+    let (width, height) = (map.size().width, map.size().height);
+    let mut anchors = memory::filled("anchors", height, None)?;
+    for (y, anchor) in anchors.iter_mut().enumerate() {
+        let x = map.values()[y * width..][..width].iter().position(|value| value.is_finite());
+        *anchor = x.filter(|&x| x > 0).map(|x| (x, slope(&map, x, y)));
+    }
+    Ok(map.replaced(|values| {
+        for (row, anchor) in values.chunks_exact_mut(width).zip(anchors) {
+            let Some((x, slope)) = anchor else { continue };
+            let (hole, known) = row.split_at_mut(x);
+            for (away, value) in (1_u32..).zip(hole.iter_mut().rev()) {
+                let continued = f64::from(known[0]) - slope * f64::from(away);
+                *value = (continued.round() as f32).clamp(least, largest);
+            }
+        }
+    }))
+}
+
+/// The slope to be continued to the left of the anchor at (x, y).
+fn slope(map: &DisparityMap, x: usize, y: usize) -> f64 {
+    let (width, height) = (map.size().width, map.size().height);
+    let columns = x..width.min(x + COLUMNS);
+    let anchor = map.values()[y * width + x];
+    let (mut rise, mut spread) = (0.0, 0.0);
+    for row in map.values().chunks_exact(width).take(height.min(y + ROWS + 1)).skip(y.saturating_sub(ROWS)) {
+        let near = &row[columns.clone()];
+        let run = if (near[0] - anchor).abs() <= 1.0 { run(near) } else { &[] };
+        if run.len() >= FEWEST {
+            let (own_rise, own_spread) = moments(run);
+            (rise, spread) = (rise + own_rise, spread + own_spread);
+        }
+    }
+    if spread > 0.0 { (BELIEVED * rise / spread).clamp(-STEEPEST, STEEPEST) } else { 0.0 }
+}
+
+/// The values before the first step of more than 1 px, or the first unknown value.
+fn run(values: &[f32]) -> &[f32] {
+    let end = values.windows(2).position(|pair| !((pair[1] - pair[0]).abs() <= 1.0));
+    end.map_or(values, |last| &values[..=last])
+}
+
+/// The sums of the products of columns and values, and of the squares of columns, about their means.
+fn moments(values: &[f32]) -> (f64, f64) {
+    let middle = (values.len() - 1) as f64 / 2.0;
+    let columns = || (0..).map(|column| f64::from(column) - middle);
+    let rise = columns().zip(values).map(|(column, &value)| column * f64::from(value)).sum();
+    (rise, columns().take(values.len()).map(|column| column * column).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Size;
+
+    const NONE: f32 = DisparityMap::UNKNOWN;
+
+    fn filled(width: usize, values: Vec<f32>) -> Vec<f32> {
+        let size = Size { width, height: values.len() / width };
+        fill_border(DisparityMap::new(size, values).unwrap()).unwrap().values().to_vec()
+    }
+
+    #[test]
+    fn a_slope_goes_on_at_three_quarters() {
+        // 4 px more with each 10 columns, so 3 px less with each 10 columns into the hole. The row below is farther away.
+        let known = (0..34).map(|x| if x < 10 { NONE } else { (20.0 + 0.4 * x as f32).round() });
+        let rows = filled(34, known.chain([2.0; 34]).collect());
+        assert_eq!(rows[..11], [21.0, 21.0, 22.0, 22.0, 22.0, 23.0, 23.0, 23.0, 23.0, 24.0, 24.0]);
+        // It never leaves the range of the known disparities.
+        assert_eq!(filled(34, rows[..34].iter().map(|&d| if d < 24.0 { NONE } else { d }).collect())[..9], [24.0; 9]);
+    }
+
+    #[test]
+    fn steps_short_runs_and_other_surfaces_tell_nothing() {
+        // Seven columns, then a step.
+        let mut row = vec![NONE; 4];
+        row.extend((0..7).map(|x| 10.0 + x as f32).chain([40.0; 20]));
+        assert_eq!(filled(31, row)[..4], [10.0; 4]);
+        // The row below belongs to another surface.
+        let flat = [NONE, NONE].into_iter().chain([9.0; 20]);
+        let steep = (0..22).map(|x| if x < 2 { NONE } else { 30.0 + x as f32 });
+        let both = filled(22, flat.chain(steep).collect());
+        assert_eq!([both[0], both[22]], [9.0, 31.0]);
+    }
+
+    #[test]
+    fn only_the_left_border_is_filled() {
+        let map = vec![5.0, NONE, 6.0, NONE];
+        assert_eq!(filled(4, map.clone()), map);
+        assert_eq!(filled(2, vec![NONE; 4]), [NONE; 4]);
+    }
+}
