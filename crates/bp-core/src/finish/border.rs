@@ -1,5 +1,6 @@
 //! Filling the left border, which the right camera does not see.
 
+use super::check::AGREE;
 use crate::{DisparityMap, Error, memory};
 
 /// How many rows above and below, and how many columns, tell the slope of a surface.
@@ -53,7 +54,7 @@ fn slope(map: &DisparityMap, x: usize, y: usize) -> f64 {
     let (mut rise, mut spread) = (0.0, 0.0);
     for row in map.values().chunks_exact(width).take(height.min(y + ROWS + 1)).skip(y.saturating_sub(ROWS)) {
         let near = &row[columns.clone()];
-        let run = if (near[0] - anchor).abs() <= 1.0 { run(near) } else { &[] };
+        let run = if (near[0] - anchor).abs() <= AGREE { run(near) } else { &[] };
         if run.len() >= FEWEST {
             let (own_rise, own_spread) = moments(run);
             (rise, spread) = (rise + own_rise, spread + own_spread);
@@ -64,7 +65,7 @@ fn slope(map: &DisparityMap, x: usize, y: usize) -> f64 {
 
 /// The values before the first step of more than 1 px, or the first unknown value.
 fn run(values: &[f32]) -> &[f32] {
-    let end = values.windows(2).position(|pair| !((pair[1] - pair[0]).abs() <= 1.0));
+    let end = values.windows(2).position(|pair| (pair[1] - pair[0]).abs() > AGREE);
     end.map_or(values, |last| &values[..=last])
 }
 
