@@ -18,8 +18,11 @@ const MIN_ROWS: usize = 8;
 /// Columns that are computed together.
 const COLUMNS: usize = 32;
 
+/// Those columns, and as many on both sides as windows reach.
+const WIDE: usize = COLUMNS + 2 * REACH;
+
 /// The disparities around some columns of a row; unknown outside the map.
-type Near = [[f32; COLUMNS + 2 * REACH]; SIDE];
+type Near = [[f32; WIDE]; SIDE];
 
 /// Writes the mean of the disparities in the 9x9 window around each pixel that differ from its own by no more than [`AGREE`].
 /// Both maps are `[height][width]`.
@@ -58,9 +61,14 @@ fn row_of_means<S: Simd>(simd: S, rows: [Option<&[f32]>; SIDE], means: &mut [f32
 /// The disparities around the columns from x on.
 #[inline(always)]
 fn near(rows: &[Option<&[f32]>; SIDE], x: usize) -> Near {
-    let mut near = [[DisparityMap::UNKNOWN; COLUMNS + 2 * REACH]; SIDE];
+    let mut near = [[DisparityMap::UNKNOWN; WIDE]; SIDE];
     for (near, row) in near.iter_mut().zip(rows) {
         let Some(row) = row else { continue };
+        let whole = x.checked_sub(REACH).and_then(|first| row.get(first..first + WIDE)?.try_into().ok());
+        if let Some(columns) = whole {
+            *near = columns;
+            continue;
+        }
         let (first, missing) = (x.saturating_sub(REACH), REACH.saturating_sub(x));
         let columns = &row[first..row.len().min(x + COLUMNS + REACH)];
         near[missing..missing + columns.len()].copy_from_slice(columns);
