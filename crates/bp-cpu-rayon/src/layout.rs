@@ -15,7 +15,7 @@ pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     (4 * (lanes + 2 * BLOCK) + 2 * lanes + size.height) as u64 + greys::bytes(plan, grid)
 }
 
-/// A shape and the edges between its nodes: which of them exist and, once a pair is loaded, which of them are weak.
+/// A shape and the edges between its nodes: which of them exist and, once a pair is loaded, their levels.
 #[derive(Debug)]
 pub(crate) struct Layout {
     shape: Shape,
@@ -84,7 +84,7 @@ impl Layout {
         self.none_and_all.each_ref().map(Vec::as_slice)
     }
 
-    /// The grey values around the nodes of `plane` in row `y`; `None` if the model has no weak edges.
+    /// The grey values around the nodes of `plane` in row `y`; `None` if all edges have the same cost.
     pub(crate) fn around(&self, plane: usize, y: usize) -> Option<Around<'_>> {
         self.greys.around(plane, y)
     }

@@ -8,7 +8,7 @@
 //!
 //! Where to start reading:
 //!
-//! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and which are weak.
+//! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and what level they have.
 //! * `match_cost` (on `features` and `compare`) and `coarsen` compute data costs.
 //! * `half_steps` runs the schedules `sync` and `checkerboard` over whole grids. Its `edges` explains why one message per edge
 //!   is enough.

@@ -94,3 +94,37 @@ fn means_of<S: Simd>(simd: S, near: &Near, at: usize) -> S::f32s {
     // An unknown pixel is near nothing, not even itself.
     own + sums / counts.max(one)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{super::never, *};
+
+    /// The mean of one pixel, in the same order of additions.
+    fn mean(width: usize, map: &[f32], at: usize) -> f32 {
+        let (x, y) = (at % width, at / width);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (row, column) in (y..y + SIDE).flat_map(|row| (x..x + SIDE).map(move |column| (row, column))) {
+            let (Some(row), Some(column)) = (row.checked_sub(REACH), column.checked_sub(REACH)) else { continue };
+            let near = map.get(row * width + column).filter(|_| column < width).map(|value| value - map[at]);
+            if let Some(difference) = near.filter(|difference| difference.abs() <= AGREE) {
+                (sum, count) = (sum + difference, count + 1.0);
+            }
+        }
+        if count > 0.0 { map[at] + sum / count } else { map[at] }
+    }
+
+    #[test]
+    fn vectors_compute_what_single_pixels_do() {
+        for (width, height) in [(1, 1), (3, 12), (31, 2), (40, 9), (73, 11), (130, 5)] {
+            let value = |i: usize| match i * i * 29 % 101 {
+                0..5 => DisparityMap::UNKNOWN,
+                noise => (i % width) as f32 * 0.07 + noise as f32 / 40.0,
+            };
+            let map: Vec<f32> = (0..width * height).map(value).collect();
+            let mut means = vec![0.0; map.len()];
+            write_means(width, &map, &mut means, &never).unwrap();
+            let expected: Vec<f32> = (0..map.len()).map(|at| mean(width, &map, at)).collect();
+            assert_eq!(means, expected, "{width}x{height}");
+        }
+    }
+}
