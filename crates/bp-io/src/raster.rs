@@ -1,6 +1,6 @@
 //! One value per pixel, to be written to a file.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -16,13 +16,15 @@ pub struct Raster<'a> {
     pub values: &'a [f32],
     /// The quantity of the values.
     pub quantity: Quantity,
+    /// Whether the formats TIFF and NPY hold NaN for unknown, and not plus infinity.
+    pub nan: bool,
 }
 
 impl<'a> Raster<'a> {
     /// The disparities of a map.
     #[must_use]
     pub fn disparities(map: &'a DisparityMap) -> Self {
-        Self { size: map.size(), values: map.values(), quantity: Quantity::Disparity }
+        Self { size: map.size(), values: map.values(), quantity: Quantity::Disparity, nan: false }
     }
 
     /// The least and the largest known value.
@@ -32,12 +34,25 @@ impl<'a> Raster<'a> {
         known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
+    /// Whether a format holds NaN for unknown.
+    pub(crate) fn has_nan(&self, format: MapFormat) -> bool {
+        self.nan && matches!(format, MapFormat::Tiff | MapFormat::Npy)
+    }
+
+    /// The values as a format of floats holds them.
+    fn stored(&self, format: MapFormat) -> Cow<'a, [f32]> {
+        if !self.has_nan(format) {
+            return Cow::Borrowed(self.values);
+        }
+        self.values.iter().map(|&value| if value.is_finite() { value } else { f32::NAN }).collect()
+    }
+
     /// Encodes the values in memory, in a format of floats. `None` for [`MapFormat::Png16`], which rounds.
     ///
     /// # Errors
     /// Those of the encoder, as text.
     pub fn floats(&self, format: MapFormat) -> Option<Result<Vec<u8>, String>> {
-        let Self { size, values, .. } = *self;
+        let (size, values) = (self.size, &*self.stored(format));
         let mut bytes = Vec::new();
         let written = match format {
             MapFormat::Png16 => return None,
@@ -55,8 +70,10 @@ impl<'a> Raster<'a> {
     /// # Errors
     /// [`Error::Request`] if the format cannot hold a value, [`Error::Write`].
     pub fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
-        let Self { size, values, quantity } = *self;
-        match MapFormat::of(path)? {
+        let Self { size, quantity, .. } = *self;
+        let format = MapFormat::of(path)?;
+        let values = &*self.stored(format);
+        match format {
             MapFormat::Pfm => files.whole(path, |file| pfm::write(file, size, values)),
             MapFormat::Npy => files.whole(path, |file| npy::write(file, size, values)),
             MapFormat::Tiff => {

@@ -81,7 +81,7 @@ struct Sidecar<'a, P> {
     inputs: Vec<String>,
 }
 
-/// The stored value of unknown pixels. Infinity is text, because JSON has no number for it.
+/// The stored value of unknown pixels. Infinity and NaN are text, because JSON has no numbers for them.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Unknown {
@@ -136,6 +136,7 @@ pub fn write_sidecar<P: Serialize>(
     let format = MapFormat::of(path)?;
     let (scale, unknown) = match format {
         MapFormat::Png16 => (1.0 / f64::from(raster.quantity.steps()), Unknown::Number(0)),
+        _ if raster.has_nan(format) => (1.0, Unknown::Text("nan")),
         MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
     };
     write(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })

@@ -32,6 +32,8 @@ pub struct Making {
     pub picture: Picture,
     /// Whether no sidecar is written beside maps and pictures.
     pub no_sidecar: bool,
+    /// Whether the formats TIFF and NPY hold NaN for unknown, and not plus infinity.
+    pub nan: bool,
     /// The geometry of the cameras, which depth and points need.
     pub geometry: Option<Geometry>,
     /// How files are written.
@@ -127,7 +129,11 @@ impl Outputs {
         self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &Raster::disparities(content.map), None))?;
         self.picture.as_deref().map_or(Ok(()), |path| writer.picture(path))?;
         if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
-            writer.map(path, &Raster { size: content.map.size(), values, quantity: Quantity::Confidence }, None)?;
+            writer.map(
+                path,
+                &Raster { values, quantity: Quantity::Confidence, ..Raster::disparities(content.map) },
+                None,
+            )?;
         }
         let Some(calibration) = making.calibration(content.map.size())? else { return Ok(()) };
         self.depth.as_deref().map_or(Ok(()), |path| writer.depth(path, &calibration))?;
@@ -174,6 +180,7 @@ impl Writer<'_> {
     fn map(&self, path: &Path, raster: &Raster<'_>, calibration: Option<&Calibration>) -> Result<(), Error> {
         // Removed first, so that an old sidecar never lies beside a new map, even if the program ends in between.
         remove_sidecar(path)?;
+        let raster = &Raster { nan: self.making.nan, ..*raster };
         if raster.range().is_none() {
             self.watch.warn(&format!("{}: no pixel is known", path.display()));
         }
@@ -206,7 +213,7 @@ impl Writer<'_> {
                 self.watch.warn(&format!("{}: {unknown} {what}", path.display()));
             }
         }
-        let raster = Raster { size: self.content.map.size(), values: &depths, quantity: Quantity::Depth };
+        let raster = Raster { values: &depths, quantity: Quantity::Depth, ..Raster::disparities(self.content.map) };
         self.map(path, &raster, Some(calibration))
     }
 }

@@ -154,7 +154,13 @@ impl OutputArgs {
         let read = args.calib.as_deref().map(Geometry::read).transpose()?;
         let bar = (!args.no_colour_bar).then_some(colour_bar::draw as bp_io::DrawBar);
         let picture = Picture { colours: args.colours.unwrap_or_default(), bar };
-        Ok(Making { picture, no_sidecar: args.no_sidecar, geometry: read.or(given), ..Making::default() })
+        Ok(Making {
+            picture,
+            no_sidecar: args.no_sidecar,
+            nan: args.unknown == Some(true),
+            geometry: read.or(given),
+            ..Making::default()
+        })
     }
 
     /// The calibration file.

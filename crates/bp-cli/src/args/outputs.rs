@@ -39,6 +39,9 @@ pub(crate) struct MakingArgs {
     /// Leave out the colour bar, which shows the disparity of each colour. The picture then has the map's size.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_colour_bar: bool,
+    /// What .tif and .npy hold for unknown pixels: plus infinity, or NaN as programs for photogrammetry expect. [default: inf]
+    #[arg(long, value_name = "inf|nan", value_parser = named(&[false, true], unknown), hide_short_help = true)]
+    pub(crate) unknown: Option<bool>,
     /// Do not write the sidecar MAP.json, which describes scale, unit, range, plan and inputs of a map or picture.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_sidecar: bool,
@@ -101,4 +104,9 @@ fn positive_double(text: &str) -> Result<f64, String> {
 fn point(text: &str) -> Result<[f64; 2], String> {
     let numbers = text.split_once(',').and_then(|(x, y)| Some([finite(x).ok()?, finite(y).ok()?]));
     numbers.ok_or_else(|| "must be two numbers with a comma between them".to_owned())
+}
+
+/// The name of what marks unknown pixels: whether it is NaN.
+fn unknown(nan: bool) -> &'static str {
+    if nan { "nan" } else { "inf" }
 }

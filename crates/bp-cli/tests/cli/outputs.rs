@@ -64,6 +64,25 @@ fn unknown_pixels_and_fractions_survive_every_format() {
 }
 
 #[test]
+fn floats_may_hold_nan_for_unknown_pixels() {
+    let folder = Folder::new();
+    write_map(&folder, "map.pfm", |x| 0.25 + x as f32 / 16.0);
+    for format in ["tif", "npy"] {
+        succeeds(&folder, &format!("convert map.pfm -o other.{format} --unknown nan"));
+        assert_eq!(sidecar(&folder, &format!("other.{format}"))["unknown"], "nan");
+        succeeds(&folder, &format!("convert other.{format} -o back.pfm"));
+        assert_eq!(fs::read(folder.path("back.pfm")).unwrap(), fs::read(folder.path("map.pfm")).unwrap(), "{format}");
+    }
+    let stored = fs::read(folder.path("other.npy")).unwrap();
+    let values = stored[stored.len() - 4 * (WIDTH * HEIGHT) as usize..].chunks_exact(4);
+    let values: Vec<f32> = values.map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
+    let count = |is_it: fn(f32) -> bool| values.iter().filter(|&&value| is_it(value)).count();
+    assert_eq!((count(f32::is_nan), count(f32::is_infinite)), (1, 0));
+    succeeds(&folder, "convert map.pfm -o other.pfm --unknown nan");
+    assert_eq!(fs::read(folder.path("other.pfm")).unwrap(), fs::read(folder.path("map.pfm")).unwrap(), "PFM has +inf");
+}
+
+#[test]
 fn negative_disparities_survive_where_the_format_holds_them() {
     let folder = Folder::new();
     write_map(&folder, "map.pfm", |x| x as f32 - 20.0);

@@ -176,6 +176,7 @@ struct OutputSettings<'a> {
     colours: Colours,
     colour_bar: bool,
     sidecar: bool,
+    nan: bool,
     geometry: Option<GeometrySettings>,
 }
 
@@ -211,6 +212,7 @@ pub(super) fn settings_sha256(options: &BatchOptions, making: &Making) -> Result
         colours: making.picture.colours,
         colour_bar: making.picture.bar.is_some(),
         sidecar: !making.no_sidecar,
+        nan: making.nan,
         geometry: making.geometry.as_ref().map(Into::into),
     };
     let text = serde_json::to_vec(&settings).map_err(|error| Error::System(format!("settings: {error}")))?;
