@@ -11,7 +11,7 @@
 //! let right = Image::from_grey(64, 48, &grey_right)?;
 //! let mut matcher = Matcher::new(&Options::default().with_labels(16).with_check(true))?;
 //! let disparity = matcher.compute(&left, &right)?;
-//! assert_eq!(disparity.map.at(40, 20), Some(3.0));
+//! assert!(disparity.map.at(40, 20).is_some_and(|pixels| (pixels - 3.0).abs() < 0.1));
 //! println!("{:?} on {}", disparity.times.total(), matcher.device().name);
 //! # Ok(())
 //! # }
