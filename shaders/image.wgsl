@@ -3,7 +3,7 @@
 // The red, green and blue bytes of all pixels, without gaps, including APRON rows above and below the image.
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 
-override APRON: u32 = 2;
+override APRON: u32 = 4;
 
 fn image_byte(index: u32) -> u32 {
     return (image[index / 4] >> (8 * (index % 4))) & 0xff;

@@ -47,6 +47,6 @@ wgsl! {
     MESSAGES = "messages.wgsl";
     /// The layout of label sets.
     SETS = "sets.wgsl";
-    /// Finds the edges whose smoothness cost is lower.
+    /// Finds the levels of edges.
     EDGE_LEVELS = "edge_levels.wgsl";
 }

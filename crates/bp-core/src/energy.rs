@@ -62,7 +62,7 @@ pub fn cheapest_labels(pair: &StereoPair, model: &Model) -> Result<Vec<u16>, Err
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{EdgeLevels, Image, Profile};
+    use crate::{Image, Profile};
 
     #[test]
     fn energy_counts_every_pixel_and_edge_once() {
@@ -74,9 +74,7 @@ mod tests {
         let energy = Energy::of(&pair, &model, &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy, Energy { data: 765 + 30 + 765, smoothness: 20 + 20 + 40 });
         // Horizontal neighbours differ by 10 grey values, vertical ones by 20.
-        let energy =
-            Energy::of(&pair, &model.with_edges(EdgeLevels::halved_above(10, model.smoothness())), &[1, 1, 0, 2])
-                .unwrap();
+        let energy = Energy::of(&pair, &model.with_edges_halved_above(10), &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy.smoothness, 10 + 10 + 40);
         assert!(Energy::of(&pair, &model, &[0; 3]).is_err());
     }

@@ -157,6 +157,13 @@ impl Model {
         Self { edges, ..self }
     }
 
+    /// The same model with two levels of edges: where grey values differ by more than `threshold`, slope and truncation are half
+    /// of those of the first level, rounded down.
+    #[must_use]
+    pub fn with_edges_halved_above(self, threshold: u8) -> Self {
+        self.with_edges(EdgeLevels::halved_above(threshold, self.smoothness()))
+    }
+
     /// The data cost profile.
     #[must_use]
     pub fn profile(&self) -> Profile {
@@ -193,13 +200,13 @@ impl Model {
         self.edges.usual()
     }
 
-    /// Its slope s.
+    /// Slope s of the first level.
     #[must_use]
     pub fn slope(&self) -> u8 {
         self.smoothness().slope
     }
 
-    /// Its truncation K.
+    /// Truncation K of the first level.
     #[must_use]
     pub fn truncation(&self) -> u8 {
         self.smoothness().truncation

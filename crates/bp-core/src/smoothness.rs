@@ -39,14 +39,12 @@ impl EdgeLevels {
     pub const COUNT: usize = 4;
 
     /// The same cost for all edges.
-    #[must_use]
-    pub const fn uniform(smoothness: Smoothness) -> Self {
+    pub(crate) const fn uniform(smoothness: Smoothness) -> Self {
         Self { most: [u8::MAX; Self::COUNT], smoothness: [smoothness; Self::COUNT] }
     }
 
     /// Two levels: above a difference of `threshold`, slope and truncation are halved, rounded down.
-    #[must_use]
-    pub const fn halved_above(threshold: u8, usual: Smoothness) -> Self {
+    pub(crate) const fn halved_above(threshold: u8, usual: Smoothness) -> Self {
         let weak = Smoothness { slope: usual.slope / 2, truncation: usual.truncation / 2 };
         Self { most: [threshold, u8::MAX, u8::MAX, u8::MAX], smoothness: [usual, weak, weak, weak] }
     }

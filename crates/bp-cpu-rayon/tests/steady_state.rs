@@ -2,7 +2,7 @@
 
 use std::alloc::System;
 
-use bp_core::{Algorithm, Backend, Driver, EdgeLevels, Model, Plan, Profile, Schedule, Settings};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings};
 use bp_cpu_rayon::Rayon;
 use bp_testkit::noise_pair;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -19,8 +19,7 @@ fn matching_allocates_nothing() {
     for profile in Profile::ALL {
         for (algorithm, schedule) in Algorithm::ALL.into_iter().flat_map(|a| Schedule::ALL.map(|s| (a, s))) {
             let model = Model::new(profile, 17).unwrap();
-            let levels = EdgeLevels::halved_above(10, model.smoothness());
-            let model = if profile == Profile::Mrf { model } else { model.with_edges(levels) };
+            let model = if profile == Profile::Mrf { model } else { model.with_edges_halved_above(10) };
             let settings = algorithm.settings(pairs[0].size(), 6, 2, schedule);
             let plan = Plan::new(pairs[0].size(), model, settings).unwrap();
             matchers.push(pool.install(|| Driver::new(device.as_ref(), plan)).unwrap());

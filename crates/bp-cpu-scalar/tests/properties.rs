@@ -4,8 +4,8 @@
 use std::ops::ControlFlow;
 
 use bp_core::{
-    Algorithm, BAND_ROWS, Backend, Cut, DataCost, Driver, EdgeLevels, Energy, Error, Image, MessageStart, Model, Plan,
-    Profile, Schedule, Seam, Settings, Size, StereoPair,
+    Algorithm, BAND_ROWS, Backend, Cut, DataCost, Driver, Energy, Error, Image, MessageStart, Model, Plan, Profile,
+    Schedule, Seam, Settings, Size, StereoPair,
 };
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{Answer, Case, Oracle, compare, noise_pair, solve};
@@ -34,7 +34,7 @@ fn any_model(labels: std::ops::Range<usize>) -> impl Strategy<Value = Model> {
     (profile, labels, any::<u8>(), 0..=63_u8, -3..4_i32, weak).prop_map(|(profile, labels, slope, k, min, weak)| {
         let model = Model::new(profile, labels).unwrap().with_min_disparity(min).unwrap();
         let model = model.with_smoothness(slope, k).unwrap();
-        weak.map_or(model, |threshold| model.with_edges(EdgeLevels::halved_above(threshold, model.smoothness())))
+        weak.map_or(model, |threshold| model.with_edges_halved_above(threshold))
     })
 }
 

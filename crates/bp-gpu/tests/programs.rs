@@ -3,13 +3,12 @@
 
 use std::collections::HashMap;
 
-use bp_core::{Algorithm, EdgeLevels, Error, Model, Plan, Profile, Schedule, Settings, Size};
+use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
 use bp_gpu::{Access, Command, Kernel, Limits, Parameters, Program};
 
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
     let model = Model::new(profile, 30).unwrap();
-    let levels = EdgeLevels::halved_above(10, model.smoothness());
-    let model = if profile == Profile::Census { model.with_edges(levels) } else { model };
+    let model = if profile == Profile::Census { model.with_edges_halved_above(10) } else { model };
     Plan::new(size, model, algorithm.settings(size, 20, 2, schedule)).unwrap()
 }
 

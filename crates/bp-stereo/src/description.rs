@@ -62,7 +62,7 @@ pub struct Settings {
 #[serde(deny_unknown_fields)]
 pub struct EdgeLevel {
     /// The greatest difference of the two nodes' grey values.
-    pub most: u8,
+    pub max_difference: u8,
     /// Slope of the smoothness cost.
     pub slope: u8,
     /// Truncation of the smoothness cost.
@@ -262,7 +262,11 @@ impl Settings {
 /// Describes the levels up to the one that holds every difference; nothing if all edges have the same cost.
 fn edge_levels(edges: &bp_core::EdgeLevels) -> Vec<EdgeLevel> {
     let levels = edges.most().into_iter().zip(edges.smoothness());
-    let levels = levels.map(|(most, bp_core::Smoothness { slope, truncation })| EdgeLevel { most, slope, truncation });
+    let levels = levels.map(|(max_difference, cost)| EdgeLevel {
+        max_difference,
+        slope: cost.slope,
+        truncation: cost.truncation,
+    });
     let last = edges.level(u8::MAX);
     if edges.is_uniform() { Vec::new() } else { levels.take(last + 1).collect() }
 }

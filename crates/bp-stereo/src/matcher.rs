@@ -87,10 +87,6 @@ impl Matcher {
         options.check()?;
         let pool = system::thread_pool(options.threads)?;
         let opened = pool.install(|| devices::open(&options.backend, options.device.as_deref()))?;
-        if let Some(threads) = options.threads.filter(|&threads| opened.info.workers != threads) {
-            let what = format!("`backend` {} has no threads; rayon has", opened.name);
-            return Err(Error::Options(format!("`threads` {threads}: {what}")));
-        }
         Ok(Self { options: options.clone(), pool, opened, beside: Beside::default(), prepared: None })
     }
 

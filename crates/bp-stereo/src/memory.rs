@@ -33,7 +33,8 @@ const DEPTH: u64 = 4;
 /// Bytes per pixel of the mirrored pair while the right image is matched. The right map that is kept later needs fewer.
 const RIGHT: u64 = 6;
 
-/// Temporary bytes per pixel for finishing a map: a map with a frame, and the next map. For the confidence: besides
+/// Temporary bytes per pixel for finishing a map: a map with a frame and the next map, or the next map and, for fractions, the
+/// rows of windows, which fit as long as images are not very wide and low. For the confidence: besides
 /// both maps, two maps with frames and the worth of each pixel.
 const FINISHING: u64 = 8;
 const CONFIDENCE: u64 = 20;

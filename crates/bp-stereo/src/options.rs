@@ -43,7 +43,8 @@ pub struct Options {
     pub check: bool,
     /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
-    /// Whether pixels that the check or the speckle filter made unknown are filled from their row.
+    /// Whether pixels that the check or the speckle filter made unknown are filled: at the
+    /// left border by the slope of the surface beside them, elsewhere from their row.
     pub fill: bool,
     /// Side of a median filter's window: 3, 5 or 7.
     pub median: Option<usize>,
@@ -55,7 +56,7 @@ pub struct Options {
     pub backend: String,
     /// Device of the backend: its index, a part of its name or the beginning of its UUID; `None` means the first.
     pub device: Option<String>,
-    /// Threads of the backend rayon; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor.
+    /// Threads of the backend rayon and, on every backend, of what follows matching; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor.
     pub threads: Option<usize>,
     /// Most bytes that the program may hold, including images and answer. Larger pairs are matched in tiles.
     /// `None` means the free memory.

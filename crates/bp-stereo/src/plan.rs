@@ -1,7 +1,7 @@
 //! Makes the plan of a pair from options.
 
 use bp_core::{
-    EdgeLevels, MAX_LABELS, Model, Plan, Size, Tiling,
+    MAX_LABELS, Model, Plan, Size, Tiling,
     survey::{DisparityRange, SeenDisparities, Survey},
 };
 
@@ -20,8 +20,7 @@ fn with_edges(options: &Options, model: Model) -> Result<Model, Error> {
         (None, None) => model,
         _ => model.with_smoothness(slope.unwrap_or(model.slope()), truncation.unwrap_or(model.truncation()))?,
     };
-    let halved = |threshold| EdgeLevels::halved_above(threshold, model.smoothness());
-    Ok(edge_threshold.map_or(model, |threshold| model.with_edges(halved(threshold))))
+    Ok(edge_threshold.map_or(model, |threshold| model.with_edges_halved_above(threshold)))
 }
 
 /// The labels that the options ask for. `hold` says whether the outputs can hold a first disparity. `None` if

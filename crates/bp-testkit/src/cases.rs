@@ -22,7 +22,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
     let wide_or_high = [(131, 35), (256, 3), (9, 99), (6, 70), (3, 65), (2, 130)];
     let large = wide_or_high.into_iter().flat_map(|size| {
         let plain = Profile::ALL.into_iter().filter_map(|profile| Model::new(profile, 5).ok());
-        let weak = Model::new(Profile::Census, 5).map(|model| weakened(model, 25));
+        let weak = Model::new(Profile::Census, 5).map(|model| model.with_edges_halved_above(25));
         plain.chain(weak).map(move |model| (size, model))
     });
     let whole = every.chain(large).flat_map(|((width, height), model)| {
@@ -48,7 +48,9 @@ fn label_sets() -> impl Iterator<Item = Case> {
 
 fn stepped_label_sets() -> impl Iterator<Item = Case> {
     let plain = |profile, labels| Model::new(profile, labels);
-    let weak = |profile, slope, truncation| Ok(weakened(plain(profile, 30)?.with_smoothness(slope, truncation)?, 30));
+    let weak = |profile, slope, truncation| {
+        Ok(plain(profile, 30)?.with_smoothness(slope, truncation)?.with_edges_halved_above(30))
+    };
     let steep =
         steep_levels().ok_or(Error::EdgeLevels).and_then(|edges| Ok(plain(Profile::Mrf, 30)?.with_edges(edges)));
     let models = [
@@ -78,7 +80,7 @@ fn strips() -> impl Iterator<Item = Case> {
     let strips = rows.map(|rows| pair.strip(rows)).into_iter();
     strips.flat_map(|strip| Profile::ALL.map(|profile| (strip.clone(), profile))).flat_map(|(strip, profile)| {
         let settings = Schedule::ALL.map(|schedule| Algorithm::Cfbp.settings(strip.size(), 7, 2, schedule));
-        let model = Model::new(profile, 6).map(|model| weakened(model, 20)).ok();
+        let model = Model::new(profile, 6).map(|model| model.with_edges_halved_above(20)).ok();
         settings.into_iter().filter_map(move |settings| case(&strip, model?, settings))
     })
 }
@@ -98,16 +100,12 @@ fn models(labels: usize) -> Vec<Model> {
     let weak = weak.into_iter().flat_map(move |(profile, slope, truncation, threshold)| {
         of(profile)
             .filter_map(move |model| model.with_smoothness(slope, truncation).ok())
-            .map(move |model| weakened(model, threshold))
+            .map(move |model| model.with_edges_halved_above(threshold))
     });
     let levels = [steep_levels(), flat_levels()].into_iter().flatten();
     let levels = levels.flat_map(move |edges| of(Profile::Mrf).map(move |model| model.with_edges(edges)));
     let negative = of(Profile::Census).filter_map(|model| model.with_min_disparity(-2).ok());
     plain.chain(strained).chain(weak).chain(levels).chain(negative).collect()
-}
-
-fn weakened(model: Model, threshold: u8) -> Model {
-    model.with_edges(EdgeLevels::halved_above(threshold, model.smoothness()))
 }
 
 /// Four levels, the first of which strains 8 bits most.

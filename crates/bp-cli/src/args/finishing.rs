@@ -20,13 +20,14 @@ pub(crate) struct FinishArgs {
     /// Drop surfaces with fewer than N pixels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) speckle: Option<u32>,
-    /// Whether to fill dropped pixels from their row, with the farther of the two nearest surfaces. [default: on]
+    /// Whether to fill dropped pixels from their row, with the farther of the two nearest surfaces, or at the left border
+    /// with the slope of the surface there. [default: on]
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) fill: Option<bool>,
     /// Apply a median filter of N x N pixels.
     #[arg(long, value_name = "N", value_parser = named(&MEDIANS, side))]
     pub(crate) median: Option<usize>,
-    /// Keep disparities in whole pixels. Otherwise they are refined to fractions of a pixel, by the images.
+    /// Keep whole pixels instead of refining disparities to fractions from the images.
     #[arg(long, hide_short_help = true)]
     pub(crate) whole_pixels: bool,
     /// Write a confidence from 0 to 1 for each pixel.

@@ -102,7 +102,7 @@ pub(crate) struct PlanArgs {
     /// Device of the backend: its index, a part of its name or the beginning of its UUID. [default: the first]
     #[arg(long, value_name = "DEVICE", value_parser = NonEmptyStringValueParser::new(), hide_short_help = true)]
     pub(crate) device: Option<String>,
-    /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one per core]
+    /// Threads of the backend rayon and, on every backend, of what follows matching. [default: RAYON_NUM_THREADS, else one per core]
     #[arg(long, value_name = "N", value_parser = threads(), hide_short_help = true)]
     pub(crate) threads: Option<u16>,
     /// Total loops (k), from which the algorithm derives those of each grid. [default: the number of labels; 1 for
@@ -143,7 +143,7 @@ pub(crate) struct PlanArgs {
     pub(crate) seed_start: Option<bool>,
     /// Slope of the smoothness cost, in units of the data cost. [default: the profile's]
     ///
-    /// With --slope or --truncation, all edges have the same smoothness cost.
+    /// With --slope or --truncation, all edges have the same smoothness cost, unless --edge-threshold is given too.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) slope: Option<u8>,
     /// Truncation K of the smoothness cost. [default: the profile's]

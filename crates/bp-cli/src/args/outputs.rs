@@ -39,7 +39,8 @@ pub(crate) struct MakingArgs {
     /// Leave out the colour bar, which shows the disparity of each colour. The picture then has the map's size.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_colour_bar: bool,
-    /// What .tif and .npy hold for unknown pixels: plus infinity, or NaN as programs for photogrammetry expect. [default: inf]
+    /// Value of unknown pixels in .tif and .npy: plus infinity, or NaN as programs for photogrammetry expect; .pfm and .png
+    /// have values of their own. [default: inf]
     #[arg(long, value_name = "inf|nan", value_parser = named(&[false, true], unknown), hide_short_help = true)]
     pub(crate) unknown: Option<bool>,
     /// Do not write the sidecar MAP.json, which describes scale, unit, range, plan and inputs of a map or picture.

@@ -145,7 +145,6 @@ fn contradictory_options_are_usage_errors_that_name_them() {
         ("--mask truth.png", ["--mask", "--ground-truth"]),
         ("--algorithm magic", ["--algorithm", "magic"]),
         ("--threads 0", ["--threads", "1024"]),
-        ("--backend scalar --threads 3", ["--threads 3", "rayon"]),
         ("--repeat 0", ["--repeat", "10000"]),
         ("--max-memory much", ["--max-memory", "much"]),
         ("--scale 0 --ground-truth truth.png", ["--scale", "above 0"]),

@@ -3,18 +3,18 @@
 use super::check::AGREE;
 use crate::{DisparityMap, Error, memory};
 
-/// How many rows above and below, and how many columns, tell the slope of a surface.
+/// How many rows above and below, and how many columns, a slope is estimated from.
 const ROWS: usize = 16;
 const COLUMNS: usize = 24;
 
-/// The fewest columns of a row that tell anything.
+/// The shortest run of columns that is used.
 const FEWEST: usize = 8;
 
 /// The steepest slope, in pixels of disparity a column.
 const STEEPEST: f64 = 0.5;
 
-/// How much of the slope is believed. Beyond the known pixels, surfaces tend to be flatter.
-const BELIEVED: f64 = 0.75;
+/// The share of the slope that is continued. Beyond the known pixels, surfaces tend to be flatter.
+const CONTINUED: f64 = 0.75;
 
 /// Fills unknown pixels at the left border by continuing the surface beside them, in whole pixels. Rows of which nothing is
 /// known stay as they are.
@@ -22,7 +22,8 @@ const BELIEVED: f64 = 0.75;
 /// The first known pixel of a row is its anchor. In the 16 rows above and below, and in its own, a run of up to 24 pixels begins
 /// in the anchor's column if the disparity there differs from the anchor's by at most 1 px; it ends before an unknown pixel or
 /// a step of more than 1 px. A line is fitted to all runs of at least 8 pixels, each about its own mean. Three quarters of its
-/// slope, at most half a pixel a column, lead from the anchor to the border. The range of disparities stays.
+/// slope, at most half a pixel a column, lead from the anchor towards the border, over as many columns as the anchor's
+/// disparity: so wide is the strip that the right camera does not see. The disparity then stays. So does the range of disparities.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
@@ -38,8 +39,9 @@ pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
         for (row, anchor) in values.chunks_exact_mut(width).zip(anchors) {
             let Some((x, slope)) = anchor else { continue };
             let (hole, known) = row.split_at_mut(x);
+            let hidden = f64::from(known[0]).max(0.0);
             for (away, value) in (1_u32..).zip(hole.iter_mut().rev()) {
-                let continued = f64::from(known[0]) - slope * f64::from(away);
+                let continued = f64::from(known[0]) - slope * f64::from(away).min(hidden);
                 *value = (continued.round() as f32).clamp(least, largest);
             }
         }
@@ -60,7 +62,7 @@ fn slope(map: &DisparityMap, x: usize, y: usize) -> f64 {
             (rise, spread) = (rise + own_rise, spread + own_spread);
         }
     }
-    if spread > 0.0 { (BELIEVED * rise / spread).clamp(-STEEPEST, STEEPEST) } else { 0.0 }
+    if spread > 0.0 { (CONTINUED * rise / spread).clamp(-STEEPEST, STEEPEST) } else { 0.0 }
 }
 
 /// The values before the first step of more than 1 px, or the first unknown value.
@@ -110,6 +112,14 @@ mod tests {
         let steep = (0..22).map(|x| if x < 2 { NONE } else { 30.0 + x as f32 });
         let both = filled(22, flat.chain(steep).collect());
         assert_eq!([both[0], both[22]], [9.0, 31.0]);
+    }
+
+    #[test]
+    fn beyond_the_hidden_strip_the_disparity_stays() {
+        let row: Vec<f32> =
+            (0..60).map(|x| if x < 30 { NONE } else { (2.0 + 0.4 * (x - 30) as f32).round() }).collect();
+        let rows = filled(60, row.into_iter().chain([0.0; 60]).collect());
+        assert_eq!((rows[30], rows[29], rows[28], rows[0]), (2.0, 2.0, 1.0, 1.0));
     }
 
     #[test]

@@ -111,6 +111,17 @@ mod tests {
     }
 
     #[test]
+    fn a_blank_area_keeps_its_disparity() {
+        let size = Size { width: 40, height: 20 };
+        let blank = || Image::from_grey(size.width, size.height, &vec![9; size.pixels()]).unwrap();
+        let mut values = vec![5.0; size.pixels()];
+        values[0] = 0.0;
+        let map = DisparityMap::new(size, values).unwrap();
+        let refined = subpixel(&StereoPair::new(blank(), blank()).unwrap(), map.clone(), &never).unwrap();
+        assert_eq!(refined, map);
+    }
+
+    #[test]
     fn edges_and_unknown_pixels_stay() {
         let values = vec![3.0, 3.0, DisparityMap::UNKNOWN, f32::MAX, f32::MIN];
         let map = DisparityMap::new(Size { width: 5, height: 1 }, values).unwrap();

@@ -164,12 +164,14 @@ pub(crate) fn sources(from: &[u16], to: &[u16], edges: &EdgeLevels) -> impl Iter
 
 #[cfg(test)]
 mod tests {
+    use bp_core::{Model, Profile};
+
     use super::*;
 
     #[test]
     fn sources_are_the_nearest_entries_on_both_sides() {
-        let edges = EdgeLevels::halved_above(7, Smoothness { slope: 2, truncation: 10 });
-        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20], &edges).collect();
+        let model = Model::new(Profile::Census, 30).unwrap().with_edges_halved_above(7);
+        let found: Vec<_> = sources(&[3, 5, 9], &[1, 3, 4, 9, 10, 20], model.edges()).collect();
         let costs = |distance: u8| [2 * distance, distance, distance, distance];
         let source = |entries, distances: [u8; 2]| Source { entries, costs: distances.map(costs) };
         let expected = [

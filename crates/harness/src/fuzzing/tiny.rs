@@ -2,8 +2,8 @@
 
 use arbitrary::Unstructured;
 use bp_core::{
-    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, EdgeLevels, Energy, Error, Image, MAX_GRIDS,
-    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
+    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS, MAX_TRUNCATION,
+    MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
     finish::{Finish, MEDIANS, confidence, never},
     survey::Survey,
 };
@@ -148,8 +148,7 @@ fn model(from: &mut Unstructured<'_>, size: Size) -> arbitrary::Result<Result<Mo
     let threshold: Option<u8> = from.arbitrary()?;
     let model = Model::new(profile, labels.min(VOLUME / size.pixels()).max(1));
     let model = model.and_then(|model| model.with_min_disparity(min_disparity)?.with_smoothness(slope, truncation));
-    let leveled = |model: Model, threshold| model.with_edges(EdgeLevels::halved_above(threshold, model.smoothness()));
-    Ok(model.map(|model| threshold.map_or(model, |threshold| leveled(model, threshold))))
+    Ok(model.map(|model| threshold.map_or(model, |threshold| model.with_edges_halved_above(threshold))))
 }
 
 fn settings(from: &mut Unstructured<'_>, size: Size) -> arbitrary::Result<Settings> {

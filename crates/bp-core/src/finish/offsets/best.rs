@@ -33,9 +33,10 @@ pub(super) fn write_best(
 #[inline(always)]
 fn best_step(variances: [f32; TRIED]) -> f32 {
     let [a, b, c, d, e] = variances;
-    let mut best = [a, b, c, -1.0];
-    if c < best[1] {
-        best = [b, c, d, 0.0];
+    // Where all offsets fit equally, as in a blank area, the disparity stays.
+    let mut best = [b, c, d, 0.0];
+    if b < best[1] {
+        best = [a, b, c, -1.0];
     }
     if d < best[1] {
         best = [c, d, e, 1.0];
