@@ -82,6 +82,7 @@ fn census_costs_are_as_accurate_as_the_prototypes() {
             "5",
             "--loops",
             "2",
+            "--whole-pixels",
             "--ground-truth",
             &truth,
             "--ground-truth-right",
