@@ -38,13 +38,13 @@ pub fn code(image: &Image, x: usize, y: usize) -> u8 {
 }
 
 /// The columns and rows of the neighbours that a code compares, relative to the pixel, from the highest bit to the lowest.
-pub(crate) type Neighbours = [(isize, isize); 8];
+pub type Neighbours = [(isize, isize); 8];
 
 /// The neighbours of [`code`].
-pub(crate) const INNER: Neighbours = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+pub const INNER: Neighbours = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
 
 /// The neighbours of [`outer_code`].
-pub(crate) const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0), (0, 2), (0, 4)];
+pub const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0), (0, 2), (0, 4)];
 
 /// The furthest column or row that a code compares.
 const REACH: usize = 4;

@@ -2,6 +2,7 @@
 
 use bp_core::{
     Error, Image, Model, Node, Profile, Size, StereoPair,
+    census::{INNER, Neighbours, OUTER},
     image::{APRON, grey},
     memory,
 };
@@ -130,15 +131,6 @@ fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row:
     after.fill(own[width - 1]);
 }
 
-/// The columns and rows of eight neighbours, relative to the pixel.
-type Neighbours = [(isize, isize); 8];
-
-/// The neighbours that a census code compares, in order.
-const CENSUS: Neighbours = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-
-/// The neighbours that the outer code compares.
-const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0), (0, 2), (0, 4)];
-
 /// Rows of features to be written.
 struct Rows<'a> {
     values: &'a mut [u8],
@@ -181,16 +173,16 @@ impl View<'_> {
                         every_second(even, pixels, |pixel| pixel[channel]);
                         every_second(odd, &pixels[1..], |pixel| pixel[channel]);
                     }
-                    Profile::Census => deal(even, odd, |x, out| self.census(&CENSUS, 0, Node { x, y }, out)),
+                    Profile::Census => deal(even, odd, |x, out| self.census(&INNER, 0, Node { x, y }, out)),
                     Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, Node { x, y }, out)),
                     Profile::BirchfieldTomasi => {
                         deal(even, odd, |x, out| self.half_samples(channel, Node { x, y }, out))
                     }
                     Profile::Census16 => {
-                        deal(even, odd, |x, out| self.census([&CENSUS, &OUTER][channel], 0, Node { x, y }, out))
+                        deal(even, odd, |x, out| self.census([&INNER, &OUTER][channel], 0, Node { x, y }, out))
                     }
                     Profile::Census32 => deal(even, odd, |x, out| {
-                        self.census([&CENSUS, &CENSUS, &CENSUS, &OUTER][channel], channel, Node { x, y }, out)
+                        self.census([&INNER, &INNER, &INNER, &OUTER][channel], channel, Node { x, y }, out)
                     }),
                 },
             );

@@ -14,7 +14,7 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct Greys {
     shape: Shape,
-    most: [u8; EdgeLevels::COUNT],
+    edges: EdgeLevels,
     values: Vec<u8>,
 }
 
@@ -22,7 +22,7 @@ impl Greys {
     /// Allocates room for the grey values of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let values = memory::filled("grey values", bytes(plan, grid) as usize, 0)?;
-        Ok(Self { shape: Shape::new(plan, grid), most: plan.model().edges().most(), values })
+        Ok(Self { shape: Shape::new(plan, grid), edges: *plan.model().edges(), values })
     }
 
     /// Loads the grey values of an image.
@@ -66,7 +66,7 @@ impl Greys {
         // An even column has its left neighbour in the pair before it, an odd one its right neighbour in the pair after it.
         let next = if plane == 0 { &beside[BLOCK - 1..] } else { &beside[BLOCK + 1..] };
         let neighbours = [same, next, self.lanes(plane, above), self.lanes(plane, below)];
-        Some(Around { most: self.most, own: self.lanes(plane, y), neighbours })
+        Some(Around { edges: &self.edges, own: self.lanes(plane, y), neighbours })
     }
 
     /// The values of `plane` in row `y` from lane 0 on.
@@ -117,8 +117,7 @@ fn deal<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
 /// The grey values of the nodes of a plane in a row, and those of their neighbours by slot, each `[lane]`.
 #[derive(Clone, Copy)]
 pub(crate) struct Around<'a> {
-    /// The greatest difference of each level.
-    most: [u8; EdgeLevels::COUNT],
+    edges: &'a EdgeLevels,
     own: &'a [u8],
     neighbours: [&'a [u8]; 4],
 }
@@ -132,8 +131,7 @@ impl Around<'_> {
 
     /// The level of the edge of this slot.
     pub(crate) fn level(&self, slot: usize, lane: usize) -> usize {
-        let difference = self.own[lane].abs_diff(self.neighbours[slot][lane]);
-        self.most.iter().filter(|&&most| difference > most).count()
+        self.edges.level(self.own[lane].abs_diff(self.neighbours[slot][lane]))
     }
 
     /// The levels of the edges of this slot, for the nodes of a vector from `lane` on.
@@ -144,7 +142,7 @@ impl Around<'_> {
         let difference = own.saturating_sub(other) | other.saturating_sub(own);
         let [one, none] = [1, 0].map(|count| V::splat(simd, count));
         // No difference exceeds that of the last level.
-        let [first, second, third, _] = self.most;
+        let [first, second, third, _] = self.edges.most();
         let mut level = none;
         for most in [first, second, third] {
             level += difference.simd_gt(V::splat(simd, most)).select(one, none);

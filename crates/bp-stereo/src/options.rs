@@ -43,8 +43,8 @@ pub struct Options {
     pub check: bool,
     /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
-    /// Whether pixels that the check or the speckle filter made unknown are filled: at the
-    /// left border by the slope of the surface beside them, elsewhere from their row.
+    /// Whether pixels that the check or the speckle filter made unknown are filled from their row. At the left border, the
+    /// next surface is extended with its slope.
     pub fill: bool,
     /// Side of a median filter's window: 3, 5 or 7.
     pub median: Option<usize>,

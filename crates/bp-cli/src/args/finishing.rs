@@ -20,8 +20,10 @@ pub(crate) struct FinishArgs {
     /// Drop surfaces with fewer than N pixels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) speckle: Option<u32>,
-    /// Whether to fill dropped pixels from their row, with the farther of the two nearest surfaces, or at the left border
-    /// with the slope of the surface there. [default: on]
+    /// Whether to fill dropped pixels. [default: on]
+    ///
+    /// They are filled from their row, with the farther of the two nearest surfaces. At the left border, the next surface
+    /// is extended with its slope.
     #[arg(long, value_parser = named(&[true, false], switch), hide_short_help = true)]
     pub(crate) fill: Option<bool>,
     /// Apply a median filter of N x N pixels.

@@ -16,8 +16,8 @@ const STEEPEST: f64 = 0.5;
 /// The share of the slope that is continued. Beyond the known pixels, surfaces tend to be flatter.
 const CONTINUED: f64 = 0.75;
 
-/// Fills unknown pixels at the left border by continuing the surface beside them, in whole pixels. Rows of which nothing is
-/// known stay as they are.
+/// Fills unknown pixels at the left border. In each row, the surface that begins right of them is extended to the left with its
+/// slope, in whole pixels. A row without any known pixel stays unknown.
 ///
 /// The first known pixel of a row is its anchor. In the 16 rows above and below, and in its own, a run of up to 24 pixels begins
 /// in the anchor's column if the disparity there differs from the anchor's by at most 1 px; it ends before an unknown pixel or
