@@ -73,6 +73,12 @@ impl Image {
         self.size
     }
 
+    /// Whether all pixels are grey.
+    #[must_use]
+    pub fn is_grey(&self) -> bool {
+        self.pixels().iter().all(|&[red, green, blue]| red == green && green == blue)
+    }
+
     /// All colours, `[height][width]`, without those of an apron.
     #[must_use]
     pub fn pixels(&self) -> &[[u8; 3]] {

@@ -27,6 +27,7 @@
 //! all backends. [`exactness`] explains why 8 bits suffice for that, and [`worked_example`] works through a pair of 3x2
 //! pixels by hand.
 
+mod alignment;
 mod backend;
 pub mod census;
 mod cost;
@@ -56,6 +57,7 @@ pub mod survey;
 mod tiles;
 pub mod worked_example;
 
+pub use alignment::Alignment;
 pub use backend::{Backend, Device, DeviceInfo, DeviceKind, Solver};
 pub use census::Seed;
 pub use cost::DataCost;

@@ -9,11 +9,13 @@
 //! The survey is plain integer arithmetic on one thread, so it gives the same result on every machine and backend.
 
 mod coarse;
+pub(crate) mod points;
 mod range;
 mod rows;
 mod shrink;
 
 use coarse::Matches;
+use points::Point;
 
 use crate::{Error, StereoPair};
 
@@ -52,6 +54,8 @@ pub struct Survey {
     pub identical: bool,
     /// Whether hardly any pixel has a match, although the images are large enough: they do not show the same scene.
     pub unlike: bool,
+    /// Points that were matched at full resolution.
+    pub(crate) points: Vec<Point>,
 }
 
 impl Survey {
@@ -67,12 +71,17 @@ impl Survey {
         let (count, matched) = best.map_or((0, 0.0), |best| (best.count(), best.share()));
         let best = best.filter(|_| count >= LEAST_MATCHES && matched >= LEAST_SHARE);
         let negative = best.map_or(0, |best| best.found().filter(|&(_, _, disparity)| disparity < 0).count());
+        // A shrunk image is still matched if its rows are apart by one pixel, and half a pixel more at its borders.
+        let most_down = looks.iter().map(|look| look.rows_down.unsigned_abs()).max().unwrap_or(0);
+        let reach = factor * (most_down + 1) + factor.div_ceil(2);
+        let points = best.map_or_else(Vec::new, |_| points::find(pair, small.left(), &looks, factor, reach));
         Ok(Self {
             identical: pair.left() == pair.right(),
             matched,
-            seen: best.and_then(|best| SeenDisparities::of(best, factor)),
+            seen: best.and_then(|best| SeenDisparities::of(pair, best, factor)),
             exchanged: best.is_some() && negative as f64 >= NEARLY_ALL * count as f64,
-            rows: best.and_then(|_| rows::offsets(pair, &looks, factor)),
+            rows: rows::offsets(pair.size(), &points, reach),
+            points,
             unlike: best.is_none() && small.size().pixels() as f64 * LEAST_SHARE >= LEAST_MATCHES as f64,
         })
     }

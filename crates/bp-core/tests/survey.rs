@@ -56,9 +56,11 @@ fn a_shifted_plane_gives_its_shift_and_nothing_else() {
         let pair = plane(120, 50, shift, 0);
         let (survey, back) = (look(&pair), look(&exchanged(&pair)));
         let shift = shift as i32;
-        assert_eq!(survey.seen, Some(SeenDisparities { least: shift, largest: shift, step: 1 }));
-        assert_eq!(back.seen, Some(SeenDisparities { least: -shift, largest: -shift, step: 1 }));
-        assert_eq!(survey.seen.unwrap().range(), DisparityRange { min_disparity: shift - 2, labels: 16 });
+        assert_eq!(survey.seen, Some(SeenDisparities { least: shift, largest: shift, margin: 2 }));
+        assert_eq!(back.seen, Some(SeenDisparities { least: -shift, largest: -shift, margin: 2 }));
+        let min_disparity = (shift - 2).max(0);
+        let labels = ((shift + 2 - min_disparity + 1) as usize).next_multiple_of(4);
+        assert_eq!(survey.seen.unwrap().range(), DisparityRange { min_disparity, labels });
         assert_eq!([survey.exchanged, back.exchanged], [false, shift > 0]);
         assert_eq!([survey.unlike, back.unlike], [false; 2]);
         assert_eq!([survey.rows, back.rows], [None; 2]);
@@ -101,9 +103,9 @@ fn labels_that_leave_out_what_was_seen_are_told_at_their_end() {
     let range = seen.range();
     assert_eq!(beyond(range.min_disparity, range.labels), [false, false]);
     let from_zero = range.starting_at(0);
-    assert_eq!((from_zero.min_disparity, from_zero.max_disparity() / 16), (0, range.max_disparity() / 16));
+    assert!(from_zero.min_disparity == 0 && (0..4).contains(&(from_zero.max_disparity() - range.max_disparity())));
     assert_eq!(range.starting_at(i32::MIN).labels, MAX_LABELS);
-    assert_eq!(range.starting_at(i32::MAX).labels, 16);
+    assert_eq!(range.starting_at(i32::MAX).labels, 4);
     assert_eq!(beyond(0, 64), [false, false]);
     assert_eq!(beyond(0, 40), [false, true]);
     assert_eq!(beyond(20, 60), [true, false]);

@@ -17,6 +17,7 @@
 //! # }
 //! ```
 
+mod alignment;
 mod calibration;
 mod caught;
 mod colours;
@@ -34,6 +35,7 @@ mod sidecar;
 mod tiff;
 mod write;
 
+pub use alignment::read_alignment;
 pub use calibration::{CalibrationFile, Geometry};
 pub use caught::is_caught;
 pub use colours::Colours;

@@ -20,7 +20,12 @@ use serde::{Deserialize, Serialize};
 pub use shard::Shard;
 pub use summary::{Failed, Summary};
 
-use crate::{Cause, Error, Labels, Making, Options, Watch, pairs::Source};
+use bp_io::Files;
+
+use crate::{
+    Align, Cause, Error, Labels, Making, Options, Watch, align_camera,
+    pairs::{Pair, Source},
+};
 
 /// The pairs of a batch, how they are matched, and what is written.
 #[derive(Clone, Debug)]
@@ -29,6 +34,8 @@ pub struct BatchOptions {
     pub source: Source,
     /// The folder of the outputs.
     pub output: PathBuf,
+    /// The file of the camera's alignment. If it is missing, it is measured and written. All pairs use it.
+    pub alignment: Option<PathBuf>,
     /// How each pair is matched.
     pub matching: Options,
     /// Extension of the maps, which selects their format.
@@ -98,6 +105,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let making = &Making { files: bp_io::Files::of(&shard.file_part()), ..making.clone() };
     let _lock = shard.lock(&options.output.join(job::RECORDS))?;
     job::clear_leftovers(options, &jobs, &making.files)?;
+    let options = &with_alignment(options, &found.pairs, &making.files, watch)?;
     let settings_sha256 = record::settings_sha256(options, making)?;
     let is_complete = |chain: &&[Job]| !options.force && job::are_complete(chain, &settings_sha256);
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
@@ -108,6 +116,28 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
     summary.write(&making.files, &shard.summary_path(&options.output))?;
     Ok(summary)
+}
+
+/// The options with the alignment of the camera, if all pairs come from one.
+fn with_alignment(
+    options: &BatchOptions,
+    pairs: &[Pair],
+    files: &Files,
+    watch: &Watch<'_>,
+) -> Result<BatchOptions, Error> {
+    let is_one_camera = options.alignment.is_some() || matches!(options.source, Source::Video(_));
+    if options.matching.align != Align::Auto || !is_one_camera {
+        return Ok(options.clone());
+    }
+    let file = options.alignment.as_deref().map(|path| (files, path));
+    let align = align_camera(pairs.iter().map(|pair| run::read(options, pair)), file, watch)?;
+    if let Align::Known(known) = align
+        && !known.is_negligible()
+    {
+        let [least, largest] = known.range();
+        watch.note(&format!("rows differ by {least:.2} to {largest:.2} px; corrected in all pairs"));
+    }
+    Ok(BatchOptions { matching: Options { align, ..options.matching.clone() }, ..options.clone() })
 }
 
 /// Matches the jobs that are due, and returns those that failed.
@@ -146,15 +176,15 @@ fn check_warm_start(options: &BatchOptions) -> Result<(), Error> {
         let what = "pairs of different scenes have nothing in common";
         return Err(Error::Options(format!("`warm_start` needs `video`: {what}")));
     }
-    if matching.labels == Labels::Auto {
-        let what = "the same labels for all frames: give `labels` a number";
-        return Err(Error::Options(format!("`warm_start` needs {what}")));
-    }
     if matching.algorithm.is_swept() || matching.needs_right() {
         let what = "`warm_start` needs the messages of the frame before";
         let why = "the schedule sweep does not keep them, and matching both views overwrites them";
         let advice = "use the `algorithm` cfbp with 10 `half_steps`, say, and neither `check` nor confidence";
         return Err(Error::Options(format!("{what}: {why}; {advice}")));
+    }
+    if matching.labels == Labels::Auto {
+        let what = "the same labels for all frames: give `labels` a number";
+        return Err(Error::Options(format!("`warm_start` needs {what}")));
     }
     Ok(())
 }

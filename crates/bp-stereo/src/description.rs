@@ -47,6 +47,9 @@ pub struct Settings {
     pub label_sets: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
+    /// How the rows of the images differed, if that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<Rows>,
     /// The operations on the map after matching, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finish: Option<Finish>,
@@ -67,6 +70,25 @@ pub struct EdgeLevel {
     pub slope: u8,
     /// Truncation of the smoothness cost.
     pub truncation: u8,
+}
+
+/// How the rows of two images differed; see [`bp_core::Alignment`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Rows {
+    /// The least and the largest difference in pixels: how much lower points lie in the right image.
+    pub range: [f64; 2],
+    /// Whether the right image was resampled so that rows agree. Not needed for very small differences.
+    pub corrected: bool,
+    /// The coefficients of the quadratic, in pixels.
+    pub coefficients: [f64; 6],
+}
+
+impl From<&bp_core::Alignment> for Rows {
+    fn from(alignment: &bp_core::Alignment) -> Self {
+        Self { range: alignment.range(), corrected: !alignment.is_negligible(), coefficients: alignment.coefficients() }
+    }
 }
 
 /// The operations on a map after matching, in this order.
@@ -252,6 +274,7 @@ impl Settings {
             coarse_clip: settings.coarse_clip,
             label_sets: settings.label_sets,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            rows: None,
             finish: None,
             message_updates: plan.message_updates(),
             planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),

@@ -12,6 +12,8 @@ use crate::{Error, Options};
 /// Wall-clock times of one answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnswerTimes {
+    /// Surveying the pair, aligning its rows and making its plan.
+    pub planning: Duration,
     /// Matching the left image, and the right one if needed.
     pub matching: Times,
     /// Everything else: mirroring the pair for the right image, and finishing the map.
@@ -22,7 +24,7 @@ impl AnswerTimes {
     /// Time from images in memory to the finished map.
     #[must_use]
     pub fn total(&self) -> Duration {
-        self.matching.total + self.finishing
+        self.planning + self.matching.total + self.finishing
     }
 }
 
@@ -61,5 +63,9 @@ pub(crate) fn finished(
         *trust = 0.0;
     }
     let map = Finish { check: false, speckles: None, ..finish }.apply(pair, judged, None, is_stopped)?;
-    Ok(Finished { map, confidence, times: AnswerTimes { matching, finishing: start.elapsed() - matching.total } })
+    Ok(Finished {
+        map,
+        confidence,
+        times: AnswerTimes { planning: Duration::ZERO, matching, finishing: start.elapsed() - matching.total },
+    })
 }

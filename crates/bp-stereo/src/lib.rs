@@ -25,6 +25,7 @@
 //! This crate prints nothing, has no global state and does not change the panic hook.
 
 mod algorithm;
+mod alignment;
 pub mod batch;
 pub mod description;
 pub mod devices;
@@ -42,13 +43,14 @@ mod warning;
 mod watch;
 
 pub use algorithm::{Algorithm, Hierarchy, Loops};
-pub use bp_core::{DisparityMap, Energy, Image, Profile, Schedule, Size, StereoPair};
+pub use alignment::align_camera;
+pub use bp_core::{Alignment, DisparityMap, Energy, Image, Profile, Schedule, Size, StereoPair};
 pub use bp_io as io;
 pub use error::{Cause, Error};
 pub use finishing::AnswerTimes;
 pub use matcher::{Disparity, Matcher, Planned, Start};
 pub use memory::Beside;
-pub use options::{Labels, Options};
+pub use options::{Align, Labels, Options, Quality};
 pub use outputs::{Content, Making, Outputs};
 pub use system::{Memory, thread_pool};
 pub use tiles::Tiles;

@@ -1,9 +1,13 @@
 //! The matcher. It opens a device once, and prepares it again only if a pair needs a different plan.
 
-use std::fmt;
+use std::{
+    borrow::Cow,
+    fmt,
+    time::{Duration, Instant},
+};
 
 use bp_core::{
-    DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, Times, survey::Survey,
+    Alignment, DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, Times, survey::Survey,
 };
 use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
@@ -29,6 +33,8 @@ pub struct Matcher {
 /// A tiled plan, prepared on the device.
 struct Prepared {
     tiled: Tiled,
+    /// Whether there is room for an aligned image.
+    is_aligned: bool,
     /// Predicted peak memory of the program, in bytes.
     peak_bytes: u64,
 }
@@ -38,8 +44,12 @@ struct Prepared {
 pub struct Planned {
     /// The plan.
     pub plan: Plan,
+    /// How the rows of the images differ; `None` if that was not asked for, or if too few points agree.
+    pub alignment: Option<Alignment>,
     /// Possible problems with the pair or its labels.
     pub warnings: Vec<Warning>,
+    /// Time that planning took.
+    pub time: Duration,
 }
 
 /// The messages that a pair starts from.
@@ -124,28 +134,22 @@ impl Matcher {
         self.run(&pair, planned, Start::Cold, &Watch::default())
     }
 
-    /// Plans a pair. A quick survey of it finds possible problems, and the labels if they are [`crate::Labels::Auto`].
+    /// Plans a pair. A quick survey of it finds possible problems, how rows differ, and the labels if they are
+    /// [`crate::Labels::Auto`].
     ///
     /// # Errors
     /// [`Error::Core`] if the options ask for an impossible model or plan.
     pub fn plan(&self, pair: &StereoPair) -> Result<Planned, Error> {
-        self.plan_within(pair, &Survey::of(pair)?, &|_| true)
-    }
-
-    /// Plans a pair that was already surveyed. `hold` says whether the outputs can hold a first disparity.
-    ///
-    /// # Errors
-    /// Those of [`Matcher::plan`].
-    pub fn plan_within(
-        &self,
-        pair: &StereoPair,
-        survey: &Survey,
-        hold: &dyn Fn(i32) -> bool,
-    ) -> Result<Planned, Error> {
-        let (options, size) = (&self.options, pair.size());
-        let found = labels(options, size, survey, hold);
-        let plan = plan::plan(options, size, found.unwrap_or_else(|| quarter_of_width(options, size)))?;
-        Ok(Planned { warnings: warning::of(options, survey, &plan, found.is_some()), plan })
+        let (options, size, start) = (&self.options, pair.size(), Instant::now());
+        let (survey, alignment) = self.pool.install(|| {
+            let survey = Survey::of(pair)?;
+            let alignment = plan::alignment(options, pair, &survey)?;
+            Ok::<_, Error>((survey, alignment))
+        })?;
+        let found = labels(options, size, &survey);
+        let plan = plan::plan(options, pair, found.unwrap_or_else(|| quarter_of_width(options, size)))?;
+        let warnings = warning::of(options, &survey, alignment.as_ref(), &plan, found.is_some());
+        Ok(Planned { plan, alignment, warnings, time: start.elapsed() })
     }
 
     /// Matches a pair as planned. Progress goes to `watch`, in message entries.
@@ -160,13 +164,21 @@ impl Matcher {
         watch: &Watch<'_>,
     ) -> Result<Disparity, Error> {
         let Self { options, pool, opened, beside, prepared } = self;
-        let Planned { plan, warnings } = planned;
+        let Planned { plan, alignment, warnings, time } = planned;
         // A different plan is freed before the new one is prepared.
-        let before = prepared.take().filter(|prepared| *prepared.tiled.plan() == plan);
+        let applied = alignment.filter(|alignment| !alignment.is_negligible());
+        let is_aligned = applied.is_some();
+        let fits = |prepared: &Prepared| *prepared.tiled.plan() == plan && prepared.is_aligned == is_aligned;
+        let before = prepared.take().filter(fits);
         let (ready, finished, energy) = pool.install(|| {
-            let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, opened, watch), Ok)?;
-            let finished = ready.solve(options, opened, pair, start, watch)?;
-            let energy = Energy::of(pair, ready.tiled.plan().model(), ready.tiled.labels())?;
+            let mut ready =
+                before.map_or_else(|| Prepared::new(options, *beside, &plan, is_aligned, opened, watch), Ok)?;
+            let begun = Instant::now();
+            let pair = aligned(pair, applied.as_ref())?;
+            let planning = time + begun.elapsed();
+            let mut finished = ready.solve(options, opened, &pair, start, watch)?;
+            finished.times.planning = planning;
+            let energy = Energy::of(&pair, ready.tiled.plan().model(), ready.tiled.labels())?;
             Ok::<_, Error>((ready, finished, energy))
         })?;
         watch.check()?;
@@ -175,7 +187,7 @@ impl Matcher {
             confidence: finished.confidence,
             times: finished.times,
             energy,
-            settings: plan::described(options, ready.tiled.tiling(), opened)?,
+            settings: plan::described(options, ready.tiled.tiling(), alignment.as_ref(), opened)?,
             tiles: Tiles::of(ready.tiled.tiling()),
             message_updates: ready.tiled.message_updates(),
             allocated_bytes: ready.tiled.allocated_bytes(),
@@ -202,6 +214,14 @@ impl Matcher {
     }
 }
 
+/// The pair with aligned rows, if there is an alignment.
+fn aligned<'a>(pair: &'a StereoPair, alignment: Option<&Alignment>) -> Result<Cow<'a, StereoPair>, Error> {
+    match alignment {
+        Some(alignment) => Ok(Cow::Owned(alignment.aligned(pair)?)),
+        None => Ok(Cow::Borrowed(pair)),
+    }
+}
+
 impl fmt::Debug for Matcher {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { options, opened, .. } = self;
@@ -210,9 +230,16 @@ impl fmt::Debug for Matcher {
 }
 
 impl Prepared {
-    fn new(options: &Options, beside: Beside, plan: &Plan, opened: &Opened, watch: &Watch<'_>) -> Result<Self, Error> {
-        let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, opened, watch)?;
-        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, peak_bytes })
+    fn new(
+        options: &Options,
+        beside: Beside,
+        plan: &Plan,
+        is_aligned: bool,
+        opened: &Opened,
+        watch: &Watch<'_>,
+    ) -> Result<Self, Error> {
+        let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, is_aligned, opened, watch)?;
+        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, is_aligned, peak_bytes })
     }
 
     fn solve(

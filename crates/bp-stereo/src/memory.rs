@@ -10,6 +10,9 @@ const PROGRAM: u64 = 20 << 20;
 /// Bytes per pixel of both images.
 const PAIR: u64 = 6;
 
+/// Bytes per pixel of the aligned right image.
+const ALIGNED: u64 = 3;
+
 /// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
 
@@ -64,15 +67,16 @@ pub(crate) struct Fitted {
 }
 
 /// Tiles `plan` to stay within the options' limit and the available memory. Reports to `watch` if the image is not
-/// matched as a whole. The plan itself does not change, because tiles cost less accuracy than a smaller plan.
+/// matched as a whole. `is_aligned` says whether there is an aligned image too. The plan itself does not change, because tiles cost less accuracy than a smaller plan.
 pub(crate) fn fitted(
     options: &Options,
     beside: Beside,
     plan: &Plan,
+    is_aligned: bool,
     opened: &Opened,
     watch: &Watch<'_>,
 ) -> Result<Fitted, Error> {
-    let bytes = Bytes::beside(options, beside, plan.image_size());
+    let bytes = Bytes::beside(options, beside, is_aligned, plan.image_size());
     let limit = Limit::of(options, opened, bytes.held);
     let needed = |tile: &Plan| {
         opened.device.check(tile)?;
@@ -124,17 +128,18 @@ struct Bytes {
 }
 
 impl Bytes {
-    fn beside(options: &Options, beside: Beside, size: Size) -> Self {
+    fn beside(options: &Options, beside: Beside, is_aligned: bool, size: Size) -> Self {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let if_so = |is_so: bool, bytes: u64| if is_so { bytes } else { 0 };
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
+        let aligned = if_so(is_aligned, ALIGNED);
         let (right, trust) = (if_so(options.needs_right(), RIGHT), if_so(options.confidence, TRUST));
         let finishing = if options.confidence { CONFIDENCE } else { FINISHING };
         let finishing = finishing.max(if_so(options.speckle.is_some(), SPECKLE));
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + a_pixel(PAIR + truth),
+            held: PROGRAM + a_pixel(PAIR + aligned + truth),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),
         }

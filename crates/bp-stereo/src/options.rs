@@ -1,7 +1,7 @@
 //! The options of a match.
 
 use bp_core::{
-    Profile,
+    Alignment, Profile, StereoPair,
     finish::{Finish, MEDIANS},
 };
 use serde::{Deserialize, Serialize};
@@ -24,8 +24,10 @@ use crate::{Algorithm, Error, devices};
 pub struct Options {
     /// The algorithm.
     pub algorithm: Algorithm,
-    /// The data cost and its default smoothness.
-    pub profile: Profile,
+    /// What the options that are `None` stand for.
+    pub quality: Quality,
+    /// The data cost and its default smoothness; `None` means [`Profile::Census16`], or that of [`Options::quality`].
+    pub profile: Option<Profile>,
     /// Slope of the smoothness cost in units of the data cost; `None` means the profile's. If this or the truncation is given,
     /// all edges have the same cost, unless there is an edge threshold too.
     pub slope: Option<u8>,
@@ -34,22 +36,25 @@ pub struct Options {
     /// Halves slope and truncation where neighbouring grey values of the left image differ by more than this; 255 gives all
     /// edges the same cost. `None` means the profile's levels; see [`bp_core::EdgeLevels`].
     pub edge_threshold: Option<u8>,
+    /// Whether the rows of the right image are aligned with those of the left one first.
+    pub align: Align,
     /// The labels.
     pub labels: Labels,
-    /// Disparity of the first label in pixels; may be negative. `None` means 0, or with [`Labels::Auto`] what the
-    /// images need.
+    /// Disparity of the first label in pixels; may be negative. `None` means what the images need with [`Labels::Auto`], else 0.
     pub min_disparity: Option<i32>,
-    /// Whether the right image is matched too, and pixels on which the two maps disagree become unknown.
-    pub check: bool,
+    /// Whether the right image is matched too, and pixels on which the two maps disagree become unknown. `None` means no, or as
+    /// [`Options::quality`] says.
+    pub check: Option<bool>,
     /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
     /// Whether pixels that the check or the speckle filter made unknown are filled from their row. At the left border, the
     /// next surface is extended with its slope.
     pub fill: bool,
-    /// Side of a median filter's window: 3, 5 or 7.
+    /// Side of a median filter's window: 3, 5 or 7. `None` means no filter, or that of [`Options::quality`].
     pub median: Option<usize>,
-    /// Whether disparities are refined to fractions of a pixel, by the images; otherwise they are whole.
-    pub subpixel: bool,
+    /// Whether disparities are refined to fractions of a pixel, by the images; otherwise they are whole. `None` means yes, or as
+    /// [`Options::quality`] says.
+    pub subpixel: Option<bool>,
     /// Whether each pixel gets a confidence from 0 to 1; matches the right image too.
     pub confidence: bool,
     /// Backend: "rayon", "scalar", "vulkan" or "wgpu", or "NAME:DEVICE".
@@ -67,30 +72,75 @@ pub struct Options {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Labels {
-    /// A quarter of the width, rounded up to a multiple of 16, as OpenCV recommends for belief propagation.
+    /// Those that a coarse survey of the images finds. If too little matches, [`Labels::QuarterOfWidth`].
     #[default]
-    QuarterOfWidth,
-    /// The labels that a coarse survey of the images finds.
     Auto,
+    /// A quarter of the width, rounded up to a multiple of 16, as OpenCV recommends for belief propagation. Of images wider than
+    /// 4:3, a quarter of the width of a 4:3 image with as many pixels.
+    QuarterOfWidth,
     /// This number of labels.
     Count(usize),
+}
+
+/// What to trade for what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Whole pixels.
+    Fast,
+    /// Fractions of a pixel.
+    #[default]
+    Balanced,
+    /// Also a left-right check, which fills occluded pixels from the surface behind, and a median of 3x3. Colour images are matched
+    /// in colour, with [`Profile::Census32`].
+    Best,
+}
+
+impl Quality {
+    /// All of them, from fast to slow.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
+
+    /// The name used in options.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Best => "best",
+        }
+    }
+}
+
+/// The alignment of rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Align {
+    /// None.
+    Off,
+    /// Measured on the pair. Pairs whose rows agree, or on which too few points do, stay as they are.
+    #[default]
+    Auto,
+    /// This one, measured earlier with the same camera.
+    Known(Alignment),
 }
 
 impl Default for Options {
     fn default() -> Self {
         Self {
             algorithm: Algorithm::default(),
-            profile: Profile::Census16,
+            quality: Quality::default(),
+            profile: None,
             slope: None,
             truncation: None,
             edge_threshold: None,
+            align: Align::default(),
             labels: Labels::default(),
             min_disparity: None,
-            check: false,
+            check: None,
             speckle: None,
             fill: true,
             median: None,
-            subpixel: true,
+            subpixel: None,
             confidence: false,
             backend: devices::DEFAULT.to_owned(),
             device: None,
@@ -117,8 +167,12 @@ macro_rules! setters {
 setters! {
     /// With [`Options::algorithm`].
     with_algorithm: Algorithm => algorithm = std::convert::identity;
+    /// With [`Options::quality`].
+    with_quality: Quality => quality = std::convert::identity;
     /// With [`Options::profile`].
-    with_profile: Profile => profile = std::convert::identity;
+    with_profile: Profile => profile = Some;
+    /// With [`Options::align`].
+    with_align: Align => align = std::convert::identity;
     /// With this number of labels; see [`Options::labels`].
     with_labels: usize => labels = Labels::Count;
     /// With [`Options::min_disparity`].
@@ -126,13 +180,13 @@ setters! {
     /// With [`Options::edge_threshold`].
     with_edge_threshold: u8 => edge_threshold = Some;
     /// With [`Options::check`].
-    with_check: bool => check = std::convert::identity;
+    with_check: bool => check = Some;
     /// With [`Options::speckle`].
     with_speckle: usize => speckle = Some;
     /// With [`Options::median`].
     with_median: usize => median = Some;
     /// With [`Options::subpixel`].
-    with_subpixel: bool => subpixel = std::convert::identity;
+    with_subpixel: bool => subpixel = Some;
     /// With [`Options::confidence`].
     with_confidence: bool => confidence = std::convert::identity;
     /// With [`Options::backend`].
@@ -159,18 +213,29 @@ impl Options {
     /// The operations on a map after matching.
     #[must_use]
     pub fn finish(&self) -> Finish {
+        let (is_best, check) = (self.quality == Quality::Best, self.checks());
         Finish {
-            check: self.check,
+            check,
             speckles: self.speckle,
-            fill: self.fill && (self.check || self.speckle.is_some()),
-            median: self.median,
-            subpixel: self.subpixel,
+            fill: self.fill && (check || self.speckle.is_some()),
+            median: self.median.or(is_best.then_some(3)),
+            subpixel: self.subpixel.unwrap_or(self.quality != Quality::Fast),
         }
     }
 
     /// Whether the right image is matched too.
     #[must_use]
     pub fn needs_right(&self) -> bool {
-        self.check || self.confidence
+        self.checks() || self.confidence
+    }
+
+    fn checks(&self) -> bool {
+        self.check.unwrap_or(self.quality == Quality::Best)
+    }
+
+    /// The profile for a pair: colours count only if the left image has some.
+    pub(crate) fn profile_for(&self, pair: &StereoPair) -> Profile {
+        let in_colour = || self.quality == Quality::Best && !pair.left().is_grey();
+        self.profile.unwrap_or_else(|| if in_colour() { Profile::Census32 } else { Profile::Census16 })
     }
 }

@@ -114,12 +114,6 @@ impl Outputs {
         Ok(self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))?)
     }
 
-    /// Whether the formats can hold a disparity.
-    #[must_use]
-    pub fn hold(&self, disparity: i32) -> bool {
-        self.check_range(disparity as f32, disparity as f32).is_ok()
-    }
-
     /// Writes all files. `watch` receives warnings about their contents.
     ///
     /// # Errors

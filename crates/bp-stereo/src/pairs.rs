@@ -22,6 +22,13 @@ pub struct Pair {
     pub right: PathBuf,
 }
 
+impl Pair {
+    /// Both images, for messages.
+    pub(crate) fn images(&self) -> String {
+        format!("{} and {}", self.left.display(), self.right.display())
+    }
+}
+
 /// Pairs in order, and notes on files that are not part of a pair.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Found {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use bp_core::{
-    Plan,
+    Alignment, Plan,
     survey::{RowOffsets, SeenDisparities, Survey},
 };
 
@@ -17,7 +17,7 @@ pub enum Warning {
     Identical,
     /// Hardly anything matches.
     Unlike,
-    /// Too little matches to find labels; the default is used.
+    /// Too little matches to find labels; a quarter of the width is used.
     NoLabelsFound,
     /// The images look exchanged.
     Exchanged,
@@ -54,7 +54,13 @@ pub struct Unused {
 }
 
 /// The warnings from the survey of a pair, from its plan, and from a failed search for labels.
-pub(crate) fn of(options: &Options, survey: &Survey, plan: &Plan, found_labels: bool) -> Vec<Warning> {
+pub(crate) fn of(
+    options: &Options,
+    survey: &Survey,
+    alignment: Option<&Alignment>,
+    plan: &Plan,
+    found_labels: bool,
+) -> Vec<Warning> {
     // A negative `min_disparity` shows that the order of the images is intended.
     let exchanged = survey.exchanged && options.min_disparity.is_none_or(|first| first >= 0);
     let mut warnings = Vec::new();
@@ -63,9 +69,11 @@ pub(crate) fn of(options: &Options, survey: &Survey, plan: &Plan, found_labels: 
     add(survey.unlike, Warning::Unlike);
     add(!found_labels, Warning::NoLabelsFound);
     add(exchanged, Warning::Exchanged);
-    warnings.extend(survey.rows.map(Warning::Rows));
+    // Slight offsets that were aligned are no problem any more.
+    let rows = survey.rows.filter(|rows| alignment.is_none() || !rows.is_slight());
+    warnings.extend(rows.map(Warning::Rows));
     // Disparities are unreliable if rows do not correspond, and exchanged images have their own warning.
-    let trusted = survey.rows.is_none() && !exchanged;
+    let trusted = rows.is_none() && !exchanged;
     let beyond = survey.seen.filter(|_| trusted).and_then(|seen| beyond(options, seen, plan));
     warnings.extend(beyond.map(Warning::Beyond));
     warnings.extend(unused(plan).map(Warning::Unused));
@@ -131,7 +139,9 @@ impl Warning {
                     "hardly anything in {pair} matches: they show different scenes, are far from rectified, or are blank"
                 )
             }
-            Self::NoLabelsFound => format!("`labels` auto: too little in {pair} matches, so the default is used"),
+            Self::NoLabelsFound => {
+                format!("too little in {pair} matches to find the disparities to search: give `labels` a number")
+            }
             Self::Exchanged => {
                 format!("{pair} look exchanged: swap them, or give a negative `min_disparity` if that is meant")
             }

@@ -7,9 +7,13 @@ use bytesize::ByteSize;
 use clap::{Args, builder::NonEmptyStringValueParser};
 
 use bp_io::Limits;
-use bp_stereo::{Labels, devices};
+use bp_stereo::{Labels, Quality, devices};
 
-use super::{FinishArgs, ManyArgs, OutputArgs, meaning::labels, named, positive, switch, threads};
+use super::{
+    FinishArgs, ManyArgs, OutputArgs,
+    meaning::{AlignArg, align, labels},
+    named, positive, switch, threads,
+};
 
 /// `bp match`.
 #[derive(Clone, Debug, Args)]
@@ -74,19 +78,33 @@ pub(crate) struct MatchArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Plan")]
 pub(crate) struct PlanArgs {
-    /// Number of disparities to search; must exceed the largest one. [default: a quarter of the width]
+    /// Number of disparities to search; must exceed the largest one. [default: auto]
     ///
     /// The largest disparity that can be found is the first one plus labels - 1. With auto, a coarse survey of the
-    /// images finds the labels and the first disparity. The default is rounded up to a multiple of 16.
+    /// images finds the labels and the first disparity.
     #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = labels)]
     pub(crate) labels: Option<Labels>,
-    /// First disparity in pixels; may be negative. [default: 0; found by --labels auto]
+    /// First disparity in pixels; may be negative. [default: with --labels auto what the survey finds, else 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true,
         value_parser = clap::value_parser!(i32).range(-(MAX_SIDE as i64)..=MAX_SIDE as i64))]
     pub(crate) min_disparity: Option<i32>,
-    /// Data cost and its default smoothness.
-    #[arg(long, default_value = "census16", value_parser = named(&Profile::ALL, Profile::name))]
-    pub(crate) profile: Profile,
+    /// Whether to align the rows of the right image with those of the left one: auto, off or a camera's FILE.
+    ///
+    /// Rows of rectified images often differ by a few tenths of a pixel. auto measures this on the pair (on the first frames of
+    /// a video) and resamples the right image, unless rows agree or too few points do. FILE holds the alignment of a
+    /// camera; if it is missing, it is measured on this pair (on the first pairs of a batch) and written.
+    #[arg(long, default_value = "auto", value_name = "auto|off|FILE", value_parser = align, hide_short_help = true)]
+    pub(crate) align: AlignArg,
+    /// What to trade for what: fast, balanced or best.
+    ///
+    /// fast keeps whole pixels. best also checks the map against that of the right image, fills what only the left camera sees
+    /// from the surface behind, and matches colour images in colour; it takes about twice the time. Other options change
+    /// single parts of it.
+    #[arg(long, default_value = "balanced", value_parser = named(&Quality::ALL, Quality::name))]
+    pub(crate) quality: Quality,
+    /// Data cost and its default smoothness. [default: census16; for colour images with --quality best census32]
+    #[arg(long, hide_short_help = true, value_parser = named(&Profile::ALL, Profile::name))]
+    pub(crate) profile: Option<Profile>,
     /// Algorithm: sweep is ours, the others are the thesis's. [default: sweep]
     ///
     /// bp is plain belief propagation; cfbp is coarse-to-fine BP; cfcsbp is coarse-to-fine constant-space BP, with

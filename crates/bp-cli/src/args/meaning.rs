@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
-use bp_io::{Geometry, Picture};
+use bp_io::{Geometry, Picture, read_alignment};
 use bp_stereo::{
-    Algorithm, Hierarchy, Labels, Loops, Making, Options, Outputs,
+    Algorithm, Align, Hierarchy, Labels, Loops, Making, Options, Outputs, Quality,
     batch::{Also, BatchOptions},
     pairs::{self, Source},
 };
@@ -24,17 +24,19 @@ impl MatchArgs {
         check_finish(self)?;
         let options = Options {
             algorithm: plan.meaning()?,
+            quality: plan.quality,
             profile: plan.profile,
             slope: plan.slope,
             truncation: plan.truncation,
             edge_threshold: plan.edge_threshold,
+            align: plan.align.meaning()?,
             labels: plan.labels.unwrap_or_default(),
             min_disparity: plan.min_disparity,
-            check: finish.check.is_some(),
+            check: finish.check.map(|()| true),
             speckle: finish.speckle.map(|least| least as usize),
             fill: finish.fill.unwrap_or(true),
             median: finish.median,
-            subpixel: !finish.whole_pixels,
+            subpixel: finish.whole_pixels.then_some(false),
             confidence: finish.confidence.is_some() || self.many.also.contains(&Also::Confidence),
             backend: plan.backend.clone(),
             device: plan.device.clone(),
@@ -67,6 +69,7 @@ impl MatchArgs {
         Ok(Some(BatchOptions {
             source,
             output: self.output.clone(),
+            alignment: self.plan.align.file().cloned(),
             matching: self.options()?,
             format: self.many.format.clone(),
             also: self.many.also.clone(),
@@ -89,7 +92,8 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
         return Err(Failure::usage("--output - writes one map to standard output, without --json, --pairs or --video"));
     }
     let finish = &args.finish;
-    if finish.fill.is_some() && finish.check.is_none() && finish.speckle.is_none() {
+    let checks = finish.check.is_some() || args.plan.quality == Quality::Best;
+    if finish.fill.is_some() && !checks && finish.speckle.is_none() {
         return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
     }
     let truth = &args.truth;
@@ -253,6 +257,39 @@ impl PlanArgs {
         needs(other_schedule, !is_swept, "--schedule sync or checkerboard", THESIS)?;
         needs(self.z.is_some(), kind.divides_loops(), "--z", "--algorithm cfcsbp or ctcsbp")?;
         needs(self.seed_start.is_some(), kind.is_cut(), "--seed-start", "--algorithm ctbp or ctcsbp")
+    }
+}
+
+/// The value of --align.
+#[derive(Clone, Debug)]
+pub(crate) enum AlignArg {
+    Off,
+    Auto,
+    /// The alignment of a camera, in a file that may be missing.
+    File(PathBuf),
+}
+
+impl AlignArg {
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        if let Self::File(path) = self { Some(path) } else { None }
+    }
+
+    fn meaning(&self) -> Result<Align, Failure> {
+        match self {
+            Self::Off => Ok(Align::Off),
+            Self::File(path) if path.exists() => Ok(Align::Known(read_alignment(path)?)),
+            Self::Auto | Self::File(_) => Ok(Align::Auto),
+        }
+    }
+}
+
+/// Parses the value of --align.
+pub(super) fn align(text: &str) -> Result<AlignArg, String> {
+    match text {
+        "off" => Ok(AlignArg::Off),
+        "auto" => Ok(AlignArg::Auto),
+        "" => Err("must be auto, off or a file".to_owned()),
+        path => Ok(AlignArg::File(path.into())),
     }
 }
 

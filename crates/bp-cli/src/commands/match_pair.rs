@@ -2,13 +2,15 @@
 
 use std::{
     io::Write as _,
+    iter,
     path::{Path, PathBuf},
 };
 
-use bp_core::{DisparityMap, GroundTruth, Size, StereoPair, survey::Survey};
+use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
 use bp_io::{Limits, MapFormat, Raster, read_image};
 use bp_stereo::{
-    AnswerTimes, Beside, Content, Disparity, Error, Labels, Making, Matcher, Outputs, Planned, Start, batch,
+    Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Outputs, Planned, Start, align_camera,
+    batch,
 };
 
 use super::{
@@ -20,9 +22,7 @@ use super::{
 use crate::{
     args::MatchArgs,
     failure::{Failure, as_options},
-    heap, interrupt,
-    notes::note,
-    terminal,
+    heap, interrupt, terminal,
 };
 
 /// Runs the command.
@@ -66,14 +66,17 @@ struct Job<'a> {
 }
 
 fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
-    let (options, outputs, making) = (args.options()?, args.outputs(), args.making()?);
+    let (mut options, outputs, making) = (args.options()?, args.outputs(), args.making()?);
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let inputs: Vec<&Path> = sources(args).chain(truths.map(PathBuf::as_path)).collect();
+    let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
     let limits = limits(args.max_megapixels);
     let pair = read_pair(files, limits)?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limits)).transpose()?;
     interrupt::listen()?;
+    if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {
+        options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
+    }
     let whole = args.messages_hash.then_some("messages_hash");
     let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, whole };
     let mut matcher = Matcher::new(&options)?.beside(beside);
@@ -113,17 +116,10 @@ impl Job<'_> {
     /// Plans the pair, and checks that its outputs can hold the result. Shows warnings before this check: exchanged
     /// images may be the reason that it fails.
     fn plan(&self, matcher: &Matcher) -> Result<Planned, Failure> {
-        let survey = Survey::of(&self.pair)?;
-        let planned = matcher.plan_within(&self.pair, &survey, &|disparity| self.outputs.hold(disparity))?;
+        let planned = matcher.plan(&self.pair)?;
         planned.warnings.iter().for_each(|warning| terminal::warn(&as_options(&warning.about(&self.name()))));
         self.hint_at_scale(&planned);
         self.outputs.check_plan(&self.making, &planned.plan)?;
-        if matcher.options().labels == Labels::Auto {
-            let model = planned.plan.model();
-            let labels = model.labels();
-            let (low, high) = (model.min_disparity(), model.disparity(labels as u16 - 1));
-            note(&format!("--labels auto: {labels} labels, from {low} to {high} px"));
-        }
         Ok(planned)
     }
 
@@ -140,14 +136,15 @@ impl Job<'_> {
 
     /// Matches the pair as often as the arguments ask for. Returns the last answer and the times of all. Only one
     /// answer is in memory at a time.
-    fn matched(&self, matcher: &mut Matcher, planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
+    fn matched(&self, matcher: &mut Matcher, mut planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
         let mut times = Vec::new();
         loop {
-            let answer = matcher.run(&self.pair, planned.clone(), Start::Cold, &terminal::watch())?;
+            let answer = matcher.run(&self.pair, planned, Start::Cold, &terminal::watch())?;
             times.push(answer.times);
             if times.len() >= self.args.repeat as usize {
                 return Ok((answer, times));
             }
+            planned = matcher.plan(&self.pair)?;
         }
     }
 

@@ -4,8 +4,8 @@ use std::{fmt::Write as _, path::PathBuf};
 
 use bp_core::{Errors, Size, Stage};
 use bp_stereo::{
-    AnswerTimes, Disparity, Matcher, Tiles,
-    description::{self, Clocked, Energy, Settings, clocks, milliseconds},
+    Align, AnswerTimes, Disparity, Matcher, Tiles,
+    description::{self, Clocked, Energy, Rows, Settings, clocks, milliseconds},
 };
 use bytesize::ByteSize;
 use serde::Serialize;
@@ -24,6 +24,9 @@ pub(super) struct Report {
     backend: String,
     device: description::Device,
     settings: Settings,
+    /// Whether rows should have been aligned, but too few points agree.
+    #[serde(skip)]
+    is_unaligned: bool,
     /// `None` if the pair was matched as a whole.
     tiles: Option<Tiles>,
     /// The message entries that were computed for one image. The settings hold the prediction.
@@ -33,9 +36,10 @@ pub(super) struct Report {
     peak_bytes: u64,
     /// The total time of each match, in order.
     samples_ms: Vec<f64>,
-    /// The median of the samples, the part of it after matching, and the stages of that match. The stages include both
+    /// The median of the samples, the parts of it before and after matching, and the stages of that match. The stages include both
     /// images if both were matched.
     total_ms: f64,
+    planning_ms: f64,
     finishing_ms: f64,
     clocks: Vec<Clocked>,
     energy: Energy,
@@ -71,6 +75,7 @@ impl Report {
             height: asked.size.height,
             backend: matcher.device_name().to_owned(),
             device: matcher.device().into(),
+            is_unaligned: answer.settings.rows.is_none() && matcher.options().align != Align::Off,
             settings: answer.settings,
             tiles: answer.tiles,
             message_updates: answer.message_updates,
@@ -78,6 +83,7 @@ impl Report {
             peak_bytes: answer.peak_bytes,
             samples_ms: times.iter().map(total_ms).collect(),
             total_ms: total_ms(&median),
+            planning_ms: milliseconds(median.planning),
             finishing_ms: milliseconds(median.finishing),
             clocks: clocks(&median.matching),
             energy: answer.energy.into(),
@@ -108,6 +114,19 @@ fn spread(samples_ms: &[f64]) -> String {
     if count > 1 { format!(", median of {count} from {low:.1} to {high:.1} ms") } else { String::new() }
 }
 
+/// How the rows of the images differ, if it was measured.
+fn rows(report: &Report) -> String {
+    let text = match report.settings.rows {
+        Some(Rows { range: [least, largest], corrected: true, .. }) => {
+            format!("differ by {least:.2} to {largest:.2} px; corrected")
+        }
+        Some(_) => "agree".to_owned(),
+        None if report.is_unaligned => "not aligned: too few points agree".to_owned(),
+        None => return String::new(),
+    };
+    format!("{:<10}{text}\n", "rows")
+}
+
 /// The report as text.
 pub(super) fn text(report: &Report) -> String {
     let mut text = String::new();
@@ -115,6 +134,7 @@ pub(super) fn text(report: &Report) -> String {
     let Settings { labels, min_disparity, algorithm, profile, grids, steps_per_grid, schedule, .. } = settings;
     let last = min_disparity + *labels as i32 - 1;
     let _ = writeln!(text, "{:<10}{width}x{height} pixels, {labels} labels ({min_disparity} to {last} px)", "pair");
+    text += &rows(report);
     let steps = if schedule == "checkerboard" { "half-steps" } else { "loops" };
     let plan = format!("{algorithm}, profile {profile}, {grids} grids x {steps_per_grid} {steps} ({schedule})");
     let software = if report.device.software_rasteriser { " (software rasteriser)" } else { "" };
@@ -123,6 +143,7 @@ pub(super) fn text(report: &Report) -> String {
         let _ = writeln!(text, "{:<10}{columns}x{rows} of up to {width}x{height} pixels, {answer}", "tiles");
     }
     let _ = writeln!(text, "{:<10}{:.1} ms in total{}", "time", report.total_ms, spread(&report.samples_ms));
+    let _ = writeln!(text, "{:<14}{:<16}{:>10.1} ms", "", "before matching", report.planning_ms);
     for Clocked { clock, stages } in &report.clocks {
         let _ = writeln!(text, "{:<12}{clock:?} clock", "");
         for (stage, ms) in Stage::ALL.into_iter().zip(stages.in_order()) {

@@ -1,11 +1,13 @@
 //! The program as its users see it: options, files, messages, exit codes.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+mod align;
 mod devices;
 mod folder;
 mod manners;
 mod many;
 mod outputs;
+mod quality;
 mod recorded;
 mod resumed;
 mod running;

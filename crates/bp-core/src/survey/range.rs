@@ -1,17 +1,28 @@
 //! Derives the labels that a pair needs from its coarse matches.
 
-use super::coarse::Matches;
-use crate::{MAX_LABELS, Model};
+use super::{
+    coarse::{Found, Matches},
+    points,
+};
+use crate::{MAX_LABELS, Model, StereoPair};
 
 /// One in this many matches may lie beyond either end of the range, because some false matches remain.
 const BEYOND: usize = 1000;
 
-/// The margin added at both ends, in shrunk pixels. A coarse disparity may be off by one, and parts of surfaces beyond
-/// the range found are narrow and easily missed.
+/// Matches at either end of the range that are matched again at full resolution.
+const AT_THE_END: usize = 64;
+
+/// One in this many of those may lie beyond the end.
+const STRAYS: usize = 4;
+
+/// The margin added at both ends, in pixels, besides half a shrunk pixel.
 const MARGIN: i32 = 2;
 
+/// Another part of the range is added at its near end: near surfaces are often narrow and easily missed.
+const NEARER: i32 = 6;
+
 /// The number of labels is a multiple of this.
-const LABEL_STEP: usize = 16;
+const LABEL_STEP: usize = 4;
 
 /// The range of disparities that coarse matching found, in pixels of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +31,8 @@ pub struct SeenDisparities {
     pub least: i32,
     /// The largest disparity, ignoring one match in a thousand.
     pub largest: i32,
-    /// How far off either may be: one pixel of the shrunk images.
-    pub step: i32,
+    /// How far off either may be.
+    pub margin: i32,
 }
 
 /// The labels to match with.
@@ -29,7 +40,7 @@ pub struct SeenDisparities {
 pub struct DisparityRange {
     /// Disparity of the first label in pixels.
     pub min_disparity: i32,
-    /// Number of labels, a multiple of 16 and at most [`MAX_LABELS`].
+    /// Number of labels, at most [`MAX_LABELS`].
     pub labels: usize,
 }
 
@@ -53,26 +64,47 @@ impl DisparityRange {
 }
 
 impl SeenDisparities {
-    pub(super) fn of(matches: &Matches, factor: usize) -> Option<Self> {
-        let mut found: Vec<i32> = matches.found().map(|(_, _, disparity)| disparity).collect();
-        found.sort_unstable();
-        let beyond = found.len() / BEYOND;
-        let (least, largest) = (*found.get(beyond)?, *found.get(found.len().checked_sub(beyond + 1)?)?);
+    pub(super) fn of(pair: &StereoPair, matches: &Matches, factor: usize) -> Option<Self> {
+        let all: Vec<Found> = matches.found().collect();
+        let [least, largest] = ends(all.iter().map(|&(.., disparity)| disparity).collect(), BEYOND)?;
+        // If the match of a pixel may lie outside the right image, the one inside may be false.
+        let is_inside = |x: usize| x as i32 >= largest && (x as i32 - least) < matches.width() as i32;
+        let inside: Vec<Found> = all.iter().copied().filter(|&(x, ..)| is_inside(x)).collect();
+        let inside = if inside.is_empty() { all } else { inside };
+        let [least, largest] = ends(inside.iter().map(|&(.., disparity)| disparity).collect(), BEYOND)?;
+        let exactly = |is_near: &dyn Fn(i32) -> bool| {
+            let near: Vec<Found> = inside.iter().copied().filter(|&(.., disparity)| is_near(disparity)).collect();
+            let some: Vec<Found> = near.iter().copied().step_by(near.len().div_ceil(AT_THE_END).max(1)).collect();
+            ends(points::disparities(pair, &some, matches.rows_down, factor), STRAYS)
+        };
         let step = factor as i32;
-        Some(Self { least: step * least, largest: step * largest, step })
+        Some(Self {
+            least: exactly(&|disparity| disparity <= least).map_or(step * least, |[least, _]| least),
+            largest: exactly(&|disparity| disparity >= largest).map_or(step * largest, |[_, largest]| largest),
+            margin: step / 2 + MARGIN,
+        })
     }
 
-    /// Labels that cover this range and a margin. Rounding up adds labels at the near end (large disparities). Labels
-    /// beyond [`MAX_LABELS`] are dropped at the same end.
+    /// Labels that cover this range and a margin. Negative disparities are covered only if some were seen. Rounding up adds
+    /// labels at the near end (large disparities). Labels beyond [`MAX_LABELS`] are dropped at the same end.
     #[must_use]
     pub fn range(&self) -> DisparityRange {
-        DisparityRange::spanning(self.least - MARGIN * self.step, self.largest + MARGIN * self.step)
+        let first = self.least - self.margin;
+        let nearer = (self.largest - self.least) / NEARER;
+        DisparityRange::spanning(if self.least < 0 { first } else { first.max(0) }, self.largest + self.margin + nearer)
     }
 
     /// Whether some disparities lie below the first label of a model, and whether some lie above its last.
     #[must_use]
     pub fn beyond(&self, model: &Model) -> [bool; 2] {
         let (first, last) = (model.disparity(0), model.disparity(model.labels() as u16 - 1));
-        [self.least + self.step < first, self.largest - self.step > last]
+        [self.least + self.margin < first, self.largest - self.margin > last]
     }
+}
+
+/// The least and the largest value, when one in `strays` at either end does not count.
+fn ends(mut values: Vec<i32>, strays: usize) -> Option<[i32; 2]> {
+    values.sort_unstable();
+    let strays = values.len() / strays;
+    Some([*values.get(strays)?, *values.get(values.len().checked_sub(strays + 1)?)?])
 }

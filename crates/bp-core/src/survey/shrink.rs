@@ -1,9 +1,14 @@
 //! Smaller copies of the images.
 
+use rayon::prelude::*;
+
 use crate::{Error, Image, Size, StereoPair, image::grey, memory};
 
 /// The longest side of the shrunk images in pixels. Disparities of up to half of it, in both directions, fit 8 bits.
 pub const LONGEST_SIDE: usize = 200;
+
+/// The fewest rows that one thread computes.
+const MIN_ROWS: usize = 16;
 
 /// The factor by which both sides are divided.
 pub(super) fn factor(size: Size) -> usize {
@@ -20,11 +25,10 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
     let Size { width, height } = image.size();
     let (columns, rows) = ((width / factor).max(1), (height / factor).max(1));
     let mut means = memory::filled("a smaller image", columns * rows, 0u8)?;
-    let mut sums = vec![[0u64; 3]; columns];
-    for (row, means) in means.chunks_exact_mut(columns).enumerate() {
+    means.par_chunks_exact_mut(columns).with_min_len(MIN_ROWS).enumerate().for_each(|(row, means)| {
         let ys = row * factor..((row + 1) * factor).min(height);
-        let count = (ys.len() * factor.min(width)) as u64;
-        sums.fill([0; 3]);
+        let count = (ys.len() * factor.min(width)) as u32;
+        let mut sums = vec![[0; 3]; columns];
         for line in image.pixels()[ys.start * width..ys.end * width].chunks_exact(width) {
             for (sum, block) in sums.iter_mut().zip(line.chunks(factor)) {
                 add(sum, block);
@@ -33,13 +37,13 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
         for (mean, sum) in means.iter_mut().zip(&sums) {
             *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
-    }
+    });
     Image::from_grey(columns, rows, &means)
 }
 
-fn add(sums: &mut [u64; 3], colours: &[[u8; 3]]) {
+fn add(sums: &mut [u32; 3], colours: &[[u8; 3]]) {
     for colour in colours {
-        sums.iter_mut().zip(colour).for_each(|(sum, &value)| *sum += u64::from(value));
+        sums.iter_mut().zip(colour).for_each(|(sum, &value)| *sum += u32::from(value));
     }
 }
 

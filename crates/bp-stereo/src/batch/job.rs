@@ -71,11 +71,6 @@ impl Job {
         [&self.pair.left, &self.pair.right]
     }
 
-    /// Both images, for messages.
-    pub(super) fn images_name(&self) -> String {
-        format!("{} and {}", self.pair.left.display(), self.pair.right.display())
-    }
-
     /// The files that the outputs are made from: the images, then the calibration.
     pub(super) fn inputs(&self) -> Vec<&Path> {
         self.images().into_iter().chain(self.calibration.as_deref()).collect()

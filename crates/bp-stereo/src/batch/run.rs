@@ -11,7 +11,7 @@ use std::{
     time::Instant,
 };
 
-use bp_core::{DeviceKind, StereoPair, survey::Survey};
+use bp_core::{DeviceKind, StereoPair};
 use bp_io::{Limits, read_image};
 
 use super::{
@@ -22,20 +22,15 @@ use super::{
 };
 use crate::{
     Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Memory, Start, Warning, Watch, description,
+    pairs::Pair,
 };
 
 /// A pair in memory.
 struct Read<'a> {
     job: &'a Job,
     inputs: Vec<FileState>,
-    pair: Result<Surveyed, Error>,
+    pair: Result<StereoPair, Error>,
     read_ms: f64,
-}
-
-/// Two images and their survey.
-struct Surveyed {
-    pair: StereoPair,
-    survey: Survey,
 }
 
 /// An answer, not yet written.
@@ -110,21 +105,12 @@ impl Run<'_> {
             let start = Instant::now();
             // Recorded before the images are decoded, so that a later run notices any change since.
             let inputs: io::Result<Vec<FileState>> = job.images().into_iter().map(FileState::of).collect();
-            let pair = self.read(job);
+            let pair = read(self.options, &job.pair);
             let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
             if self.watch.is_stopped() || to.send(read).is_err() {
                 return;
             }
         }
-    }
-
-    fn read(&self, job: &Job) -> Result<Surveyed, Error> {
-        let limits = Limits::megapixels(self.options.max_megapixels);
-        let limits = limits.within(Memory::available_to(DeviceKind::Processor));
-        let [left, right] = job.images();
-        let pair = StereoPair::new(read_image(left, limits)?, read_image(right, limits)?);
-        let pair = pair.map_err(|error| Error::from(error).of(job.images_name()))?;
-        Ok(Surveyed { survey: Survey::of(&pair)?, pair })
     }
 
     /// Matches one pair after another. If the device is lost, it is opened again for the next pair.
@@ -162,13 +148,13 @@ impl Run<'_> {
         &self,
         matcher: &mut Matcher,
         job: &Job,
-        Surveyed { pair, survey }: Surveyed,
+        pair: StereoPair,
         start: Start,
         read_ms: f64,
     ) -> Result<Answer, Error> {
         let begun = Instant::now();
-        let planned = matcher.plan_within(&pair, &survey, &|disparity| job.outputs.hold(disparity))?;
-        let warnings: Vec<String> = planned.warnings.iter().map(|warning| warning.about(&job.images_name())).collect();
+        let planned = matcher.plan(&pair)?;
+        let warnings: Vec<String> = planned.warnings.iter().map(|warning| warning.about(&job.pair.images())).collect();
         // Warnings come before the check: exchanged images may be the reason that the outputs cannot hold the labels.
         let is_first = |warning: &Warning| self.warned.count(warning) == 1;
         let firsts = planned.warnings.iter().zip(&warnings).filter(|(warning, _)| is_first(warning));
@@ -184,6 +170,14 @@ impl Run<'_> {
         let times = PairTimes { read_ms, match_ms: milliseconds_since(begun), ..PairTimes::default() };
         Ok(Answer { done: done(matcher, &pair, &disparity, warnings, times), disparity, pair })
     }
+}
+
+/// Reads the images of a pair.
+pub(super) fn read(options: &BatchOptions, pair: &Pair) -> Result<StereoPair, Error> {
+    let limits = Limits::megapixels(options.max_megapixels);
+    let limits = limits.within(Memory::available_to(DeviceKind::Processor));
+    let images = StereoPair::new(read_image(&pair.left, limits)?, read_image(&pair.right, limits)?);
+    images.map_err(|error| Error::from(error).of(pair.images()))
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -29,7 +29,7 @@ pub struct Summary {
     pub skipped: usize,
     /// Pairs that failed in this run.
     pub failures: Vec<Failed>,
-    /// The distinct settings of the pairs, in order of first appearance.
+    /// The distinct settings of the pairs, in order of first appearance, without the rows of single pairs.
     pub settings: Vec<description::Settings>,
     /// The distinct tilings of the pairs that were not matched as a whole.
     pub tiles: Vec<Tiles>,
@@ -87,9 +87,9 @@ impl Summary {
             done: done.len(),
             skipped,
             failures,
-            settings: distinct(done.iter().map(|done| &done.settings)),
-            tiles: distinct(done.iter().filter_map(|done| done.tiles.as_ref())),
-            devices: distinct(done.iter().map(|done| &done.device)),
+            settings: distinct(done.iter().map(|done| description::Settings { rows: None, ..done.settings.clone() })),
+            tiles: distinct(done.iter().filter_map(|done| done.tiles.clone())),
+            devices: distinct(done.iter().map(|done| done.device.clone())),
             times,
             total_ms,
             median_solve_ms: median(done.iter().map(|done| done.times.solve_ms).collect()),
@@ -112,11 +112,11 @@ impl Failed {
 }
 
 /// The distinct values, in order of first appearance.
-fn distinct<'a, T: Clone + PartialEq + 'a>(values: impl Iterator<Item = &'a T>) -> Vec<T> {
+fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut found: Vec<T> = Vec::new();
     for value in values {
-        if !found.contains(value) {
-            found.push(value.clone());
+        if !found.contains(&value) {
+            found.push(value);
         }
     }
     found

@@ -2,8 +2,8 @@
 
 use arbitrary::Unstructured;
 use bp_core::{
-    Algorithm, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS, MAX_TRUNCATION,
-    MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
+    Algorithm, Alignment, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS,
+    MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
     finish::{Finish, MEDIANS, confidence, never},
     survey::Survey,
 };
@@ -100,7 +100,7 @@ fn finished(finish: Finish, pair: &StereoPair, left: DisparityMap, right: &Dispa
     Ok(())
 }
 
-/// Checks that the labels that a survey proposes make a valid model.
+/// Checks that the labels that a survey proposes make a valid model, and that the rows it finds can be aligned.
 fn surveyed(pair: &StereoPair) -> Result<(), Error> {
     let survey = Survey::of(pair)?;
     assert!((0.0..=1.0).contains(&survey.matched), "{survey:?}");
@@ -108,7 +108,7 @@ fn surveyed(pair: &StereoPair) -> Result<(), Error> {
         let range = seen.range();
         Model::new(Profile::Census, range.labels)?.with_min_disparity(range.min_disparity)?;
     }
-    Ok(())
+    Alignment::find(pair, &survey).map_or(Ok(()), |alignment| alignment.aligned(pair).map(drop))
 }
 
 fn draw(mut from: Unstructured<'_>) -> arbitrary::Result<Option<Drawn>> {

@@ -1,0 +1,299 @@
+//! Measures by how many rows points move between the images.
+
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
+use super::weights;
+use crate::{Image, StereoPair, image::grey, survey::points::Point};
+
+/// Columns and rows of a window.
+const WIDTH: usize = 16;
+const HEIGHT: usize = 13;
+
+/// The first and last row of a window are moved by up to this many pixels.
+const SLANT: usize = 3;
+const STEEPEST: f32 = SLANT as f32 / MIDDLE[1] as f32;
+
+/// The columns that a window and its interpolation may read.
+const WIDE: usize = WIDTH + 3 + 2 * SLANT;
+
+/// The least mean of the squared slopes along columns.
+const LEAST_CONTRAST: f32 = 1.0;
+
+/// The most by which an unknown position along the row may raise the variance of the position along the column.
+const MOST_MIXED: f32 = 20.0;
+
+/// The window is that of the pixel at this column and row of it.
+const MIDDLE: [usize; 2] = [WIDTH / 2, HEIGHT / 2];
+
+/// Points that one thread measures together.
+const TOGETHER: usize = 32;
+
+/// The most steps towards the best match, and the smallest in pixels.
+const STEPS: usize = 6;
+const LEAST_STEP: f32 = 0.03;
+
+/// A match farther than this from its start is another one.
+const FARTHEST: f32 = 1.5;
+
+/// A window matches if the sum of its squared differences is at most this share of the sum of its squared contrasts.
+const LARGEST_SHARE: f32 = 0.25;
+
+/// A point in the right image, and by how many rows it moved, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moved {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) rows: f64,
+    /// The inverse of the variance of `rows`.
+    pub(super) weight: f64,
+}
+
+/// Values of a window, `[row][column]`.
+type Window = [[f32; WIDTH]; HEIGHT];
+
+/// Measures the points whose windows have texture and match.
+pub(super) fn measure(pair: &StereoPair, points: &[Point]) -> Vec<Moved> {
+    let level = Level::new();
+    let of_chunk = |points: &[Point]| dispatch!(level, simd => measured(simd, pair, points));
+    points.par_chunks(TOGETHER).flat_map_iter(of_chunk).collect()
+}
+
+#[inline(always)]
+fn measured<S: Simd>(simd: S, pair: &StereoPair, points: &[Point]) -> Vec<Moved> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut all = Vec::with_capacity(points.len());
+            for point in points {
+                all.extend(moved(pair, point));
+            }
+            all
+        },
+    )
+}
+
+/// Follows the slopes of the grey values to the best match (Lucas and Kanade 1981).
+#[inline(always)]
+fn moved(pair: &StereoPair, point: &Point) -> Option<Moved> {
+    let patch = Patch::of(pair.left(), point.x, point.y)?;
+    let start = Match { x: point.column as f32, slant: 0.0, y: point.row as f32 };
+    let mut found = start;
+    let mut squares = f32::INFINITY;
+    for _ in 0..STEPS {
+        let differences = patch.differences(&window(pair.right(), found)?);
+        squares = dot(&differences, &differences);
+        let [across, slant, down] = patch.step(&differences);
+        found = Match { x: found.x + across, slant: found.slant + slant, y: found.y + down };
+        if (found.x - start.x).abs().max((found.y - start.y).abs()) > FARTHEST || found.slant.abs() > STEEPEST {
+            return None;
+        }
+        if across.abs().max(down.abs()) < LEAST_STEP {
+            break;
+        }
+    }
+    // The noise of the images makes this variance; a hundredth more allows for everything else.
+    let variance = squares / (WIDTH * HEIGHT) as f32 * patch.inverse[2][2] + 0.01;
+    let moved = Moved {
+        x: f64::from(found.x),
+        y: point.y as f64,
+        rows: f64::from(found.y) - point.y as f64,
+        weight: f64::from(1.0 / variance),
+    };
+    (squares <= LARGEST_SHARE * patch.squares).then_some(moved)
+}
+
+/// Where a window matches in the right image. Each row of it lies `slant` pixels farther right than the one above, because the
+/// disparity of a slanted surface changes from row to row.
+#[derive(Clone, Copy)]
+struct Match {
+    x: f32,
+    slant: f32,
+    y: f32,
+}
+
+/// A window of the left image.
+struct Patch {
+    /// Grey values less their mean.
+    greys: Window,
+    /// By how much they change with x, slant and y, less the means.
+    slopes: [Window; 3],
+    /// The inverse of the matrix of the sums of products of slopes.
+    inverse: [[f32; 3]; 3],
+    /// The sum of the squares of the grey values.
+    squares: f32,
+}
+
+impl Patch {
+    #[inline(always)]
+    fn of(left: &Image, x: usize, y: usize) -> Option<Self> {
+        let wide = greys(left, x.checked_sub(MIDDLE[0] + 1 + SLANT)?, y.checked_sub(MIDDLE[1] + 1)?)?;
+        let mut slopes = [[[0.0; WIDTH]; HEIGHT]; 3];
+        let mut greys = [[0.0; WIDTH]; HEIGHT];
+        for j in 0..HEIGHT {
+            for i in 0..WIDTH {
+                let at = SLANT + i + 1;
+                greys[j][i] = wide[j + 1][at];
+                slopes[0][j][i] = (wide[j + 1][at + 1] - wide[j + 1][at - 1]) / 2.0;
+                slopes[1][j][i] = slopes[0][j][i] * (j as f32 - MIDDLE[1] as f32);
+                slopes[2][j][i] = (wide[j + 2][at] - wide[j][at]) / 2.0;
+            }
+        }
+        let greys = centred(greys);
+        let slopes = slopes.map(centred);
+        let mut matrix = [[0.0; 3]; 3];
+        for (row, a) in matrix.iter_mut().zip(&slopes) {
+            for (sum, b) in row.iter_mut().zip(&slopes) {
+                *sum = dot(a, b);
+            }
+        }
+        let inverse = inverse(matrix)?;
+        let is_determined =
+            matrix[2][2] > LEAST_CONTRAST * (WIDTH * HEIGHT) as f32 && inverse[2][2] * matrix[2][2] < MOST_MIXED;
+        is_determined.then(|| Self { squares: dot(&greys, &greys), greys, slopes, inverse })
+    }
+
+    /// The grey values less those of another window, whose mean and contrast are made equal.
+    #[inline(always)]
+    fn differences(&self, other: &Window) -> Window {
+        let gain = (self.squares / dot(other, other).max(f32::MIN_POSITIVE)).sqrt();
+        let mut differences = self.greys;
+        for (row, other) in differences.iter_mut().zip(other) {
+            for (value, other) in row.iter_mut().zip(other) {
+                *value -= gain * other;
+            }
+        }
+        differences
+    }
+
+    /// The step to the match in x, slant and y, if the grey values were planes.
+    #[inline(always)]
+    fn step(&self, differences: &Window) -> [f32; 3] {
+        let [a, b, c] = [0, 1, 2].map(
+            #[inline(always)]
+            |i: usize| dot(&self.slopes[i], differences),
+        );
+        self.inverse.map(
+            #[inline(always)]
+            |[x, y, z]| x * a + y * b + z * c,
+        )
+    }
+}
+
+/// The inverse of a symmetric matrix; `None` if there is none.
+#[inline(always)]
+fn inverse([[a, b, c], [_, d, e], [_, _, f]]: [[f32; 3]; 3]) -> Option<[[f32; 3]; 3]> {
+    let adjugate = [
+        [d * f - e * e, c * e - b * f, b * e - c * d],
+        [c * e - b * f, a * f - c * c, b * c - a * e],
+        [b * e - c * d, b * c - a * e, a * d - b * b],
+    ];
+    let determinant = a * adjugate[0][0] + b * adjugate[0][1] + c * adjugate[0][2];
+    let exists = determinant > 1e-6 * a * d * f;
+    exists.then(|| {
+        adjugate.map(
+            #[inline(always)]
+            |row| {
+                row.map(
+                    #[inline(always)]
+                    |value| value / determinant,
+                )
+            },
+        )
+    })
+}
+
+/// The sum of products. The order of the additions does not depend on the vectors of the CPU.
+#[inline(always)]
+fn dot(a: &Window, b: &Window) -> f32 {
+    let mut sums = [0.0; WIDTH];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..WIDTH {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum()
+}
+
+#[inline(always)]
+fn centred(mut window: Window) -> Window {
+    let mut sums = [0.0; WIDTH];
+    for row in &window {
+        for i in 0..WIDTH {
+            sums[i] += row[i];
+        }
+    }
+    let mean = sums.iter().sum::<f32>() / (WIDTH * HEIGHT) as f32;
+    for row in &mut window {
+        for value in row {
+            *value -= mean;
+        }
+    }
+    window
+}
+
+/// The grey values less their mean where a window matches, by cubic interpolation (Keys 1981); `None` if it leaves the image.
+#[inline(always)]
+fn window(image: &Image, Match { x, slant, y }: Match) -> Option<Window> {
+    let (left, top) = (x.floor() as usize, y.floor() as usize);
+    let greys = greys(image, left.checked_sub(MIDDLE[0] + 1 + SLANT)?, top.checked_sub(MIDDLE[1] + 1)?)?;
+    let down = weights(y - y.floor());
+    let mut window = [[0.0; WIDTH]; HEIGHT];
+    for (j, row) in window.iter_mut().enumerate() {
+        let mut line = [0.0; WIDE];
+        for i in 0..WIDE {
+            line[i] = down[0] * greys[j][i]
+                + down[1] * greys[j + 1][i]
+                + down[2] * greys[j + 2][i]
+                + down[3] * greys[j + 3][i];
+        }
+        let shift = SLANT as f32 + x - x.floor() + slant * (j as f32 - MIDDLE[1] as f32);
+        let across = weights(shift - shift.floor());
+        let line = line.get(shift as usize..shift as usize + WIDTH + 3)?;
+        for i in 0..WIDTH {
+            row[i] = across[0] * line[i] + across[1] * line[i + 1] + across[2] * line[i + 2] + across[3] * line[i + 3];
+        }
+    }
+    Some(centred(window))
+}
+
+/// The grey values of a window and of the pixels around it that interpolation needs; `None` if they leave the image.
+#[inline(always)]
+fn greys(image: &Image, left: usize, top: usize) -> Option<[[f32; WIDE]; HEIGHT + 3]> {
+    let mut greys = [[0.0; WIDE]; HEIGHT + 3];
+    let width = image.size().width;
+    if left + WIDE > width || top + HEIGHT + 3 > image.size().height {
+        return None;
+    }
+    for (row, greys) in (top..).zip(&mut greys) {
+        let pixels = &image.pixels()[row * width + left..][..WIDE];
+        for (value, &pixel) in greys.iter_mut().zip(pixels) {
+            *value = f32::from(grey(pixel));
+        }
+    }
+    Some(greys)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::Survey;
+
+    /// The bytes of a match would otherwise depend on the machine.
+    #[test]
+    fn all_vector_lengths_give_the_same_numbers() {
+        let wave = |x: usize, y: usize| ((x * x * 5 + y * y * 3 + 17 * x * y) as f32 / 90.0).sin();
+        let view = |shift: usize, gain: f32| -> Image {
+            let pixels: Vec<u8> =
+                (0..200 * 90).map(|i| (128.0 + gain * wave(i % 200 + shift, i / 200)) as u8).collect();
+            Image::from_grey(200, 90, &pixels).unwrap()
+        };
+        let pair = StereoPair::new(view(0, 90.0), view(5, 70.0)).unwrap();
+        let points = Survey::of(&pair).unwrap().points;
+        let all = |level: Level| dispatch!(level, simd => measured(simd, &pair, &points));
+        let bits =
+            |level: Level| all(level).iter().map(|moved| [moved.rows.to_bits(), moved.weight.to_bits()]).collect();
+        let (longest, shortest): (Vec<_>, Vec<_>) = (bits(Level::new()), bits(Level::baseline()));
+        assert!(longest.len() > 20 && longest == shortest, "{} points", longest.len());
+    }
+}

@@ -1,0 +1,33 @@
+//! The alignment of a camera: measured once, for all its pairs.
+
+use std::path::Path;
+
+use bp_core::{Alignment, StereoPair, survey::Survey};
+use bp_io::Files;
+
+use crate::{Align, Error, Watch};
+
+/// The most pairs to measure.
+const PAIRS: usize = 10;
+
+/// Measures one pair after another until enough points agree on one, and writes the alignment to a file, if one is given.
+/// [`Align::Off`] if there is none among the first ten pairs; `watch` then receives a warning about the file.
+///
+/// # Errors
+/// Only the file's: pairs with an error are passed over.
+pub fn align_camera(
+    pairs: impl Iterator<Item = Result<StereoPair, Error>>,
+    file: Option<(&Files, &Path)>,
+    watch: &Watch<'_>,
+) -> Result<Align, Error> {
+    let found = pairs.take(PAIRS).flatten().find_map(|pair| Alignment::find(&pair, &Survey::of(&pair).ok()?));
+    match (found, file) {
+        (Some(alignment), Some((files, path))) => files.json(path, &alignment)?,
+        (None, Some((_, path))) => {
+            let what = "rows are not aligned, because too few points of the images agree";
+            watch.warn(&format!("{} is not written: {what}", path.display()));
+        }
+        (_, None) => {}
+    }
+    Ok(found.map_or(Align::Off, Align::Known))
+}
