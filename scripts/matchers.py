@@ -1,7 +1,7 @@
 """Matchers that scripts compare: any program that writes a disparity map, and OpenCV's."""
 import pathlib, shlex, subprocess
 
-from public_pairs import BP
+from public_pairs import BP, bp
 
 SGBM_MODES = {"3-way": "SGBM_3WAY", "5 paths": "SGBM", "8 paths": "HH"}
 
@@ -28,14 +28,30 @@ def write_map(path, sixteenths):
     path.write_bytes(f"Pf\n{width} {height}\n-1.0\n".encode() + disparities[::-1].tobytes())
 
 
-class Sgbm:
-    """OpenCV's matcher in one mode, with windows of 3x3 pixels."""
+def aligned(left, right, labels, output):
+    """Both images in grey, the right one resampled by the alignment of rows that `bp match` finds."""
+    import cv2, numpy
+    rows = bp("match", left, right, "--labels", labels, "--no-sidecar", "--output", output)["settings"].get("rows")
+    left, right = greys(left, right)
+    if not (rows and rows["corrected"]):
+        return left, right
+    height, width = right.shape
+    x, y = numpy.meshgrid(numpy.linspace(-1, 1, width), numpy.linspace(-1, 1, height))
+    terms = numpy.stack([numpy.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    columns, own = numpy.meshgrid(numpy.arange(width), numpy.arange(height))
+    sources = (own + terms @ rows["coefficients"]).astype(numpy.float32)
+    return left, cv2.remap(right, columns.astype(numpy.float32), sources, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
-    def __init__(self, mode):
-        self.mode = mode
+
+class Sgbm:
+    """OpenCV's matcher in one mode, with windows of 3x3 pixels, on the images or on those with aligned rows."""
+
+    def __init__(self, mode, is_aligned=False):
+        self.mode, self.is_aligned = mode, is_aligned
 
     def match(self, left, right, labels, output):
-        write_map(output, sgbm(self.mode, labels, 3).compute(*greys(left, right)))
+        images = aligned(left, right, labels, output) if self.is_aligned else greys(left, right)
+        write_map(output, sgbm(self.mode, labels, 3).compute(*images))
 
 
 class Command:
@@ -63,8 +79,11 @@ class Command:
 MATCH = f"{BP} match {{left}} {{right}} --output {{output}} --labels {{labels}} --no-sidecar --quiet"
 KNOWN = {
     "bp": Command("bp", MATCH),
-    "bp, checked": Command("bp, checked", f"{MATCH} --check left-right --median 3"),
-} | {f"OpenCV SGBM, {mode}": Sgbm(mode) for mode in SGBM_MODES}
+    "bp, fast": Command("bp, fast", f"{MATCH} --quality fast"),
+    "bp, best": Command("bp, best", f"{MATCH} --quality best"),
+    "bp, rows as they are": Command("bp, rows as they are", f"{MATCH} --align off"),
+} | {f"OpenCV SGBM, {mode}": Sgbm(mode) for mode in SGBM_MODES
+} | {f"OpenCV SGBM, {mode}, aligned rows": Sgbm(mode, is_aligned=True) for mode in SGBM_MODES}
 
 
 def add_option(parser):
