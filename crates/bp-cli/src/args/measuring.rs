@@ -93,6 +93,9 @@ pub(crate) struct GateArgs {
     /// baseline for all machines, after a change that is meant to change results.
     #[arg(long, value_name = "WHERE", num_args = 0..=1, require_equals = true, default_missing_value = "here")]
     pub(crate) update: Option<Where>,
+    /// On a kind of machine without a baseline, write one of this measurement to a folder, if nothing fails.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["update", "instructions"])]
+    pub(crate) propose: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -140,6 +143,7 @@ impl GateArgs {
             Where::Here => Renewal::Here,
             Where::Everywhere => Renewal::Everywhere,
         });
-        GateOptions { quick: self.quick, rounds: self.rounds, baselines: self.baselines.clone(), update }
+        let (baselines, proposal) = (self.baselines.clone(), self.propose.clone());
+        GateOptions { quick: self.quick, rounds: self.rounds, baselines, update, proposal }
     }
 }

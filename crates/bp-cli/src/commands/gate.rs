@@ -23,7 +23,16 @@ pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
     }
     let judgement = threads::run_on(None, || terminal::watched(|watch| gate::gate(&args.options(), watch)))?;
     print(args, &judgement, &gate::page(&judgement))?;
-    if args.update.is_some() { written(&judgement.written.join(" and ")) } else { conclude(&judgement.failures()) }
+    if args.update.is_some() {
+        return written(&judgement.written.join(" and "));
+    }
+    if !judgement.written.is_empty() {
+        written(&judgement.written.join(" and "))?;
+    }
+    if judgement.is_partial() {
+        note(&format!("warning: only {}", judgement.summary()));
+    }
+    conclude(&judgement.failures())
 }
 
 fn print(args: &GateArgs, judgement: &impl Serialize, page: &str) -> Result<(), Failure> {

@@ -2,12 +2,13 @@
 
 use std::{
     collections::BTreeMap,
+    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::{file, subject::Renewal};
+use super::{file, instructions, subject::Renewal};
 use crate::{failure::Failure, machine, record::Machine};
 
 /// A baseline file. Programs identify its machine by the file's name, people by its fields.
@@ -29,13 +30,16 @@ pub(super) struct Expected {
     pub(super) commit: String,
     /// The device of each runner, with its driver.
     pub(super) devices: BTreeMap<String, String>,
-    /// Median of each speed-up.
+    /// Rate at which the caches copied, see [`super::conditions`]. Empty in the file for all machines.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) copy_gb_per_s: Option<f64>,
+    /// Median of each speed-up; none in the file for all machines.
     pub(super) speed_ups: BTreeMap<String, f64>,
     /// Results that do not vary.
     pub(super) facts: BTreeMap<String, String>,
 }
 
-/// Both files.
+/// The files of a folder.
 #[derive(Clone, Debug)]
 pub(super) struct Baselines {
     path_here: PathBuf,
@@ -43,7 +47,12 @@ pub(super) struct Baselines {
     /// For this kind of machine, if the file exists.
     pub(super) here: Option<Baseline>,
     pub(super) anywhere: Option<Baseline>,
+    /// For other kinds of machines.
+    pub(super) elsewhere: Vec<Baseline>,
 }
+
+/// The file for all machines.
+const ANYWHERE: &str = "anywhere.json";
 
 impl Baselines {
     /// Reads the folder's files for this machine. The folder must exist unless the baselines are to be renewed.
@@ -54,13 +63,21 @@ impl Baselines {
             return Err(Failure::reading(folder, &what));
         }
         let path_here = folder.join(format!("{}.json", machine::kind(machine)));
-        let path_anywhere = folder.join("anywhere.json");
-        Ok(Self { here: file::read(&path_here)?, anywhere: file::read(&path_anywhere)?, path_here, path_anywhere })
+        let path_anywhere = folder.join(ANYWHERE);
+        let elsewhere = elsewhere(folder, &path_here)?;
+        let (here, anywhere) = (file::read(&path_here)?, file::read(&path_anywhere)?);
+        Ok(Self { here, anywhere, elsewhere, path_here, path_anywhere })
     }
 
     /// The file for this kind of machine.
     pub(super) fn path_here(&self) -> &Path {
         &self.path_here
+    }
+
+    /// The same, to be written to another folder.
+    pub(super) fn moved_to(&self, folder: &Path) -> Self {
+        let moved = |path: &Path| folder.join(path.file_name().unwrap_or_default());
+        Self { path_here: moved(&self.path_here), path_anywhere: moved(&self.path_anywhere), ..self.clone() }
     }
 
     /// The file for all machines.
@@ -79,6 +96,18 @@ impl Baselines {
         }
         Ok(renewed.iter().map(|(path, _)| path.display().to_string()).collect())
     }
+}
+
+/// The baselines of other kinds of machines than the one with this file.
+fn elsewhere(folder: &Path, here: &Path) -> Result<Vec<Baseline>, Failure> {
+    let Ok(files) = fs::read_dir(folder) else { return Ok(Vec::new()) };
+    let is_other = |path: &PathBuf| {
+        let others = [ANYWHERE, instructions::FILE].map(|name| folder.join(name));
+        path.extension().is_some_and(|extension| extension == "json") && path != here && !others.contains(path)
+    };
+    let mut paths: Vec<_> = files.flatten().map(|file| file.path()).filter(is_other).collect();
+    paths.sort();
+    paths.iter().filter_map(|path| file::read(path).transpose()).collect()
 }
 
 impl Baseline {

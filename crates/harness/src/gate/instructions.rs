@@ -17,7 +17,7 @@ use bp_stereo::Watch;
 use crate::{failure::Failure, report::format::whole};
 
 /// Name of the baseline file.
-const FILE: &str = "instructions.json";
+pub(super) const FILE: &str = "instructions.json";
 
 /// A count may grow by this fraction. The same program takes the same instructions, but a new build of the same sources
 /// may differ by a few.

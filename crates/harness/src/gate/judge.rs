@@ -1,9 +1,12 @@
 //! Compares measurements with baselines.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::{
     baseline::{Baseline, Baselines, Expected},
+    conditions::Conditions,
     guarded::Guarded,
     measure::{Fact, Measured},
     subject::Gate,
@@ -15,9 +18,12 @@ use crate::{
     record::{Machine, Program},
 };
 
-/// Tolerated loss, a fraction, of speed-ups that only have a baseline for all machines. The work that a plan saves does
-/// not depend on the machine, but the speed of the caches does.
-const TOLERANCE_ANYWHERE: f64 = 0.4;
+/// Tolerated loss, a fraction, of speed-ups without a baseline for this kind of machine: of the least on other kinds. The
+/// work that a plan saves does not depend on the machine, but the speed of the caches does.
+const TOLERANCE_ELSEWHERE: f64 = 0.4;
+
+/// Fewer other kinds of machines than this do not tell what holds everywhere.
+const KINDS: usize = 2;
 
 /// The result of a gate.
 #[derive(Serialize)]
@@ -38,6 +44,12 @@ pub struct Judgement {
     pub(super) facts: Vec<JudgedFact>,
     /// Expected results of available devices that were not measured.
     pub(super) missing: Vec<String>,
+    /// What the machine was like during the measurements.
+    pub(super) conditions: Vec<Conditions>,
+    /// The copy rate when the baseline was measured.
+    pub(super) usual_copy_gb_per_s: Option<f64>,
+    /// What disturbed the measurements, if anything did.
+    pub(super) disturbance: Option<String>,
     /// Baselines that were written.
     pub written: Vec<String>,
 }
@@ -49,10 +61,26 @@ pub(super) struct SpeedUp {
     pub(super) first: Ratio,
     /// The second measurement, if the first was worse.
     pub(super) second: Option<Ratio>,
-    pub(super) baseline: Option<f64>,
-    /// The fraction of the baseline that may be lost.
-    pub(super) tolerance: f64,
+    pub(super) baseline: Option<Standard>,
     pub(super) verdict: Verdict,
+}
+
+/// What a speed-up is held against.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct Standard {
+    /// The expected speed-up.
+    pub(super) value: f64,
+    /// The fraction of it that may be lost.
+    pub(super) tolerance: f64,
+    /// Whether it was measured on this kind of machine. If not, it is the least of other kinds.
+    pub(super) is_of_here: bool,
+}
+
+impl Standard {
+    /// The least speed-up that passes.
+    pub(super) fn floor(self) -> f64 {
+        self.value * (1.0 - self.tolerance)
+    }
 }
 
 /// A result that does not vary, judged.
@@ -74,6 +102,11 @@ impl SpeedUp {
     fn is_worse(&self) -> bool {
         self.verdict == Verdict::Worse
     }
+
+    fn judge(&mut self, ratio: Ratio) {
+        let judge = |standard: Standard| ratio.judge(standard.value, standard.tolerance);
+        self.verdict = self.baseline.map_or(Verdict::NoBaseline, judge);
+    }
 }
 
 impl Judgement {
@@ -81,18 +114,23 @@ impl Judgement {
     pub(super) fn new(gate: &Gate<'_>, baselines: &Baselines, measured: &Measured) -> Result<Self, Failure> {
         let devices = gate.runners.devices();
         let known = Known { gate, baselines };
+        let expected_here = known.expected(baselines.here.as_ref());
+        let usual_copy_gb_per_s = expected_here.and_then(|expected| expected.copy_gb_per_s);
         Ok(Self {
             program: machine::program()?,
             machine: gate.machine.clone(),
             quick: gate.options.quick,
             rounds: gate.options.rounds,
             baseline: baselines.path_here().display().to_string(),
-            has_baseline: known.expected(baselines.here.as_ref()).is_some(),
+            has_baseline: expected_here.is_some(),
             devices: devices.into_iter().collect(),
             unavailable: gate.runners.unavailable.clone(),
             speed_ups: measured.ratios.iter().map(|(guarded, ratio)| known.speed_up(guarded, *ratio)).collect(),
             facts: measured.facts.iter().map(|(name, fact)| known.fact(name, fact)).collect(),
             missing: known.missing(measured),
+            conditions: vec![measured.conditions],
+            usual_copy_gb_per_s,
+            disturbance: measured.conditions.disturbance(usual_copy_gb_per_s),
             written: Vec::new(),
         })
     }
@@ -102,22 +140,58 @@ impl Judgement {
         self.speed_ups.iter().any(SpeedUp::is_worse)
     }
 
-    /// Judges again the speed-ups that were worse: they fail only if they are worse both times.
+    /// Judges again the speed-ups that were worse: they fail only if they are worse both times, and nothing disturbed
+    /// either measurement.
     pub(super) fn repeat(&mut self, measured: &Measured) {
+        self.conditions.push(measured.conditions);
+        self.disturbance = self.disturbance.take().or(measured.conditions.disturbance(self.usual_copy_gb_per_s));
         for speed_up in self.speed_ups.iter_mut().filter(|speed_up| speed_up.is_worse()) {
             let again = measured.ratios.iter().find(|(guarded, _)| guarded.name() == speed_up.name);
             speed_up.second = again.map(|&(_, ratio)| ratio);
-            if let Some((second, baseline)) = speed_up.second.zip(speed_up.baseline) {
-                speed_up.verdict = second.judge(baseline, speed_up.tolerance);
+            speed_up.judge(speed_up.second.unwrap_or(speed_up.first));
+            if speed_up.is_worse() && self.disturbance.is_some() {
+                speed_up.verdict = Verdict::TooNoisy;
             }
         }
+    }
+
+    /// How many speed-ups were judged, against what, and why the others were not.
+    pub fn summary(&self) -> String {
+        let count = |is_of: &dyn Fn(&SpeedUp) -> bool| self.speed_ups.iter().filter(|speed_up| is_of(speed_up)).count();
+        let is_judged = |speed_up: &SpeedUp| !matches!(speed_up.verdict, Verdict::TooNoisy | Verdict::NoBaseline);
+        let judged =
+            |here| count(&|one| is_judged(one) && one.baseline.is_some_and(|standard| standard.is_of_here == here));
+        let [here, elsewhere] = [true, false].map(judged);
+        let noisy = count(&|one| one.verdict == Verdict::TooNoisy);
+        let unknown = self.speed_ups.len() - here - elsewhere - noisy;
+        let why = self.disturbance.as_deref().unwrap_or_default();
+        let parts = [
+            (here, "against this kind of machine".to_owned()),
+            (elsewhere, format!("against the least of other kinds, less {:.0} %", 100.0 * TOLERANCE_ELSEWHERE)),
+            (noisy, format!("not, because it is too noisy to judge: {why}")),
+            (unknown, format!("not, because fewer than {KINDS} kinds of machines had such devices")),
+        ];
+        let parts: Vec<_> =
+            parts.iter().filter(|part| part.0 > 0).map(|(count, what)| format!("{count} {what}")).collect();
+        format!("{} of {} speed-ups were judged: {}", here + elsewhere, self.speed_ups.len(), parts.join("; "))
+    }
+
+    /// Whether this kind of machine has no baseline yet, and nothing fails or was disturbed.
+    pub(super) fn calls_for_a_baseline(&self) -> bool {
+        !self.has_baseline && self.failures().is_empty() && self.disturbance.is_none()
+    }
+
+    /// Whether some speed-ups were not judged.
+    pub fn is_partial(&self) -> bool {
+        self.speed_ups.iter().any(|speed_up| matches!(speed_up.verdict, Verdict::TooNoisy | Verdict::NoBaseline))
     }
 
     /// Describes the speed-ups that are worse, the results that changed, and the expected results that are missing.
     pub fn failures(&self) -> Vec<String> {
         let worse = self.speed_ups.iter().filter(|speed_up| speed_up.is_worse()).map(|speed_up| {
             let now = speed_up.second.unwrap_or(speed_up.first).median;
-            format!("{}: {now:.2} times, was {:.2}", speed_up.name, speed_up.baseline.unwrap_or(f64::NAN))
+            let was = speed_up.baseline.map_or(f64::NAN, |standard| standard.value);
+            format!("{}: {now:.2} times, was {was:.2}", speed_up.name)
         });
         let changed =
             self.facts.iter().filter(|fact| fact.has_changed()).map(|fact| {
@@ -126,6 +200,11 @@ impl Judgement {
         let missing = self.missing.iter().map(|name| format!("{name}: in the baseline, but not measured any more"));
         worse.chain(changed).chain(missing).collect()
     }
+}
+
+/// The description of a device without the number of its threads.
+fn without_threads(device: &str) -> &str {
+    device.rsplit_once(", ").filter(|(_, last)| last.contains(" thread")).map_or(device, |(device, _)| device)
 }
 
 /// What the baselines expect of a run.
@@ -144,6 +223,20 @@ impl<'a> Known<'a> {
     fn expected_here(&self, runners: &[&String]) -> Option<&'a Expected> {
         let (here, devices) = (self.expected(self.baselines.here.as_ref())?, self.gate.runners.devices());
         runners.iter().all(|&runner| here.devices.get(runner) == devices.get(runner)).then_some(here)
+    }
+
+    /// The least speed-up of enough other kinds of machines on which these runners used such devices.
+    fn least_elsewhere(&self, name: &str, runners: &[&String]) -> Option<f64> {
+        let devices = self.gate.runners.devices();
+        let device =
+            |devices: &BTreeMap<String, String>, runner| Some(without_threads(devices.get(runner)?).to_owned());
+        let alike = |expected: &&Expected| {
+            runners.iter().all(|&runner| device(&expected.devices, runner) == device(&devices, runner))
+        };
+        let others = self.baselines.elsewhere.iter().filter_map(|other| self.expected(Some(other))).filter(alike);
+        let measured: Vec<_> = others.filter_map(|expected| expected.speed_ups.get(name).copied()).collect();
+        let least = measured.iter().copied().min_by(f64::total_cmp);
+        least.filter(|_| measured.len() >= KINDS)
     }
 
     /// Expected results of available devices that were not measured.
@@ -172,12 +265,16 @@ impl<'a> Known<'a> {
 
     fn speed_up(&self, guarded: &Guarded, first: Ratio) -> SpeedUp {
         let name = guarded.name();
-        let of = |expected: Option<&Expected>, tolerance: f64| Some((*expected?.speed_ups.get(&name)?, tolerance));
-        let here = of(self.expected_here(&[&guarded.of.runner, &guarded.over.runner]), guarded.tolerance);
-        let anywhere = of(self.expected(self.baselines.anywhere.as_ref()), TOLERANCE_ANYWHERE);
-        let (baseline, tolerance) = here.or(anywhere).unzip();
-        let verdict = baseline.zip(tolerance).map_or(Verdict::NoBaseline, |(b, tolerance)| first.judge(b, tolerance));
-        SpeedUp { name, first, second: None, baseline, tolerance: tolerance.unwrap_or(guarded.tolerance), verdict }
+        let runners = [&guarded.of.runner, &guarded.over.runner];
+        let here = self.expected_here(&runners).and_then(|here| here.speed_ups.get(&name).copied());
+        let here = here.map(|value| Standard { value, tolerance: guarded.tolerance, is_of_here: true });
+        let baseline = here.or_else(|| {
+            let value = self.least_elsewhere(&name, &runners)?;
+            Some(Standard { value, tolerance: TOLERANCE_ELSEWHERE, is_of_here: false })
+        });
+        let mut speed_up = SpeedUp { name, first, second: None, baseline, verdict: Verdict::NoBaseline };
+        speed_up.judge(first);
+        speed_up
     }
 
     fn fact(&self, name: &str, fact: &Fact) -> JudgedFact {

@@ -5,6 +5,7 @@ use std::{cell::RefCell, collections::BTreeMap};
 use bp_core::{Driver, Energy};
 
 use super::{
+    conditions::{Conditions, Observer},
     guarded::{Entrant, Guarded, Part},
     runners::Runners,
     verdict::Ratio,
@@ -44,6 +45,8 @@ pub(super) struct Measured {
     pub(super) ratios: Vec<(Guarded, Ratio)>,
     /// Results that do not vary, by name.
     pub(super) facts: Facts,
+    /// What the machine was like meanwhile.
+    pub(super) conditions: Conditions,
 }
 
 /// A result that does not vary.
@@ -73,12 +76,14 @@ pub(super) fn measure(
     let entrants = entrants(guarded, &runners.lineup.reference).into_iter();
     let mut entrants = entrants.map(enter).collect::<Result<Vec<_>, Failure>>()?;
     let rules = Rules { rounds, slow_rounds: rounds, warm_up: true, fail_fast: true };
+    let observer = Observer::begin();
     take_turns(&mut entrants, &rules, &mut Meter::new(watch))?;
+    let conditions = observer.end();
     let ratios = guarded.iter().filter_map(|guarded| Some((guarded.clone(), ratio(guarded, &entrants)?))).collect();
     drop(entrants);
     let mut facts = facts.into_inner();
     add_other_plans(runners, problem, &mut facts, watch)?;
-    Ok(Measured { ratios, facts })
+    Ok(Measured { ratios, facts, conditions })
 }
 
 /// All guarded entrants, without duplicates. The reference comes first, because all others must give its answers.

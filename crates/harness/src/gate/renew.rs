@@ -1,8 +1,9 @@
 //! New baselines from measurements.
 
+use std::collections::BTreeMap;
+
 use super::{
     baseline::{Baseline, Baselines, Expected},
-    guarded::Guarded,
     measure::{Fact, Measured},
     subject::{Gate, Renewal},
 };
@@ -17,38 +18,43 @@ impl Gate<'_> {
         measured: &[Measured],
     ) -> Result<Vec<String>, Failure> {
         let here = baselines.here.get_or_insert_with(|| Baseline::new(Some(&self.machine)));
-        let of_runners = self.expected(measured, |_| true, |fact| fact.runner.is_some());
+        let rate = median(measured.iter().map(|measured| measured.conditions.copy_gb_per_s));
+        let of_runners = Expected {
+            speed_ups: speed_ups(measured),
+            copy_gb_per_s: rate.map(rounded),
+            ..self.expected(measured, |fact| fact.runner.is_some())
+        };
         here.runs.insert(self.setting().to_owned(), of_runners);
         if renewal == Renewal::Everywhere {
-            let reference = &self.runners.lineup.reference;
-            let is_of_reference =
-                |guarded: &Guarded| [&guarded.of, &guarded.over].iter().all(|s| s.runner == *reference);
-            let of_all = self.expected(measured, is_of_reference, |fact| fact.runner.is_none());
+            let of_all = self.expected(measured, |fact| fact.runner.is_none());
             let anywhere = baselines.anywhere.get_or_insert_with(|| Baseline::new(None));
             anywhere.runs.insert(self.setting().to_owned(), of_all);
         }
         baselines.write(renewal)
     }
 
-    /// The chosen speed-ups, each the median over the measurements, and the chosen facts.
-    fn expected(
-        &self,
-        measured: &[Measured],
-        is_expected: impl Fn(&Guarded) -> bool,
-        is_told: impl Fn(&Fact) -> bool,
-    ) -> Expected {
-        let ratios = || measured.iter().flat_map(|measured| &measured.ratios);
-        let median_of = |name: &str| {
-            let own = ratios().filter(|(guarded, _)| guarded.name() == name);
-            median(own.map(|(_, ratio)| ratio.median)).map(|median| (1000.0 * median).round() / 1000.0)
-        };
-        let names = ratios().filter(|(guarded, _)| is_expected(guarded)).map(|(guarded, _)| guarded.name());
+    /// The chosen facts.
+    fn expected(&self, measured: &[Measured], is_told: impl Fn(&Fact) -> bool) -> Expected {
         let facts = measured.iter().flat_map(|measured| &measured.facts).filter(|(_, fact)| is_told(fact));
         Expected {
             commit: machine::commit(),
             devices: self.runners.devices(),
-            speed_ups: names.filter_map(|name| Some((name.clone(), median_of(&name)?))).collect(),
             facts: facts.map(|(name, fact)| (name.clone(), fact.value.clone())).collect(),
+            ..Expected::default()
         }
     }
+}
+
+/// The median of each speed-up over the measurements.
+fn speed_ups(measured: &[Measured]) -> BTreeMap<String, f64> {
+    let mut all = BTreeMap::<_, Vec<_>>::new();
+    for (guarded, ratio) in measured.iter().flat_map(|measured| &measured.ratios) {
+        all.entry(guarded.name()).or_default().push(ratio.median);
+    }
+    all.into_iter().filter_map(|(name, medians)| Some((name, rounded(median(medians)?)))).collect()
+}
+
+/// To three decimals.
+fn rounded(value: f64) -> f64 {
+    (1000.0 * value).round() / 1000.0
 }

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::guarded::Lineup;
+use bp_core::DeviceKind;
+
+use super::guarded::{Device, Lineup};
 use crate::{
     backends,
     failure::Failure,
@@ -33,7 +35,7 @@ impl Runners {
         let reference = backends::ALL[0].name();
         let one_thread = format!("{THREADED} on 1 thread");
         let mut all = vec![open(reference, reference)?, open(&format!("{THREADED}@1"), &one_thread)?];
-        let all_threads = (threads > 1).then(|| format!("{THREADED} on {threads} threads"));
+        let all_threads = (threads > 1).then(|| format!("{THREADED} on all threads"));
         if let Some(name) = &all_threads {
             // Runs in the current thread pool, which has all threads.
             all.push(open(THREADED, name)?);
@@ -43,7 +45,8 @@ impl Runners {
         for name in others.filter(|name| ![reference, THREADED].contains(name)) {
             match open(name, name) {
                 Ok(runner) => {
-                    devices.push(runner.name.clone());
+                    let is_software = runner.info.kind == DeviceKind::SoftwareRasteriser;
+                    devices.push(Device { runner: runner.name.clone(), is_software });
                     all.push(runner);
                 }
                 Err(failure) => unavailable.push(failure.to_string()),

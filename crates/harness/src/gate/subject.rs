@@ -31,6 +31,8 @@ pub struct GateOptions {
     pub baselines: PathBuf,
     /// Baselines to renew, if any.
     pub update: Option<Renewal>,
+    /// Folder for a first baseline of this kind of machine, made of this measurement if nothing fails.
+    pub proposal: Option<PathBuf>,
 }
 
 /// What is measured, and where.

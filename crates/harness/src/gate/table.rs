@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{
-    judge::{JudgedFact, Judgement, SpeedUp},
+    judge::{JudgedFact, Judgement, SpeedUp, Standard},
     verdict::Ratio,
 };
 use crate::report::{lines, machine_fact, program_fact};
@@ -20,6 +20,7 @@ pub fn page(judgement: &Judgement) -> String {
     about(judgement).iter().for_each(|line| _ = writeln!(text, "* {line}"));
     let columns = ["speed-up", "now", "interval", "baseline", "tolerated from", "verdict"];
     let _ = writeln!(text, "\n{READING}\n\n{}", table(&columns, judgement.speed_ups.iter().map(speed_up).collect()));
+    let _ = writeln!(text, "{}.\n", judgement.summary());
     let facts = &judgement.facts;
     let changed: Vec<_> = facts.iter().filter(|fact| fact.has_changed()).collect();
     let known = facts.iter().filter(|fact| fact.baseline.is_some()).count();
@@ -47,16 +48,17 @@ fn about(judgement: &Judgement) -> Vec<String> {
     about.push(format!("Rounds: {}.", judgement.rounds));
     if !judgement.has_baseline {
         about.push(format!(
-            "There is no baseline for this kind of machine ({}): only what does not depend on the machine is judged. \
+            "There is no baseline for this kind of machine ({}): speed-ups are held against the least on other kinds. \
              `bp gate --update` writes one.",
             judgement.baseline
         ));
     }
+    about.extend(judgement.disturbance.iter().map(|what| format!("Disturbed: {what}.")));
     about
 }
 
 fn speed_up(speed_up: &SpeedUp) -> Vec<String> {
-    let SpeedUp { name, first, second, baseline, tolerance, verdict } = speed_up;
+    let SpeedUp { name, first, second, baseline, verdict } = speed_up;
     let Ratio { median, low, high } = second.as_ref().unwrap_or(first);
     let again = if second.is_some() { " (measured again)" } else { "" };
     let figure = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), figures);
@@ -64,8 +66,8 @@ fn speed_up(speed_up: &SpeedUp) -> Vec<String> {
         name.clone(),
         figures(*median),
         format!("{} to {}{again}", figures(*low), figures(*high)),
-        figure(*baseline),
-        figure(baseline.map(|baseline| baseline * (1.0 - tolerance))),
+        figure(baseline.map(|standard| standard.value)),
+        figure(baseline.map(Standard::floor)),
         verdict.name().to_owned(),
     ]
 }

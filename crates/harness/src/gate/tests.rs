@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{baseline::Baseline, measure::Measured, *};
+use super::{baseline::Baseline, conditions::Conditions, measure::Measured, *};
 
 /// The CPU backends on a tiny scene.
 fn gate(options: &GateOptions) -> Gate<'_> {
@@ -13,7 +13,13 @@ fn gate(options: &GateOptions) -> Gate<'_> {
 }
 
 fn options(baselines: &Path) -> GateOptions {
-    GateOptions { quick: true, rounds: 3, baselines: baselines.to_owned(), update: None }
+    GateOptions { quick: true, rounds: 3, baselines: baselines.to_owned(), update: None, proposal: None }
+}
+
+/// A measurement as if nothing else had run.
+fn measure(gate: &Gate<'_>) -> Measured {
+    let conditions = Conditions { others: 0.0, copy_gb_per_s: 20.0 };
+    Measured { conditions, ..gate.measure(&Watch::default()).unwrap() }
 }
 
 fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
@@ -33,9 +39,10 @@ fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(folder.path());
     let gate = gate(&options);
-    let measured = gate.measure(&Watch::default()).unwrap();
+    let measured = measure(&gate);
     let first = judge(&gate, &measured);
     assert!(first.failures().is_empty() && page(&first).contains("There is no baseline"), "{}", page(&first));
+    assert!(first.is_partial() && first.summary().starts_with("0 of 18 speed-ups were judged"), "{}", first.summary());
 
     let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
     gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
@@ -61,7 +68,7 @@ fn other_devices_and_other_settings_have_no_baseline() {
     let mut options = options(folder.path());
     let (measured, path) = {
         let gate = gate(&options);
-        let measured = gate.measure(&Watch::default()).unwrap();
+        let measured = measure(&gate);
         let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
         gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
         (measured, baselines.path_here().to_owned())
@@ -76,11 +83,60 @@ fn other_devices_and_other_settings_have_no_baseline() {
 }
 
 #[test]
+fn a_machine_without_a_baseline_is_held_against_the_least_of_two_other_kinds() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(folder.path());
+    let gate = gate(&options);
+    let measured = measure(&gate);
+    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
+    gate.renew(Renewal::Here, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let name = "rayon on 1 thread: sweep over bp, total";
+    let (here, [one, two]) = (baselines.path_here(), ["one.json", "two.json"].map(|name| folder.path().join(name)));
+    fs::rename(here, &one).unwrap();
+    assert!(judge(&gate, &measured).summary().starts_with("0 of 18"));
+
+    fs::copy(&one, &two).unwrap();
+    edit(&two, |json| json["baseline"]["runs"]["quick"]["speed_ups"][name] = 1e9.into());
+    let judged = judge(&gate, &measured);
+    assert!(judged.failures().is_empty(), "the lesser of both counts: {:?}", judged.failures());
+    assert!(judged.summary().contains("18 against the least of other kinds"), "{}", judged.summary());
+    edit(&one, |json| json["baseline"]["runs"]["quick"]["speed_ups"][name] = 1e8.into());
+    let failures = judge(&gate, &measured).failures();
+    assert!(failures.len() == 1 && failures[0].contains("was 100000000"), "{failures:?}");
+}
+
+#[test]
+fn a_measurement_that_something_disturbed_fails_nothing_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(folder.path());
+    let gate = gate(&options);
+    let mut measured = measure(&gate);
+    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
+    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let name = "rayon on 1 thread: sweep over bp, total";
+    edit(baselines.path_here(), |json| json["baseline"]["runs"]["quick"]["speed_ups"][name] = 1e9.into());
+    let mut calm = judge(&gate, &measured);
+    calm.repeat(&measured);
+    assert_eq!(calm.failures().len(), 1);
+
+    measured.conditions.copy_gb_per_s /= 2.0;
+    let mut disturbed = judge(&gate, &measured);
+    disturbed.repeat(&measured);
+    assert!(disturbed.failures().is_empty() && disturbed.is_partial(), "{:?}", disturbed.failures());
+    assert!(
+        disturbed.summary().contains("1 not, because it is too noisy to judge: the caches copied at 50 %"),
+        "{}",
+        disturbed.summary()
+    );
+    assert!(page(&disturbed).contains("| too noisy |") && page(&disturbed).contains("* Disturbed: "));
+}
+
+#[test]
 fn what_is_expected_and_not_measured_fails() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(folder.path());
     let gate = gate(&options);
-    let mut measured = gate.measure(&Watch::default()).unwrap();
+    let mut measured = measure(&gate);
     let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
     gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
     measured.ratios.pop();

@@ -25,6 +25,8 @@ pub(super) enum Verdict {
     Better,
     /// The whole interval is below that range.
     Worse,
+    /// It was worse, but something disturbed a measurement.
+    TooNoisy,
     /// No baseline to compare with.
     NoBaseline,
 }
@@ -55,6 +57,7 @@ impl Verdict {
             Self::AsBefore => "as before",
             Self::Better => "better",
             Self::Worse => "WORSE",
+            Self::TooNoisy => "too noisy",
             Self::NoBaseline => "no baseline",
         }
     }
