@@ -17,6 +17,14 @@ struct Seed {
 override LARGEST_COST: u32 = 0;
 override OUT_OF_RANGE_COST: u32 = 0;
 
+// The columns of both images to the left of the nodes.
+override MARGIN: u32 = 0;
+
+// The width of both images.
+fn pair_width() -> u32 {
+    return MARGIN + parameters.width;
+}
+
 fn difference(a: vec4<u32>, b: vec4<u32>) -> vec4<u32> {
     return max(a, b) - min(a, b);
 }
@@ -76,9 +84,9 @@ fn touches_seed(nodes: Nodes) -> vec4<bool> {
 // The costs of one label at four nodes; 0 beyond the border.
 fn costs(nodes: Nodes, at_left: vec4<u32>, seeded: vec4<bool>, label: u32) -> vec4<u32> {
     let x = columns(nodes);
-    let match_x = vec4<i32>(x) - (parameters.min_disparity + i32(label));
-    let inside = (match_x >= vec4(0)) & (match_x < vec4(i32(parameters.width)));
-    let safe = select(vec4(0u), vec4<u32>(match_x), inside) + nodes.y * parameters.width;
+    let match_x = vec4<i32>(MARGIN + x) - (parameters.min_disparity + i32(label));
+    let inside = (match_x >= vec4(0)) & (match_x < vec4(i32(pair_width())));
+    let safe = select(vec4(0u), vec4<u32>(match_x), inside) + nodes.y * pair_width();
     let at_right = vec4(right[safe.x], right[safe.y], right[safe.z], right[safe.w]);
     var cost = select(vec4(OUT_OF_RANGE_COST), compare(at_left, at_right), inside);
     let seed_cost = select(LARGEST_COST, 0u, max(label, seed.label) - min(label, seed.label) <= 1);
@@ -92,7 +100,7 @@ fn match_cost(@builtin(global_invocation_id) id: vec3<u32>) {
     if !nodes.exist {
         return;
     }
-    let x = min(columns(nodes), vec4(parameters.width - 1)) + nodes.y * parameters.width;
+    let x = MARGIN + min(columns(nodes), vec4(parameters.width - 1)) + nodes.y * pair_width();
     let at_left = vec4(left[x.x], left[x.y], left[x.z], left[x.w]);
     let seeded = touches_seed(nodes);
     var least = vec4(0xffffffffu);

@@ -129,7 +129,8 @@ pub trait Device: Send + Sync {
 /// A kernel may only enqueue its work, in the order of the calls; [`Solver::select_labels`] then waits for all of it.
 /// Such a device reports the actual time of each stage through [`Solver::device_times`].
 pub trait Solver: Send {
-    /// Computes the data costs of grid 0 from a pair. A `seed` sets the costs around the cut.
+    /// Computes the data costs of grid 0 from a pair of the size [`Plan::pair_size`]. Its nodes begin at the column
+    /// [`Plan::margin`]. A `seed` sets the costs around the cut.
     ///
     /// # Errors
     /// Errors of the device.

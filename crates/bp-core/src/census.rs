@@ -2,7 +2,7 @@
 
 use std::{array, ops::Range};
 
-use crate::{Image, Model, Node, StereoPair, image::grey};
+use crate::{Image, Model, Node, Plan, StereoPair, image::grey};
 
 /// Half the length of the strip that is compared around the centre: the "length scan" of the thesis.
 const HALF_LENGTH: usize = 10;
@@ -149,6 +149,13 @@ pub fn find_match(pair: &StereoPair, model: &Model, node: Node) -> Option<Seed> 
     };
     let scores = (0..model.labels() as u16).filter_map(|label| Some((score(label)?, label)));
     scores.min().map(|(_, label)| Seed { x, y, label })
+}
+
+/// The seed of a plan whose cut starts from the match of that point; `None` for other plans, or without a match.
+#[must_use]
+pub fn seed(pair: &StereoPair, plan: &Plan) -> Option<Seed> {
+    let cut = plan.settings().cut.filter(|cut| cut.seed_start)?;
+    find_match(pair, plan.model(), Node { x: cut.x, y: cut.y })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{Device, DisparityMap, Error, Node, Plan, Schedule, Side, Solver, Stage, StereoPair, census, memory};
+use crate::{Device, DisparityMap, Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, census, memory};
 
 /// The times of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -136,17 +136,34 @@ impl Driver {
         self.solve_from(pair, if self.has_answer { Start::Warm } else { Start::Cold }, observer)
     }
 
+    /// [`Driver::solve`] with a given seed instead of the plan's own.
+    ///
+    /// # Errors
+    /// As [`Driver::solve`].
+    pub fn solve_seeded(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<Times, Error> {
+        self.solve_with(pair, |_, _| seed, Start::Cold, &mut |_| ControlFlow::Continue(()))
+    }
+
     fn solve_from(&mut self, pair: &StereoPair, from: Start, observer: &mut Observer<'_>) -> Result<Times, Error> {
-        if pair.size() != self.plan.image_size() {
-            let (found, expected) = (pair.size(), self.plan.image_size());
+        self.solve_with(pair, census::seed, from, observer)
+    }
+
+    fn solve_with(
+        &mut self,
+        pair: &StereoPair,
+        seed: impl FnOnce(&StereoPair, &Plan) -> Option<Seed>,
+        from: Start,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        if pair.size() != self.plan.pair_size() {
+            let (found, expected) = (pair.size(), self.plan.pair_size());
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
         self.has_answer = false;
         let Self { plan, solver, labels, .. } = self;
         let mut times = Times::default();
         let start = Instant::now();
-        let seed = plan.settings().cut.filter(|cut| cut.seed_start);
-        let seed = seed.and_then(|cut| census::find_match(pair, plan.model(), Node { x: cut.x, y: cut.y }));
+        let seed = seed(pair, plan);
         timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
         for grid in 1..from.grids(plan) {
             timed(&mut times, Stage::Coarsen, || solver.coarsen(grid))?;

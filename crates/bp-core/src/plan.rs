@@ -14,6 +14,7 @@ pub struct Plan {
     model: Model,
     settings: Settings,
     sizes: Vec<Size>,
+    margin: usize,
 }
 
 impl Plan {
@@ -45,7 +46,12 @@ impl Plan {
         }
         let sizes =
             std::iter::successors(Some(size), |size| Some(size.coarser())).take(settings.grids as usize).collect();
-        Ok(Self { model, settings, sizes })
+        Ok(Self { model, settings, sizes, margin: 0 })
+    }
+
+    /// The same plan for pairs that have more columns on the left, which its nodes do not cover but match.
+    pub(crate) fn with_margin(self, margin: usize) -> Self {
+        Self { margin, ..self }
     }
 
     /// The labels, the data cost and the smoothness.
@@ -70,6 +76,19 @@ impl Plan {
     #[must_use]
     pub fn image_size(&self) -> Size {
         self.sizes[0]
+    }
+
+    /// The number of columns to the left of the nodes of grid 0 that a pair has; not 0 only for a [`crate::Part`]. The nodes
+    /// match these columns of the right image.
+    #[must_use]
+    pub fn margin(&self) -> usize {
+        self.margin
+    }
+
+    /// The size of a pair: that of the image with the margin.
+    #[must_use]
+    pub fn pair_size(&self) -> Size {
+        Size { width: self.sizes[0].width + self.margin, ..self.sizes[0] }
     }
 
     /// The size of a grid.
@@ -190,7 +209,7 @@ impl Plan {
         let pixels = self.image_size().pixels() as u64;
         let channels = self.model.profile().channels() as u64;
         let mut buffers = vec![
-            Buffer { name: "images", grid: 0, bytes: 2 * channels * pixels },
+            Buffer { name: "images", grid: 0, bytes: 2 * channels * self.pair_size().pixels() as u64 },
             Buffer { name: "labels", grid: 0, bytes: 2 * pixels },
         ];
         for grid in 0..self.grids() {

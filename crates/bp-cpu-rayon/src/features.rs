@@ -1,7 +1,7 @@
 //! Features: the few bytes of each pixel that a profile compares.
 
 use bp_core::{
-    Error, Image, Model, Node, Profile, Size, StereoPair,
+    Error, Image, Node, Plan, Profile, Size, StereoPair,
     census::{INNER, Neighbours, OUTER},
     image::{APRON, grey},
     memory,
@@ -26,10 +26,9 @@ pub(crate) struct Features {
 }
 
 impl Features {
-    /// Allocates room for pairs of `size`.
-    pub(crate) fn new(size: Size, model: &Model) -> Result<Self, Error> {
-        let profile = model.profile();
-        let lanes = shape::lanes(size);
+    /// Allocates room for the pairs of a plan.
+    pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
+        let (size, profile, lanes) = (plan.pair_size(), plan.model().profile(), lanes(plan));
         let rows = 2 * profile.channels() * size.height;
         let padded = || memory::filled("neighbours' values", padded_bytes(size, profile), 0);
         let inside = |parity: usize| {
@@ -91,9 +90,14 @@ fn load_image(level: Level, profile: Profile, image: &Image, padded: &mut [u8], 
     rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows)));
 }
 
+/// The lanes of a row. Behind a margin, a strip of nodes may begin anywhere, and still ends with a whole block.
+fn lanes(plan: &Plan) -> usize {
+    shape::lanes(plan.pair_size()) + if plan.margin() > 0 { BLOCK } else { 0 }
+}
+
 /// The bytes that [`Features`] will hold.
-pub(crate) fn bytes(size: Size, model: &Model) -> u64 {
-    let (lanes, profile) = (shape::lanes(size), model.profile());
+pub(crate) fn bytes(plan: &Plan) -> u64 {
+    let (size, lanes, profile) = (plan.pair_size(), lanes(plan), plan.model().profile());
     let rows = 2 * profile.channels() * size.height;
     (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * padded_bytes(size, profile)) as u64
 }

@@ -25,13 +25,13 @@ impl Greys {
         Ok(Self { shape: Shape::new(plan, grid), edges: *plan.model().edges(), values })
     }
 
-    /// Loads the grey values of an image.
-    pub(crate) fn load(&mut self, level: Level, image: &Image) {
-        let (shape, width) = (self.shape, self.shape.size.width);
+    /// Loads the grey values of an image from column `margin` on.
+    pub(crate) fn load(&mut self, level: Level, image: &Image, margin: usize) {
+        let shape = self.shape;
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
         rows.for_each(|(y, row)| {
             let [even, odd] = planes_mut(&shape, row);
-            let pixels = &image.pixels()[y * width..][..width];
+            let pixels = &image.pixels()[y * image.size().width + margin..][..shape.size.width];
             dispatch!(level, simd => deal(simd, pixels, even, odd));
         });
     }

@@ -176,8 +176,9 @@ impl Row<'_> {
     ) -> [u8; STRIP] {
         let Matching { features, layout, plan, .. } = self.matching;
         let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let left = channels::<CHANNELS>(|channel| strip.of(features.left(self.y, channel, plane)));
-        let node = strip.of(&features.inside(plane)[BLOCK..]);
+        let (own, offset) = self.own(plane);
+        let left = channels::<CHANNELS>(|channel| strip.of(&features.left(self.y, channel, own)[offset..]));
+        let node = strip.of(&features.inside(own)[BLOCK + offset..]);
         let right = [0, 1].map(|parity| {
             let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
             (right, features.inside(parity))
@@ -223,11 +224,19 @@ impl Row<'_> {
     #[inline(always)]
     fn lanes(&self, start: BlockStart, label: usize) -> (usize, usize) {
         let BlockStart { plane, lane } = start;
-        // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
-        let shift = plane as i64 - i64::from(self.matching.plan.model().disparity(label as u16));
+        let Matching { plan, .. } = self.matching;
+        // Left column 2i + p, with p = plane + margin, matches right column 2i + p - d, which is lane i + (p - d) div 2.
+        let shift = (plan.margin() + plane) as i64 - i64::from(plan.model().disparity(label as u16));
         let (parity, shift) = ((shift & 1) as usize, shift >> 1);
-        let nodes = self.matching.layout.nodes(parity) as i64;
+        let nodes = (plan.pair_size().width + 1 - parity) as i64 / 2;
         (parity, ((lane as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
+    }
+
+    /// Where lane 0 of a plane is in the features of a row: the parity of its column in the pair, and the lane there.
+    #[inline(always)]
+    fn own(&self, plane: usize) -> (usize, usize) {
+        let column = self.matching.plan.margin() + plane;
+        (column % 2, column / 2)
     }
 
     /// The features that a block of nodes of a plane compares under a label.
@@ -235,11 +244,12 @@ impl Row<'_> {
     fn block(&self, at: BlockStart, label: usize, channel: usize) -> Block<'_> {
         let BlockStart { plane, lane } = at;
         let (parity, start) = self.lanes(at, label);
+        let (own, offset) = self.own(plane);
         Block {
-            left: block(self.matching.features.left(self.y, channel, plane), lane),
+            left: block(self.matching.features.left(self.y, channel, own), lane + offset),
             right: block(self.matching.features.right(self.y, channel, parity), start),
             inside: block(self.matching.features.inside(parity), start),
-            node: block(self.matching.features.inside(plane), lane + BLOCK),
+            node: block(self.matching.features.inside(own), lane + offset + BLOCK),
         }
     }
 }

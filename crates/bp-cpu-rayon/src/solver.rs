@@ -72,7 +72,7 @@ fn bytes(plan: &Plan, labels: usize) -> u64 {
     let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
     let messages = kept.map(|grid| 2 * half_steps::bytes(&Shape::new(plan, grid)) as u64);
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
-    let features = features::bytes(plan.image_size(), plan.model());
+    let features = features::bytes(plan);
     costs.chain(messages).chain(layouts).chain([features, sweep::bytes(plan, labels)]).fold(0, u64::saturating_add)
 }
 
@@ -85,7 +85,7 @@ impl RayonSolver {
         Ok(Self {
             level,
             layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect::<Result<_, _>>()?,
-            features: Features::new(plan.image_size(), plan.model())?,
+            features: Features::new(plan)?,
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
             messages: [messages(0)?, messages(1)?],
             swept: Swept::new(plan)?,
@@ -144,7 +144,7 @@ fn received_in(plan: &Plan) -> [usize; 2] {
 impl Solver for RayonSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         self.features.load(self.level, pair);
-        self.layouts[0].greys.load(self.level, pair.left());
+        self.layouts[0].greys.load(self.level, pair.left(), self.plan.margin());
         self.seed = seed;
         if is_stored(&self.plan, 0) {
             let mut costs = std::mem::replace(&mut self.costs[0], Costs::none());

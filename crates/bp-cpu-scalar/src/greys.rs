@@ -16,10 +16,10 @@ impl Greys {
         Ok(Self { model: *plan.model(), size: plan.size(grid), values })
     }
 
-    /// Loads the grey values of an image.
-    pub(crate) fn load(&mut self, image: &Image) {
+    /// Loads the grey values of an image from column `margin` on.
+    pub(crate) fn load(&mut self, image: &Image, margin: usize) {
         for (node, value) in self.values.iter_mut().enumerate() {
-            *value = image.grey(node % self.size.width, node / self.size.width);
+            *value = image.grey(margin + node % self.size.width, node / self.size.width);
         }
     }
 

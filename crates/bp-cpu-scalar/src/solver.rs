@@ -30,7 +30,7 @@ impl ScalarSolver {
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
         let labels = plan.model().labels();
         Ok(Self {
-            data_cost: DataCost::new(plan.image_size(), *plan.model())?,
+            data_cost: DataCost::new(plan.pair_size(), *plan.model())?,
             costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid)).collect::<Result<_, _>>()?,
             greys: (0..plan.grids()).map(|grid| Greys::new(plan, grid)).collect::<Result<_, _>>()?,
             messages: (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid)).collect::<Result<_, _>>()?,
@@ -45,9 +45,10 @@ impl ScalarSolver {
 
 impl Solver for ScalarSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
+        let seed = seed.map(|seed| Seed { x: seed.x + self.plan.margin(), ..seed });
         self.data_cost.load(pair, seed)?;
-        self.greys[0].load(pair.left());
-        match_cost(&self.data_cost, self.plan.image_size(), &mut self.costs[0], &mut self.scratch);
+        self.greys[0].load(pair.left(), self.plan.margin());
+        match_cost(&self.data_cost, &self.plan, &mut self.costs[0], &mut self.scratch);
         Ok(())
     }
 

@@ -85,7 +85,10 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
         let needed = Kernel::most_bindings();
         return unsupported(format!("a kernel needs {needed} buffers and it allows {}", limits.bindings));
     }
-    let width = plan.image_size().width;
+    if plan.margin() > 0 && !plan.model().edges().is_uniform() {
+        return unsupported("a part with a plan of its own needs edges of one cost here".to_owned());
+    }
+    let width = plan.pair_size().width;
     if width.div_ceil(WORKGROUP as usize) > limits.workgroups as usize {
         let most = limits.workgroups as usize * WORKGROUP as usize;
         return unsupported(format!("a row has {width} pixels and it computes at most {most} at a time"));

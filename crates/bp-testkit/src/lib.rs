@@ -20,6 +20,7 @@ mod difference;
 pub mod jumps;
 mod noise;
 mod oracle;
+mod parts;
 mod random;
 mod suite;
 pub mod synthetic;

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
 
 use crate::{
-    Answer, Case, Difference, Fault, cases, difference::same, noise_pair, random_case, solve, videos::compare_videos,
+    Answer, Case, Difference, Fault, cases, difference::same, noise_pair, parts::compare_parts, random_case, solve,
+    videos::compare_videos,
 };
 
 /// Bytes of scratch memory that a device may allocate beyond its plan.
@@ -29,6 +30,7 @@ pub fn conform(reference: &dyn Device, tested: &dyn Device) -> Result<(), Differ
 pub fn conform_every(n: usize, reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
     cases().step_by(n).try_for_each(|case| compare(reference, tested, &case))?;
     compare_videos(reference, tested)?;
+    compare_parts(reference, tested)?;
     short_cases().try_for_each(|case| {
         forgets(tested, &case)?;
         allocates_as_planned(tested, &case.plan)

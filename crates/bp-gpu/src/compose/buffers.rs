@@ -44,7 +44,7 @@ pub(crate) struct Buffers {
 
 impl Buffers {
     pub(crate) fn new(plan: &Plan, grids: &[Grid]) -> Self {
-        let size = plan.image_size();
+        let (size, pair_size) = (plan.image_size(), plan.pair_size());
         let mut list = Vec::new();
         let mut add = |name, bytes: u64, memory| {
             list.push(Buffer { name, bytes: bytes.next_multiple_of(BUFFER_ALIGNMENT), memory });
@@ -52,12 +52,12 @@ impl Buffers {
         };
         // In the order of Program::PARAMETERS, UPLOAD and DOWNLOAD. The size of the first is not known yet.
         add("parameters", 0, Memory::Device);
-        add("upload", 2 * image_bytes(size) + SEED_BYTES, Memory::Upload);
+        add("upload", 2 * image_bytes(pair_size) + SEED_BYTES, Memory::Upload);
         add("download", label_bytes(size), Memory::Download);
         let mut device = |name, bytes| add(name, bytes, Memory::Device);
-        let features = 4 * size.pixels() as u64;
+        let features = 4 * pair_size.pixels() as u64;
         Self {
-            images: [(); 2].map(|()| device("images", image_bytes(size))),
+            images: [(); 2].map(|()| device("images", image_bytes(pair_size))),
             features: [(); 2].map(|()| device("features", features)),
             seed: device("seed", SEED_BYTES),
             labels: (0..plan.grids())

@@ -20,7 +20,7 @@ const START_ZERO: u32 = 3;
 
 impl Composer<'_> {
     pub(super) fn match_cost(&mut self, part: &mut PartRecorder) {
-        let (buffers, size) = (self.buffers, self.plan.image_size());
+        let (buffers, size) = (self.buffers, self.plan.pair_size());
         let image = image_bytes(size);
         let upload =
             |to, from_offset, bytes| Command::Copy { from: Program::UPLOAD, from_offset, to, to_offset: 0, bytes };
@@ -47,6 +47,7 @@ impl Composer<'_> {
                 ("LARGEST_COST", compared.max_cost().into()),
                 ("OUT_OF_RANGE_COST", compared.out_of_range_cost().into()),
                 ("SUM_BYTES", self.grids[0].sum_bytes as u32),
+                ("MARGIN", self.plan.margin() as u32),
             ];
             let pipeline = Pipeline { kernel: Kernel::MatchCost, constants };
             let [left, right] = buffers.features;
