@@ -136,12 +136,17 @@ impl Driver {
         self.solve_from(pair, if self.has_answer { Start::Warm } else { Start::Cold }, observer)
     }
 
-    /// [`Driver::solve`] with a given seed instead of the plan's own.
+    /// [`Driver::solve_observed`] with a given seed instead of the plan's own.
     ///
     /// # Errors
-    /// As [`Driver::solve`].
-    pub fn solve_seeded(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<Times, Error> {
-        self.solve_with(pair, |_, _| seed, Start::Cold, &mut |_| ControlFlow::Continue(()))
+    /// As [`Driver::solve_observed`].
+    pub fn solve_seeded(
+        &mut self,
+        pair: &StereoPair,
+        seed: Option<Seed>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        self.solve_with(pair, |_, _| seed, Start::Cold, observer)
     }
 
     fn solve_from(&mut self, pair: &StereoPair, from: Start, observer: &mut Observer<'_>) -> Result<Times, Error> {

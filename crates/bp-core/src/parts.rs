@@ -1,14 +1,17 @@
 //! The parts of an image that is cut, each with a plan of its own.
 
 use std::{
-    ops::Range,
+    ops::{ControlFlow, Range},
     sync::{Mutex, PoisonError},
     time::Instant,
 };
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use crate::{Device, Driver, Error, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census, memory};
+use crate::{
+    Device, Driver, Error, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census, finish::IsStopped,
+    memory,
+};
 
 /// A part of a cut image with a plan of its own. No message crosses the cut, so its messages and labels are the same bits as
 /// those that the plan of the whole image gives its nodes.
@@ -87,6 +90,18 @@ impl Part {
         Some(Seed { x, y: seed.y.checked_sub(self.rows.start)?, ..seed })
     }
 
+    /// Solves it on its own driver.
+    fn solve(
+        &self,
+        driver: &mut Driver,
+        pair: &StereoPair,
+        seed: Option<Seed>,
+        is_stopped: IsStopped<'_>,
+    ) -> Result<Times, Error> {
+        let stop = |_| if is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        driver.solve_seeded(&self.pair(pair), seed.and_then(|seed| self.seed(seed)), &mut { stop })
+    }
+
     /// Copies its labels to those of the whole image, `[height][width]`.
     fn give(&self, labels: &[u16], width: usize, whole: &mut [u16]) {
         for (y, labels) in self.rows.clone().zip(labels.chunks_exact(self.columns.len())) {
@@ -108,8 +123,7 @@ pub enum Parting {
 }
 
 /// Matches pairs of images part by part.
-pub struct PartDriver<'a> {
-    device: &'a dyn Device,
+pub struct PartDriver {
     whole: Plan,
     parts: Vec<Part>,
     parting: Parting,
@@ -121,12 +135,12 @@ pub struct PartDriver<'a> {
     labels: Vec<u16>,
 }
 
-impl<'a> PartDriver<'a> {
+impl PartDriver {
     /// Allocates everything for a plan with a cut: all parts side by side, or the first part.
     ///
     /// # Errors
     /// Those of [`Part::all`] and [`Device::prepare`].
-    pub fn new(device: &'a dyn Device, whole: Plan, parting: Parting) -> Result<Self, Error> {
+    pub fn new(device: &dyn Device, whole: Plan, parting: Parting) -> Result<Self, Error> {
         let parts = Part::all(&whole)?;
         let prepared = if parting == Parting::InTurn { &parts[..1] } else { &parts };
         let drivers =
@@ -137,13 +151,20 @@ impl<'a> PartDriver<'a> {
         };
         let labels = memory::filled("labels", whole.image_size().pixels(), 0)?;
         let most_bytes = drivers.iter().map(Driver::allocated_bytes).sum();
-        Ok(Self { device, whole, parts, parting, drivers, pools: pools?, most_bytes, labels })
+        Ok(Self { whole, parts, parting, drivers, pools: pools?, most_bytes, labels })
     }
 
-    /// The plan of the whole image.
-    #[must_use]
-    pub fn plan(&self) -> &Plan {
-        &self.whole
+    /// The bytes that a device will allocate for a plan with a cut.
+    ///
+    /// # Errors
+    /// Those of [`Part::all`].
+    pub fn planned_bytes(device: &dyn Device, whole: &Plan, parting: Parting) -> Result<u64, Error> {
+        let parts = Part::all(whole)?;
+        let bytes = parts.iter().map(|part| device.planned_bytes(&part.plan));
+        Ok(match parting {
+            Parting::SideBySide { .. } => bytes.fold(0, u64::saturating_add),
+            Parting::InTurn => bytes.max().unwrap_or(0),
+        })
     }
 
     /// The most bytes that were allocated at a time.
@@ -158,11 +179,12 @@ impl<'a> PartDriver<'a> {
         &self.labels
     }
 
-    /// Matches a pair. Times of stages are sums over the parts, whichever of them ran at the same time.
+    /// Matches a pair on the device that it was prepared for, where parts in turn are prepared one by one. Times of stages are sums over the parts, whichever of them ran at the same time.
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the pair does not have the plan's size, errors of the device, and [`Error::OutOfMemory`].
-    pub fn solve(&mut self, pair: &StereoPair) -> Result<Times, Error> {
+    /// [`Error::WrongSize`] if the pair does not have the plan's size, errors of the device, [`Error::OutOfMemory`], and
+    /// [`Error::Stopped`].
+    pub fn solve(&mut self, device: &dyn Device, pair: &StereoPair, is_stopped: IsStopped<'_>) -> Result<Times, Error> {
         if pair.size() != self.whole.image_size() {
             let (found, expected) = (pair.size(), self.whole.image_size());
             return Err(Error::WrongSize { what: "the pair", found, expected });
@@ -170,20 +192,25 @@ impl<'a> PartDriver<'a> {
         let start = Instant::now();
         let seed = census::seed(pair, &self.whole);
         let times = match self.parting {
-            Parting::SideBySide { .. } => self.solve_side_by_side(pair, seed)?,
-            Parting::InTurn => self.solve_in_turn(pair, seed)?,
+            Parting::SideBySide { .. } => self.solve_side_by_side(pair, seed, is_stopped)?,
+            Parting::InTurn => self.solve_in_turn(device, pair, seed, is_stopped)?,
         };
         Ok(Times { total: start.elapsed(), ..times })
     }
 
-    fn solve_side_by_side(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<Times, Error> {
+    fn solve_side_by_side(
+        &mut self,
+        pair: &StereoPair,
+        seed: Option<Seed>,
+        is_stopped: IsStopped<'_>,
+    ) -> Result<Times, Error> {
         let queue = Mutex::new(self.parts.iter().zip(&mut self.drivers));
         let work = || {
             let mut times = Times::default();
             // The lock is held only while the next part is taken.
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             while let Some((part, driver)) = next() {
-                times += driver.solve_seeded(&part.pair(pair), seed.and_then(|seed| part.seed(seed)))?;
+                times += part.solve(driver, pair, seed, is_stopped)?;
             }
             Ok(times)
         };
@@ -195,16 +222,22 @@ impl<'a> PartDriver<'a> {
         Ok(times)
     }
 
-    fn solve_in_turn(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<Times, Error> {
+    fn solve_in_turn(
+        &mut self,
+        device: &dyn Device,
+        pair: &StereoPair,
+        seed: Option<Seed>,
+        is_stopped: IsStopped<'_>,
+    ) -> Result<Times, Error> {
         let (width, mut times) = (self.whole.image_size().width, Times::default());
         for part in &self.parts {
             if self.drivers.first().is_none_or(|driver| *driver.plan() != part.plan) {
                 // The old one goes before the new one comes: there is room for one.
                 self.drivers.clear();
-                self.drivers.push(Driver::new(self.device, part.plan.clone())?);
+                self.drivers.push(Driver::new(device, part.plan.clone())?);
             }
             let driver = &mut self.drivers[0];
-            times += driver.solve_seeded(&part.pair(pair), seed.and_then(|seed| part.seed(seed)))?;
+            times += part.solve(driver, pair, seed, is_stopped)?;
             self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
             part.give(driver.labels(), width, &mut self.labels);
         }

@@ -1,7 +1,10 @@
 //! The parts of a cut image, solved with plans of their own, against the plan of the whole image.
 
+use std::ops::ControlFlow;
+
 use bp_core::{
     Algorithm, Cut, Device, Driver, Error, Model, Part, PartDriver, Parting, Profile, Schedule, Settings, Side, census,
+    finish::never,
 };
 
 use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve};
@@ -43,7 +46,7 @@ pub(crate) fn compare_parts(reference: &dyn Device, tested: &dyn Device) -> Resu
 fn solve_part(device: &dyn Device, case: &Case, part: &Part) -> Result<Answer, Error> {
     let seed = census::seed(&case.pair, &case.plan).and_then(|seed| part.seed(seed));
     let mut driver = Driver::new(device, part.plan().clone())?;
-    driver.solve_seeded(&part.pair(&case.pair), seed)?;
+    driver.solve_seeded(&part.pair(&case.pair), seed, &mut |_| ControlFlow::Continue(()))?;
     Answer::of(&mut driver)
 }
 
@@ -63,8 +66,8 @@ fn put(part: &Part, answer: &Answer, case: &Case, whole: &mut Answer) {
 /// Solves twice, because a driver of parts in turn has another part's memory the second time.
 fn compare_driver(device: &dyn Device, case: &Case, expected: &Answer, parting: Parting) -> Result<(), Fault> {
     let mut driver = PartDriver::new(device, case.plan.clone(), parting)?;
-    driver.solve(&case.pair)?;
-    driver.solve(&case.pair)?;
+    driver.solve(device, &case.pair, &never)?;
+    driver.solve(device, &case.pair, &never)?;
     let found = Answer { labels: driver.labels().to_vec(), ..expected.clone() };
     same(expected, &found, case).map_err(|difference| *difference.fault)
 }

@@ -142,8 +142,26 @@ pub struct Cell {
     pub device: Option<Device>,
     /// The settings of the run.
     pub settings: Settings,
+    /// How it used the workers, if not all of them on the whole image. Records from before 2026-11-23 lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arrangement: Option<Arrangement>,
     /// The result.
     pub outcome: Outcome,
+}
+
+/// How a plan uses the workers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Arrangement {
+    /// One worker has the whole image.
+    OneWorker,
+    /// Each of the four parts of a cut image has a plan of its own. Workers of one thread take one part after another.
+    SideBySide {
+        /// The number of workers.
+        workers: usize,
+    },
+    /// Each of the four parts has a plan of its own. All workers share one part after another, in the memory of one.
+    InTurn,
 }
 
 /// A measurement, or why it is missing.

@@ -7,7 +7,7 @@ use super::{
     format::{Spread, mebibytes, number},
     legend,
     results::{Part, Results, Row},
-    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family},
+    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family, with_parts},
 };
 use crate::{failure::Failure, record::Measurement};
 
@@ -44,7 +44,8 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
         (&CTCSBP, numbers("4.9", "3.26"), Some(numbers("4.10", "3.27")), numbers("4.11", "3.28")),
     ] {
         let what = format!("{} against BP", family(plans));
-        let with_bp = [&[BP], plans].concat();
+        let plans = &with_parts(results, plans);
+        let with_bp = [&[BP], plans.as_slice()].concat();
         drawings.push(speed_ups(results, speed, &what, plans, &both)?);
         drawings.extend(memory.map(|memory| memories(results, memory, &what, &with_bp)).transpose()?);
         drawings.push(errors(results, reliability, &what, &with_bp)?);
@@ -69,7 +70,8 @@ fn speed_ups(
 ) -> Result<Drawing, Failure> {
     let group = |plan: &Named| {
         let mut group = Group::default();
-        for &part in parts {
+        let overlaps = results.rows().any(|row| row.workers(plan.plan).is_some());
+        for &part in parts.iter().filter(|&&part| part == Part::Total || !overlaps) {
             let (name, fill) = match part {
                 Part::MessagePassing => ("message passing", Fill::Pale),
                 Part::Total => ("total", Fill::Solid),
@@ -77,14 +79,16 @@ fn speed_ups(
             let name = format!("{}: {name}", plan.title);
             group.add_measured(results, plan, name, fill, |row| row.speed_up(plan.plan, part));
         }
-        group.add_printed(results, plan);
+        if plan.printed.is_some() {
+            group.add_printed(results, plan);
+        }
         group
     };
     let axis = Axis::logarithmic("time of BP / time of the plan");
     let chart = chart(results, format!("{what}: speed-up"), axis, plans.iter().map(group), Some(1.0));
     let pale = if parts.len() == 1 { "" } else { " Pale markers show message passing alone." };
     let caption = format!(
-        "A value above 1 is faster than BP. Filled markers show the total time, measured in this run. Hollow markers beside \
+        "A value above 1 is faster than BP; parts side by side are compared with BP on one worker. Filled markers show the total time, measured in this run. Hollow markers beside \
          them show what the thesis prints for the same plan on its GPU.{pale} Whiskers are ranges over rounds."
     );
     drawing(numbers, chart, &caption)

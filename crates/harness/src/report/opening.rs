@@ -19,8 +19,9 @@ const WHY: [&str; 3] = [
     "The thesis measured CUDA programs on a GeForce GTX 750 Ti, so compare speed-ups, not milliseconds.",
     "A model of its printed times says that about 40 % of BP's time was not message passing; here that share is small, \
      so CFBP and CFCSBP, which save message passing, can be much faster than BP.",
-    "The thesis ran the four parts of CTBP and CTCSBP at once, whereas here all workers share the whole image in every \
-     plan, BP's included, so cutting the image gains nothing but a smaller working set.",
+    "The thesis compares the four parts of CTBP and CTCSBP, run at once, with BP. Where all workers share the whole image in \
+     every plan, BP's included, a cut gains nothing but a smaller working set. The rows of parts side by side compare them \
+     with BP on one worker.",
 ];
 
 /// A part of the summary.

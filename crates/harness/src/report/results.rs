@@ -3,7 +3,7 @@
 use super::{format::Spread, thesis::Thesis};
 use crate::{
     failure::Failure,
-    record::{Cell, Device, Measurement, Outcome, Record, Sample, Scene},
+    record::{Arrangement, Cell, Device, Measurement, Outcome, Record, Sample, Scene},
     scenes,
 };
 
@@ -149,30 +149,58 @@ impl<'a> Row<'a> {
         self.cell(plan)?.measured()
     }
 
+    /// The plan that this one is compared with: BP, and on one worker if this one has a worker for each part.
+    fn base(&self, plan: &str) -> &'static str {
+        let one_worker = "bp-one-worker";
+        if self.workers(plan).is_some() && self.cell(one_worker).is_some() { one_worker } else { "bp" }
+    }
+
+    /// The number of workers of a plan that runs its parts side by side.
+    pub(super) fn workers(&self, plan: &str) -> Option<usize> {
+        match self.cell(plan)?.arrangement? {
+            Arrangement::SideBySide { workers } => Some(workers),
+            Arrangement::OneWorker | Arrangement::InTurn => None,
+        }
+    }
+
+    /// Whether the backend runs on the CPU, without an API in between.
+    pub(super) fn is_processor(&self) -> bool {
+        device(self.record, self.backend).is_some_and(|device| device.api.is_none())
+    }
+
     /// Why a plan has no numbers here.
     pub(super) fn missing(&self, plan: &str) -> &'a str {
         match self.cell(plan).map(|cell| &cell.outcome) {
             Some(Outcome::Error(error)) => error,
             Some(Outcome::Unavailable(_)) => UNAVAILABLE,
+            Some(Outcome::Measured(_)) => "-",
             _ => "not run",
         }
     }
 
-    /// A plan's times.
+    /// A plan's times. Of parts side by side, the stages have none: those of several workers overlap.
     pub(super) fn time(&self, plan: &str, part: Part) -> Option<Spread> {
+        if part == Part::MessagePassing && self.workers(plan).is_some() {
+            return None;
+        }
         Spread::of(self.measured(plan)?.samples.iter().map(|sample| part.ms(sample)))
+    }
+
+    /// The times of BP that a plan is compared with.
+    pub(super) fn base_time(&self, plan: &str, part: Part) -> Option<Spread> {
+        self.time(self.base(plan), part)
     }
 
     /// The speed-up of a plan over BP: the ratio of medians. Its range covers the ratios of samples from the same
     /// round, if there are at least three such rounds.
     pub(super) fn speed_up(&self, plan: &str, part: Part) -> Option<Spread> {
-        let (bp, other) = (self.measured("bp")?, self.measured(plan)?);
+        let median = self.base_time(plan, part)?.median / self.time(plan, part)?.median;
+        let (bp, other) = (self.measured(self.base(plan))?, self.measured(plan)?);
         let same_round = |a: &Sample| {
             let b = other.samples.iter().find(|b| b.round == a.round)?;
             Some(part.ms(a) / part.ms(b))
         };
         let ratios = Spread::of(bp.samples.iter().filter_map(same_round))?;
-        let median = self.time("bp", part)?.median / self.time(plan, part)?.median;
         let (low, high) = if ratios.count >= 3 { (ratios.low, ratios.high) } else { (median, median) };
         Some(Spread { median, low: low.min(median), high: high.max(median), count: ratios.count })
     }

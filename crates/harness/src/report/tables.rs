@@ -58,8 +58,13 @@ pub(super) struct Named {
 impl Named {
     /// Whether the image is cut into four parts.
     fn is_cut(&self) -> bool {
-        self.printed.is_some_and(|algorithm| algorithm.starts_with("ct"))
+        self.plan.starts_with("ct")
     }
+}
+
+/// A plan of the thesis whose parts have plans of their own.
+const fn of_parts(look: usize, plan: &'static str, title: &'static str, meaning: &'static str) -> Named {
+    Named { printed: None, ..named(look, plan, title, meaning) }
 }
 
 /// A plan of the thesis.
@@ -85,6 +90,21 @@ pub(super) const CTCSBP: [Named; 3] = [
     },
 ];
 
+/// CTBP and CTCSBP with their parts arranged otherwise.
+const OF_PARTS: [Named; 4] = [
+    of_parts(11, "ctbp-side-by-side", "CTBP, side by side", "CTBP, each part on a worker of its own"),
+    of_parts(12, "ctbp-in-turn", "CTBP, in turn", "CTBP, one part after another in the memory of one"),
+    of_parts(13, "ctcsbp-side-by-side", "CTCSBP, Z''''=2, side by side", "CTCSBP, each part on a worker of its own"),
+    of_parts(14, "ctcsbp-in-turn", "CTCSBP, Z''''=2, in turn", "CTCSBP, one part after another in the memory of one"),
+];
+
+/// These plans and, if the record has them, the same with their parts arranged otherwise.
+pub(super) fn with_parts(results: &Results<'_>, plans: &[Named]) -> Vec<Named> {
+    let is_run = |named: &&Named| results.record.cells.iter().any(|cell| cell.plan == named.plan);
+    let is_of = |named: &&Named| plans.iter().any(|plan| named.plan.starts_with(&format!("{}-", plan.plan)));
+    plans.iter().chain(OF_PARTS.iter().filter(is_run).filter(is_of)).copied().collect()
+}
+
 /// The tables of one algorithm: its plans, and the numbers of its speed, memory and reliability.
 const SINGLE: [(&[Named], [&str; 3]); 5] = [
     (&[BP], ["3.3", "3.4", "3.5"]),
@@ -104,6 +124,7 @@ pub fn of_times(plan: &str) -> (&'static str, &'static str) {
 pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
     let mut tables = vec![setting::computer(results), setting::images(results)];
     for (plans, [speed, memory, reliability]) in SINGLE {
+        let plans = &with_parts(results, plans);
         tables.push(measured::speed(results, speed, plans));
         tables.push(measured::memory(results, memory, plans));
         tables.push(measured::reliability(results, reliability, plans));
@@ -115,6 +136,7 @@ pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
         (&CTCSBP, ["3.26", "3.27", "3.28"]),
     ];
     for (plans, [speed, memory, reliability]) in against_bp {
+        let plans = &with_parts(results, plans);
         tables.push(compared::speed(results, speed, plans));
         tables.push(compared::memory(results, memory, plans));
         tables.push(compared::reliability(results, reliability, plans));

@@ -1,6 +1,10 @@
 //! The plans that run on every scene.
 
-use bp_core::{Algorithm, Error, LabelSet, Model, Plan, Profile, Schedule, Settings, Size};
+use bp_core::{
+    Algorithm, DeviceInfo, DeviceKind, Error, LabelSet, Model, Parting, Plan, Profile, Schedule, Settings, Size,
+};
+
+use crate::record::Arrangement;
 
 /// The default of Z'' and Z''''. The digit is missing in the thesis; this is the most likely one.
 const Z: u32 = 2;
@@ -20,6 +24,8 @@ pub struct Planned {
     fixed: Option<(u32, u32)>,
     /// Whether it uses label sets, from [`LabelSet::WORTHWHILE`] labels on.
     label_sets: bool,
+    /// How it uses the workers, if not all of them on the whole image.
+    pub arrangement: Option<Arrangement>,
 }
 
 /// The thesis's five algorithms, CTCSBP also with other digits, which fit its times better; and four plans of ours.
@@ -34,6 +40,7 @@ pub fn all() -> Vec<Planned> {
         schedule: Schedule::Sync,
         fixed: None,
         label_sets: false,
+        arrangement: None,
     };
     let mut plans: Vec<_> = Algorithm::THESIS.map(|algorithm| thesis(algorithm.name(), algorithm, Z)).into();
     plans.push(thesis("ctcsbp-z3", Algorithm::Ctcsbp, 3));
@@ -53,6 +60,25 @@ pub fn all() -> Vec<Planned> {
     plans
 }
 
+/// Those that arrange the workers otherwise: plain BP on one worker, and the parts of CTBP and CTCSBP side by side or in turn.
+pub fn arranged() -> Vec<Planned> {
+    let workers = rayon::current_num_threads().min(4);
+    let (side_by_side, in_turn) = (Arrangement::SideBySide { workers }, Arrangement::InTurn);
+    let arranged = [
+        ("bp-one-worker", "bp", Arrangement::OneWorker),
+        ("ctbp-side-by-side", "ctbp", side_by_side),
+        ("ctbp-in-turn", "ctbp", in_turn),
+        ("ctcsbp-side-by-side", "ctcsbp", side_by_side),
+        ("ctcsbp-in-turn", "ctcsbp", in_turn),
+    ];
+    let all = all();
+    let arranged = arranged.into_iter().filter_map(|(name, whole, arrangement)| {
+        let whole = *all.iter().find(|planned| planned.name == whole)?;
+        Some(Planned { name, arrangement: Some(arrangement), ..whole })
+    });
+    arranged.collect()
+}
+
 /// Name of our plan with census costs and few iterations.
 pub const CENSUS: &str = "census";
 
@@ -67,6 +93,20 @@ impl Planned {
         };
         let settings = Settings { label_sets: self.label_sets && labels >= LabelSet::WORTHWHILE, ..settings };
         Plan::new(size, model, settings)
+    }
+
+    /// Whether it differs on this device from the plan of the whole image with all workers.
+    pub fn suits(&self, info: &DeviceInfo) -> bool {
+        self.arrangement != Some(Arrangement::OneWorker) || info.kind == DeviceKind::Processor && info.workers > 1
+    }
+
+    /// How its parts share the machine, if they have plans of their own.
+    pub fn parting(&self) -> Option<Parting> {
+        match self.arrangement? {
+            Arrangement::OneWorker => None,
+            Arrangement::SideBySide { workers } => Some(Parting::SideBySide { workers }),
+            Arrangement::InTurn => Some(Parting::InTurn),
+        }
     }
 
     /// The iterations that its own are derived from; `None` if those are fixed.

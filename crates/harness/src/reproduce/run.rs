@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, path::Path};
 
-use bp_core::{Driver, Energy, Plan};
+use bp_core::{Device, DisparityMap, Energy, Error, PartDriver, Plan};
 use bp_io::{Files, Raster};
 use bp_stereo::{Event, Watch};
 use sha2::{Digest, Sha256};
@@ -15,7 +15,7 @@ use super::{
 use crate::{
     failure::Failure,
     files::hex,
-    measure::{Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_MS, Solve, take_turns},
+    measure::{Arranged, Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_MS, take_turns},
     record::{self, Cell, Measurement, Outcome, Sample, Settings},
     scenes::{Scene, Source},
 };
@@ -57,12 +57,12 @@ fn measure(
 ) -> Result<Vec<String>, Failure> {
     let run = storage.record().run.clone();
     let rules = Rules { rounds: run.samples, slow_rounds: 1, warm_up: false, fail_fast: false };
-    let plans = plans::all();
+    let plans: Vec<_> = plans::all().into_iter().chain(plans::arranged()).collect();
     let storage = RefCell::new(storage);
     let mut entrants = Vec::new();
     for scene in scenes {
         for planned in &plans {
-            for runner in Asked::opened(devices) {
+            for runner in Asked::opened(devices).filter(|runner| planned.suits(&runner.info)) {
                 entrants.push(entrant(scene, planned, runner, &storage)?);
             }
         }
@@ -103,11 +103,14 @@ fn add_scene(storage: &mut Storage, scene: &Scene, devices: &[Asked]) -> Result<
 /// The cells of a scene before they are run.
 fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<Vec<Cell>, Failure> {
     let mut cells = Vec::new();
-    for planned in plans::all() {
+    for planned in plans::all().into_iter().chain(plans::arranged()) {
         let plan = planned.plan(scene.pair.size(), run.labels, run.k)?;
         for Asked { name, runner } in devices {
+            if runner.as_ref().is_ok_and(|runner| !planned.suits(&runner.info)) {
+                continue;
+            }
             let settings = match runner {
-                Ok(runner) => runner.on_device(|device| Ok(Settings::new(&plan, Some(device), planned.algorithm)))?,
+                Ok(runner) => runner.on_device(|device| Ok(settings(&planned, &plan, device)?))?,
                 Err(_) => Settings::new(&plan, None, planned.algorithm),
             };
             cells.push(Cell {
@@ -116,11 +119,19 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
                 backend: name.clone(),
                 device: runner.as_ref().ok().map(|runner| (&runner.info).into()),
                 settings: Settings { k: planned.k(run.k), z: planned.z, ..settings },
+                arrangement: planned.arrangement,
                 outcome: runner.as_ref().map_or_else(|e| Outcome::Unavailable(e.clone()), |_| Outcome::Pending),
             });
         }
     }
     Ok(cells)
+}
+
+/// The settings and predictions of a plan on a device.
+fn settings(planned: &Planned, plan: &Plan, device: &dyn Device) -> Result<Settings, Error> {
+    let settings = Settings::new(plan, Some(device), planned.algorithm);
+    let Some(parting) = planned.parting() else { return Ok(settings) };
+    Ok(Settings { planned_bytes: PartDriver::planned_bytes(device, plan, parting)?, ..settings })
 }
 
 /// A cell that takes turns. Each turn prepares the plan again, and each sample is saved at once.
@@ -140,7 +151,8 @@ struct InCell<'a> {
 
 /// The result of a turn.
 struct Solved {
-    driver: Driver,
+    labels: Vec<u16>,
+    allocated_bytes: u64,
     labels_sha256: String,
 }
 
@@ -158,7 +170,7 @@ fn entrant<'a>(
     let index = record.cells.iter().position(is_it);
     let index = index.ok_or_else(|| Failure::other(format!("{name}, {plan}: not in the record")))?;
     let samples = record.cells[index].measured().map_or(&[][..], |measured| &measured.samples);
-    let shown = format!("{name:<11}{plan:<10}{:<8}", runner.name);
+    let shown = format!("{name:<11}{plan:<20}{:<8}", runner.name);
     let plan = planned.plan(scene.pair.size(), record.run.labels, record.run.k)?;
     Ok(Entrant::new(shown, InCell { scene, planned, plan, runner, storage, index, solved: None, disagrees: false })
         .resumed(samples))
@@ -166,17 +178,18 @@ fn entrant<'a>(
 
 impl Contestant for InCell<'_> {
     fn turn(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
-        let mut solve = Solve::prepare(self.runner, self.plan.clone(), &self.scene.pair)?;
+        let plan = self.plan.clone();
+        let mut solve = Arranged::prepare(self.runner, plan, &self.scene.pair, self.planned.arrangement)?;
         let sample = solve.sample(round, meter)?;
-        let (prepare_ms, compile_ms) = (Some(solve.prepare_ms), solve.compile_ms);
         let Self { scene, planned, runner, .. } = self;
-        let name = format!("{:<11}{:<10}{:<8}", scene.record.name, planned.name, runner.name);
+        let name = format!("{:<11}{:<20}{:<8}", scene.record.name, planned.name, runner.name);
         meter.line(&format!("{name}{:>10.1} ms", sample.total_ms));
-        let labels: Vec<u8> = solve.driver.labels().iter().flat_map(|label| label.to_le_bytes()).collect();
-        let labels_sha256 = hex(&Sha256::digest(labels));
+        let bytes: Vec<u8> = solve.labels().iter().flat_map(|label| label.to_le_bytes()).collect();
+        let labels_sha256 = hex(&Sha256::digest(bytes));
         self.check_labels(&labels_sha256)?;
-        self.solved = Some(Solved { driver: solve.driver, labels_sha256 });
-        Ok(Sample { prepare_ms, compile_ms, ..sample })
+        let (labels, allocated_bytes) = (solve.labels().to_vec(), solve.allocated_bytes());
+        self.solved = Some(Solved { labels, allocated_bytes, labels_sha256 });
+        Ok(sample)
     }
 
     fn keep(&mut self, taken: Result<&Sample, &Failure>) -> Result<(), Failure> {
@@ -197,12 +210,13 @@ impl Contestant for InCell<'_> {
 }
 
 impl InCell<'_> {
-    /// Fails unless all samples on all devices give the same labels.
+    /// Fails unless all samples on all devices give the same labels, in any arrangement.
     fn check_labels(&mut self, labels_sha256: &str) -> Result<(), Failure> {
         let storage = self.storage.borrow();
         let cells = &storage.record().cells;
         let cell = &cells[self.index];
-        let same = |other: &&Cell| other.scene == cell.scene && other.plan == cell.plan;
+        let unarranged = |cell: &Cell| Settings { planned_bytes: 0, ..cell.settings.clone() };
+        let same = |other: &&Cell| other.scene == cell.scene && unarranged(other) == unarranged(cell);
         let differs = |other: &&Cell| other.measured().is_some_and(|measured| measured.labels_sha256 != labels_sha256);
         let Some(other) = cells.iter().filter(same).find(differs) else { return Ok(()) };
         self.disagrees = true;
@@ -213,7 +227,7 @@ impl InCell<'_> {
     fn measured(&self, cell: &Cell, sample: &Sample, solved: Solved, folder: &Path) -> Result<Outcome, Failure> {
         let mut measurement = match cell.measured() {
             Some(measurement) => measurement.clone(),
-            None => first_measurement(cell, self.scene, &solved.driver, solved.labels_sha256, folder)?,
+            None => first_measurement(cell, self.scene, &self.plan, solved, folder)?,
         };
         measurement.samples.push(sample.clone());
         Ok(Outcome::Measured(Box::new(measurement)))
@@ -224,22 +238,22 @@ impl InCell<'_> {
 fn first_measurement(
     cell: &Cell,
     scene: &Scene,
-    driver: &Driver,
-    labels_sha256: String,
+    plan: &Plan,
+    solved: Solved,
     folder: &Path,
 ) -> Result<Measurement, Failure> {
-    let disparities = driver.disparities();
+    let disparities = DisparityMap::from_labels(plan.image_size(), plan.model(), &solved.labels);
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
     Raster::disparities(&disparities).write(&Files::default(), &folder.join(&map))?;
     Ok(Measurement {
         samples: Vec::new(),
-        allocated_bytes: driver.allocated_bytes(),
-        energy: Energy::of(&scene.pair, driver.plan().model(), driver.labels())?.into(),
+        allocated_bytes: solved.allocated_bytes,
+        energy: Energy::of(&scene.pair, plan.model(), &solved.labels)?.into(),
         all: errors.all.into(),
         visible: visible.into(),
-        labels_sha256,
+        labels_sha256: solved.labels_sha256,
         map,
     })
 }
@@ -279,9 +293,10 @@ mod tests {
         let cells = &storage.record().cells;
         let samples: Vec<_> =
             cells.iter().map(|cell| cell.measured().map_or(0, |measured| measured.samples.len())).collect();
-        assert_eq!(samples, [1, 0, 2, 0, 1, 0, 2, 0, 1, 0, 2], "{late:?}");
+        // A plan of four parts would need four answers.
+        assert_eq!(samples, [2, 0, 1, 0, 2, 0, 1, 0, 2, 0, 1, 0, 0, 0, 0], "{late:?}");
         assert!(late.len() == 3 && late[0].contains("round 2: flaky did not answer within 60 s"), "{late:?}");
         assert!(matches!(cells[1].outcome, Outcome::Error(_)), "{:?}", cells[1].outcome);
-        assert_eq!(backend.opened.load(Ordering::Relaxed), 9);
+        assert_eq!(backend.opened.load(Ordering::Relaxed), 12);
     }
 }

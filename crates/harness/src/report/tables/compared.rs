@@ -35,22 +35,40 @@ fn time(row: &Row<'_>, plan: &str, part: Part) -> String {
 pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Table {
     let columns = "printed: BP, ms | plan, ms | speed-up, % | ours: updates, BP / plan | message passing: BP, ms | \
                    plan, ms | speed-up, % | total: BP, ms | plan, ms | speed-up, % | B>1 all: BP, % | plan, %";
+    let has_parts = plans.iter().any(Named::is_cut);
+    let columns = if has_parts { format!("{columns} | workers | efficiency") } else { columns.to_owned() };
     let title = format!("{} against BP: processing speed", family(plans));
     let note = "Speed-up is (T_BP / T - 1) * 100. Both ran on the same device. A range covers the rounds in which the two \
                 took turns.";
-    table(results, number, title, plans, columns, |row, plan| {
+    let table = table(results, number, title, plans, &columns, |row, plan| {
         let [bp_ms, _] = printed(results, row, &BP);
         let fewer = fewer_updates(row, plan).map(|ratio| format!("{ratio:.2}"));
         let mut cells = vec![bp_ms];
         cells.extend(printed(results, row, plan));
         cells.push(or(fewer, ""));
         for part in [Part::MessagePassing, Part::Total] {
-            cells.extend([time(row, "bp", part), time(row, plan.plan, part), speed_up(row, plan.plan, part)]);
+            let base = or(row.base_time(plan.plan, part).map(|time| time.to_string()), row.missing("bp"));
+            cells.extend([base, time(row, plan.plan, part), speed_up(row, plan.plan, part)]);
         }
         cells.extend([bad(row, "bp"), bad(row, plan.plan)]);
+        cells.extend(efficiency(row, plan).into_iter().filter(|_| has_parts));
         cells
-    })
-    .note(note)
+    });
+    table.note(format!("{note}{}", if has_parts { SIDE_BY_SIDE } else { "" }))
+}
+
+/// What a plan with parts side by side is compared with.
+const SIDE_BY_SIDE: &str = " Parts side by side are compared with BP on one worker. Their efficiency is the ratio of the \
+                            total times, divided by the ratio of updates and by the number of workers.";
+
+/// The workers of a plan with parts side by side, and how well it uses them.
+fn efficiency(row: &Row<'_>, plan: &Named) -> [String; 2] {
+    let workers = row.workers(plan.plan);
+    // A GPU has no workers that could be counted.
+    let ratio = row.speed_up(plan.plan, Part::Total).filter(|_| row.is_processor());
+    let ratio = ratio.zip(fewer_updates(row, plan)).map(|(ratio, fewer)| ratio.median / fewer);
+    let ratio = workers.zip(ratio).map(|(workers, ratio)| ratio / workers as f64);
+    [or(workers.map(|workers| workers.to_string()), "-"), or(ratio.map(|ratio| number(ratio, 2)), "-")]
 }
 
 /// The printed time of a plan and its speed-up over BP.
@@ -70,7 +88,9 @@ fn fewer_updates(row: &Row<'_>, plan: &Named) -> Option<f64> {
 pub(super) fn memory(results: &Results<'_>, number_of: &str, plans: &[Named]) -> Table {
     let columns = "printed | ours: BP, MiB | plan, MiB | plan / BP";
     let ours = if number_of == "3.25a" { " (not in the thesis)" } else { "" };
-    let parts = if plans.iter().any(|plan| plan.is_cut()) { " All four parts are in memory at once." } else { "" };
+    let has_parts = plans.iter().any(Named::is_cut);
+    let parts =
+        if has_parts { " Parts in turn need the memory of one; otherwise all four are held at once." } else { "" };
     let title = format!("{} against BP: required memory{ours}", family(plans));
     table(results, number_of, title, plans, columns, |row, plan| {
         let bytes = |plan: &str| row.measured(plan).map(|measured| measured.allocated_bytes);

@@ -47,17 +47,13 @@ pub(super) fn speed(results: &Results<'_>, number: &str, plans: &[Named]) -> Tab
         ]
     });
     let cut = plans.iter().any(Named::is_cut);
-    table.note(format!("{note}{}", if cut { parts_note(results) } else { "" }))
+    table.note(format!("{note}{}", if cut { PARTS } else { "" }))
 }
 
 /// How the parts of a cut image share the workers.
-fn parts_note(results: &Results<'_>) -> &'static str {
-    if results.devices().iter().all(|(_, device)| device.workers == 1 && device.api.is_none()) {
-        " Parts run one after another. This run has no backend with several workers, which could run them side by side."
-    } else {
-        " Parts do not get a worker each: all workers share the whole image in every plan, BP's included."
-    }
-}
+const PARTS: &str = " If a title says no more, all workers share the whole image, as in BP. Side by side, each part has a \
+                     plan of its own, and workers of one thread take one part after another. In turn, all workers share \
+                     one part after another, in the memory of one part.";
 
 fn grids_and_loops(cell: &Cell) -> String {
     format!("{} x {}", cell.settings.grids, cell.settings.steps_per_grid)
