@@ -103,12 +103,18 @@ fn pages_of_speed_are_made_from_their_records() {
     assert!(read >= 2, "growth and lavapipe are recorded");
 }
 
-/// docs/thesis.md agrees with its record.
+/// The pages about the thesis agree with their records.
 #[test]
 fn the_page_on_the_thesis_is_made_from_a_record() {
-    let page = Path::new("docs/thesis.md");
+    for page in ["docs/thesis.md", "docs/claims.md"] {
+        agrees_with_its_record(Path::new(page));
+    }
+}
+
+fn agrees_with_its_record(page: &Path) {
     let text = fs::read_to_string(root().join(page)).unwrap();
-    let (_, rest) = text.split_once("--readme docs/thesis.md` from `").expect("the note below the page's table");
+    let from = format!("--readme {}` from `", page.display());
+    let (_, rest) = text.split_once(&from).expect("the note below the page's table");
     let (record, _) = rest.split_once('`').unwrap();
     let run = Path::new(record).parent().unwrap();
     let renewed = harness::report::renewed_page(&text, &root(), page, run);

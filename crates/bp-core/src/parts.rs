@@ -161,10 +161,12 @@ impl PartDriver {
     pub fn planned_bytes(device: &dyn Device, whole: &Plan, parting: Parting) -> Result<u64, Error> {
         let parts = Part::all(whole)?;
         let bytes = parts.iter().map(|part| device.planned_bytes(&part.plan));
-        Ok(match parting {
+        let of_parts = match parting {
             Parting::SideBySide { .. } => bytes.fold(0, u64::saturating_add),
             Parting::InTurn => bytes.max().unwrap_or(0),
-        })
+        };
+        let labels = size_of::<u16>() * whole.image_size().pixels();
+        Ok(of_parts.saturating_add(labels as u64))
     }
 
     /// The most bytes that were allocated at a time.

@@ -7,7 +7,7 @@ use bp_core::{
     finish::never,
 };
 
-use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve};
+use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve, suite::SCRATCH_BYTES};
 
 /// Sizes with even and odd cuts, more labels than a part has columns, cuts along a border, and parts of one column or row.
 fn cases() -> impl Iterator<Item = Case> {
@@ -65,9 +65,14 @@ fn put(part: &Part, answer: &Answer, case: &Case, whole: &mut Answer) {
 
 /// Solves twice, because a driver of parts in turn has another part's memory the second time.
 fn compare_driver(device: &dyn Device, case: &Case, expected: &Answer, parting: Parting) -> Result<(), Fault> {
+    let planned = PartDriver::planned_bytes(device, &case.plan, parting)?;
     let mut driver = PartDriver::new(device, case.plan.clone(), parting)?;
     driver.solve(device, &case.pair, &never)?;
     driver.solve(device, &case.pair, &never)?;
+    let allocated = driver.allocated_bytes();
+    if allocated.abs_diff(planned) > 4 * SCRATCH_BYTES {
+        return Err(Fault::Memory { allocated, planned });
+    }
     let found = Answer { labels: driver.labels().to_vec(), ..expected.clone() };
     same(expected, &found, case).map_err(|difference| *difference.fault)
 }

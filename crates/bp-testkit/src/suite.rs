@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Bytes of scratch memory that a device may allocate beyond its plan.
-const SCRATCH_BYTES: u64 = 4096;
+pub(crate) const SCRATCH_BYTES: u64 = 4096;
 
 /// Runs the whole suite on the `tested` device.
 ///

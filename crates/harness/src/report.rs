@@ -29,7 +29,6 @@ use crate::{
     record::{RECORD_FILE, Record, load},
     speed,
 };
-use readme::{BEGIN, END};
 use results::Results;
 
 /// Name of the self-contained page, written last.
@@ -127,9 +126,11 @@ pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
 pub fn renew_page(run: &Path, page: &Path) -> Result<(), Failure> {
     let record = load(run)?;
     let text = std::fs::read_to_string(page).map_err(|error| Failure::reading(page, &error))?;
-    let part = readme::part(page, folder(run), &Results::new(&record)?);
-    let missing = || Failure::reading(page, &format!("the markers {BEGIN} and {END} are not in it"));
-    write_text(page, &readme::splice(&text, &part).ok_or_else(missing)?)
+    let renewed = readme::renewed(&text, page, folder(run), &Results::new(&record)?);
+    let begin = readme::PARTS.map(|name| format!("<!-- {name}: begin -->")).join(" or ");
+    let missing =
+        || Failure::reading(page, &format!("no part of it lies between the marker {begin} and that of its end"));
+    write_text(page, &renewed.ok_or_else(missing)?)
 }
 
 /// The folder of a run, given that folder or its record.
@@ -142,5 +143,5 @@ fn folder(run: &Path) -> &Path {
 #[must_use]
 pub fn renewed_page(text: &str, root: &Path, page: &Path, run: &Path) -> Option<String> {
     let record = load(&root.join(run)).ok()?;
-    readme::splice(text, &readme::part(page, run, &Results::new(&record).ok()?))
+    readme::renewed(text, page, run, &Results::new(&record).ok()?)
 }

@@ -1,9 +1,11 @@
 //! The tables of the thesis, 3.1 to 3.29, and ours.
 
+pub(super) mod claims;
 mod compared;
 pub(super) mod means;
 mod measured;
 pub(super) mod ours;
+pub(super) mod readings;
 mod setting;
 
 use super::results::Results;
@@ -146,6 +148,8 @@ pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
     tables.push(compared::all_reliability(results));
     tables.push(ours::profiles(results));
     tables.extend(ours::energies(results));
+    tables.push(claims::table(results));
+    tables.extend(readings::table(results));
     tables
 }
 
