@@ -49,7 +49,13 @@ fn committed_records_fit_the_schema_and_are_whole() {
                 Outcome::Measured(measured) => {
                     assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
                     let planned = cell.settings.planned_bytes;
-                    assert!(measured.allocated_bytes.abs_diff(planned) * 1000 < planned);
+                    // With label sets, the plan says what is needed at most.
+                    let differ = if cell.settings.label_sets {
+                        measured.allocated_bytes.saturating_sub(planned)
+                    } else {
+                        measured.allocated_bytes.abs_diff(planned)
+                    };
+                    assert!(differ * 1000 < planned, "{}: {} on {}", run.display(), cell.plan, cell.backend);
                 }
                 // A GPU may be too small for a plan, or missing.
                 Outcome::Unavailable(reason) => assert!(!reason.is_empty(), "{} {}", cell.scene, cell.plan),

@@ -54,26 +54,27 @@ fn has_sets(plan: &Plan) -> bool {
     plan.settings().schedule != Schedule::Sweep
 }
 
-/// The bytes that a solver will allocate, or with label sets the most that it may allocate.
+/// The bytes that a driver will allocate, including its labels, or with label sets the most that it may allocate.
 pub(crate) fn planned_bytes(plan: &Plan) -> u64 {
     bytes(plan, plan.model().labels())
 }
 
-/// The bytes that a solver will probably allocate. Of public pairs with 64 to 240 labels, label sets hold less than this.
+/// The bytes that a driver will probably allocate. Of public pairs with 64 to 240 labels, label sets hold less than this.
 pub(crate) fn likely_bytes(plan: &Plan) -> u64 {
     let labels = plan.model().labels();
     bytes(plan, labels.min(16 + labels / 5))
 }
 
-/// The bytes that a solver will allocate, if label sets hold this many labels.
+/// The bytes that a driver will allocate, if label sets hold this many labels.
 fn bytes(plan: &Plan, labels: usize) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
     let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
     let messages = kept.map(|grid| 2 * half_steps::bytes(&Shape::new(plan, grid)) as u64);
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
-    let features = features::bytes(plan);
-    costs.chain(messages).chain(layouts).chain([features, sweep::bytes(plan, labels)]).fold(0, u64::saturating_add)
+    let (features, answer) = (features::bytes(plan), (size_of::<u16>() * plan.image_size().pixels()) as u64);
+    let others = [features, answer, sweep::bytes(plan, labels)];
+    costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
 
 impl RayonSolver {
