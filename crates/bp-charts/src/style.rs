@@ -114,8 +114,8 @@ pub const BLACK: usize = 4;
 type Shape = (u32, &'static [At]);
 
 /// Shapes of about equal area: circle, square, triangle, diamond, plus, triangle downwards, cross, star, triangle to
-/// the right, pentagon, triangle to the left and needle star.
-const SHAPES: [Shape; 12] = [
+/// the right, pentagon, triangle to the left, needle star, tall bar, wide bar and star of three arms.
+const SHAPES: [Shape; 15] = [
     (24, &[(0.0, 1.0)]),
     (4, &[(45.0, 1.25)]),
     (3, &[(-90.0, 1.5)]),
@@ -128,6 +128,9 @@ const SHAPES: [Shape; 12] = [
     (5, &[(90.0, 1.2)]),
     (3, &[(180.0, 1.5)]),
     (4, &[(0.0, 2.0), (45.0, 0.6)]),
+    (2, &[(68.0, 1.7), (112.0, 1.7)]),
+    (2, &[(-22.0, 1.7), (22.0, 1.7)]),
+    (3, &[(-90.0, 2.0), (-30.0, 0.5)]),
 ];
 
 /// The pixels per unit of a marker's radius, if there is room.

@@ -44,11 +44,12 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
         (&CTCSBP, numbers("4.9", "3.26"), Some(numbers("4.10", "3.27")), numbers("4.11", "3.28")),
     ] {
         let what = format!("{} against BP", family(plans));
-        let plans = &with_parts(results, plans);
-        let with_bp = [&[BP], plans.as_slice()].concat();
-        drawings.push(speed_ups(results, speed, &what, plans, &both)?);
+        // However the parts are arranged, the labels are the same.
+        let arranged = with_parts(results, plans);
+        drawings.push(speed_ups(results, speed, &what, &arranged, &both)?);
+        let with_bp = [&[BP], arranged.as_slice()].concat();
         drawings.extend(memory.map(|memory| memories(results, memory, &what, &with_bp)).transpose()?);
-        drawings.push(errors(results, reliability, &what, &with_bp)?);
+        drawings.push(errors(results, reliability, &what, &[&[BP], plans].concat())?);
     }
     let five = [BP, CFBP, CFCSBP, CTBP, CTCSBP[0]];
     let what = "All algorithms against BP";
