@@ -112,7 +112,7 @@ fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
 fn check_report(folder: &Path) {
     let markdown = fs::read_to_string(folder.join("REPORT.md")).unwrap();
     let html = fs::read_to_string(folder.join("report.html")).unwrap();
-    let ours = ["3.25a", "3.30", "3.31", "A.1"].map(str::to_owned);
+    let ours = ["3.25a", "3.30", "3.31", "A.1", "A.3", "A.4"].map(str::to_owned);
     for number in (1..=29).map(|i| format!("3.{i}")).chain(ours) {
         assert!(markdown.contains(&format!("### Table {number}: ")), "Table {number}");
         assert!(html.contains(&format!("Table {number}: ")), "Table {number}");
@@ -134,7 +134,11 @@ fn check_report(folder: &Path) {
         BACKENDS.contains("vulkan"),
         "the reason beneath the tables"
     );
-    assert!(markdown.contains("Parts do not get a worker each"), "how parts share several workers");
+    for plan in ["CTBP, side by side", "CTBP, in turn", "CTCSBP, Z''''=2, side by side", "CTCSBP, Z''''=2, in turn"] {
+        let rows = markdown.lines().filter(|line| line.contains(&format!("| {plan} |")));
+        // Three tables of the algorithm and three against BP have a row for each scene and backend.
+        assert_eq!(rows.count(), 6 * 6 * BACKENDS.split(',').count(), "{plan}");
+    }
     assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
     assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
     assert!(markdown.contains("On the Pareto front, where no other plan is both faster and lower: "));
