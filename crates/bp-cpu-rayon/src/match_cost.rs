@@ -186,10 +186,11 @@ impl Row<'_> {
         let mut least = [u8::MAX; STRIP];
         for label in 0..layout.labels {
             let raw = &mut raw[label * layout.lanes + strip.first..][..strip.lanes];
+            let shift = self.shift(plane, label);
+            let (right, inside) = &right[shift.parity];
             for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
                 let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
-                let (parity, start) = self.lanes(BlockStart { plane, lane: strip.first + lane }, label);
-                let (right, inside) = &right[parity];
+                let start = shift.start(strip.first + lane);
                 let cost = cost(left.map(|left| load(left, lane)), right.map(|right| load(right, start)));
                 let inside = load(inside, start);
                 let cost = (cost & inside | outside & !inside) & load(node, lane);
@@ -219,17 +220,14 @@ impl Row<'_> {
         })
     }
 
-    /// The lanes of the right image that match the nodes from `start` on under a label: the parity of their columns,
-    /// and their start in [`Features::right`].
+    /// Where the nodes of a plane match under a label.
     #[inline(always)]
-    fn lanes(&self, start: BlockStart, label: usize) -> (usize, usize) {
-        let BlockStart { plane, lane } = start;
+    fn shift(&self, plane: usize, label: usize) -> Shift {
         let Matching { plan, .. } = self.matching;
         // Left column 2i + p, with p = plane + margin, matches right column 2i + p - d, which is lane i + (p - d) div 2.
         let shift = (plan.margin() + plane) as i64 - i64::from(plan.model().disparity(label as u16));
         let (parity, shift) = ((shift & 1) as usize, shift >> 1);
-        let nodes = (plan.pair_size().width + 1 - parity) as i64 / 2;
-        (parity, ((lane as i64 + shift).clamp(-(BLOCK as i64), nodes) + BLOCK as i64) as usize)
+        Shift { parity, lanes: shift, nodes: (plan.pair_size().width + 1 - parity) as i64 / 2 }
     }
 
     /// Where lane 0 of a plane is in the features of a row: the parity of its column in the pair, and the lane there.
@@ -243,7 +241,8 @@ impl Row<'_> {
     #[inline(always)]
     fn block(&self, at: BlockStart, label: usize, channel: usize) -> Block<'_> {
         let BlockStart { plane, lane } = at;
-        let (parity, start) = self.lanes(at, label);
+        let shift = self.shift(plane, label);
+        let (parity, start) = (shift.parity, shift.start(lane));
         let (own, offset) = self.own(plane);
         Block {
             left: block(self.matching.features.left(self.y, channel, own), lane + offset),
@@ -251,6 +250,25 @@ impl Row<'_> {
             inside: block(self.matching.features.inside(parity), start),
             node: block(self.matching.features.inside(own), lane + offset + BLOCK),
         }
+    }
+}
+
+/// The lanes of the right image that match the nodes of a plane under a label.
+#[derive(Clone, Copy)]
+struct Shift {
+    /// The parity of their columns.
+    parity: usize,
+    /// By how many lanes they lie further right.
+    lanes: i64,
+    /// The number of the right image's columns of this parity.
+    nodes: i64,
+}
+
+impl Shift {
+    /// Where the lanes that match those from `lane` on start in [`Features::right`].
+    #[inline(always)]
+    fn start(self, lane: usize) -> usize {
+        ((lane as i64 + self.lanes).clamp(-(BLOCK as i64), self.nodes) + BLOCK as i64) as usize
     }
 }
 
