@@ -23,7 +23,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// The parts of a plan with a cut, from top left to bottom right: four, or two if the cut runs along a border.
+    /// The parts of a plan with a cut, from top left to bottom right: four, or fewer if the cut runs along a border.
     ///
     /// # Errors
     /// [`Error::Plan`] without a cut; with another schedule than [`Schedule::Sync`]; with negative disparities; and with a

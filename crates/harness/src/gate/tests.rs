@@ -22,6 +22,13 @@ fn measure(gate: &Gate<'_>) -> Measured {
     Measured { conditions, ..gate.measure(&Watch::default()).unwrap() }
 }
 
+/// The baselines made of one measurement.
+fn renewed(gate: &Gate<'_>, measured: &Measured, renewal: Renewal) -> Baselines {
+    let mut baselines = Baselines::read(&gate.options.baselines, &machine::machine(None), true).unwrap();
+    gate.renew(renewal, &mut baselines, std::slice::from_ref(measured)).unwrap();
+    baselines
+}
+
 fn judge(gate: &Gate<'_>, measured: &Measured) -> Judgement {
     let baselines = Baselines::read(&gate.options.baselines, &machine::machine(None), false).unwrap();
     Judgement::new(gate, &baselines, measured).unwrap()
@@ -44,8 +51,7 @@ fn what_a_baseline_expects_passes_and_what_it_does_not_fails_by_name() {
     assert!(first.failures().is_empty() && page(&first).contains("There is no baseline"), "{}", page(&first));
     assert!(first.is_partial() && first.summary().starts_with("0 of 18 speed-ups were judged"), "{}", first.summary());
 
-    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
-    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let baselines = renewed(&gate, &measured, Renewal::Everywhere);
     let same = judge(&gate, &measured);
     let text = page(&same);
     assert!(same.failures().is_empty() && !text.contains("There is no baseline"), "{text}");
@@ -69,8 +75,7 @@ fn other_devices_and_other_settings_have_no_baseline() {
     let (measured, path) = {
         let gate = gate(&options);
         let measured = measure(&gate);
-        let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
-        gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+        let baselines = renewed(&gate, &measured, Renewal::Everywhere);
         (measured, baselines.path_here().to_owned())
     };
     edit(&path, |json| json["baseline"]["runs"]["quick"]["devices"]["rayon on 1 thread"] = "another".into());
@@ -88,8 +93,7 @@ fn a_machine_without_a_baseline_is_held_against_the_least_of_two_other_kinds() {
     let options = options(folder.path());
     let gate = gate(&options);
     let measured = measure(&gate);
-    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
-    gate.renew(Renewal::Here, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let baselines = renewed(&gate, &measured, Renewal::Here);
     let name = "rayon on 1 thread: sweep over bp, total";
     let (here, [one, two]) = (baselines.path_here(), ["one.json", "two.json"].map(|name| folder.path().join(name)));
     fs::rename(here, &one).unwrap();
@@ -111,8 +115,7 @@ fn a_measurement_that_something_disturbed_fails_nothing_and_says_so() {
     let options = options(folder.path());
     let gate = gate(&options);
     let mut measured = measure(&gate);
-    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
-    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let baselines = renewed(&gate, &measured, Renewal::Everywhere);
     let name = "rayon on 1 thread: sweep over bp, total";
     edit(baselines.path_here(), |json| json["baseline"]["runs"]["quick"]["speed_ups"][name] = 1e9.into());
     let mut calm = judge(&gate, &measured);
@@ -137,8 +140,7 @@ fn what_is_expected_and_not_measured_fails() {
     let options = options(folder.path());
     let gate = gate(&options);
     let mut measured = measure(&gate);
-    let mut baselines = Baselines::read(folder.path(), &machine::machine(None), true).unwrap();
-    gate.renew(Renewal::Everywhere, &mut baselines, std::slice::from_ref(&measured)).unwrap();
+    let baselines = renewed(&gate, &measured, Renewal::Everywhere);
     measured.ratios.pop();
     measured.facts.remove("census: energy").expect("plans whose times are not guarded are solved too");
     edit(baselines.path_here(), |json| {

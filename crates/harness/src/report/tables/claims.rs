@@ -15,7 +15,7 @@ const SAME_TIME: f64 = 0.05;
 /// A loss of reliability is small up to this many percentage points of pixels that are wrong by more than 1 px.
 const SMALL_LOSS: f64 = 1.0;
 
-/// What a backend says of a claim: its figure, and whether the claim holds, if that can be told.
+/// The figure of a backend, and whether the claim holds there; `None` if the figure does not decide that.
 type Finding = Option<(String, Option<bool>)>;
 
 /// A claim.
@@ -54,7 +54,7 @@ fn row(results: &Results<'_>, claim: Claim, finding: impl Fn(&str) -> Finding) -
         Some(first) if told.iter().any(|holds| holds != first) => "depends on the backend",
         Some(Some(true)) => "held",
         Some(Some(false)) => "not held",
-        Some(None) => "cannot be told",
+        Some(None) => "undecided",
     };
     let figures: Vec<_> =
         found.iter().map(|(backend, (figure, _))| format!("{}: {figure}", results.label(backend))).collect();
@@ -87,7 +87,7 @@ fn speeds(results: &Results<'_>) -> Vec<Vec<String>> {
             whole.to_uppercase(),
             number(printed, 1)
         );
-        let why = "four workers would be needed; the thesis does not say how many its GPU had, nor on how many BP ran";
+        let why = "it takes four workers; the thesis does not say on how many its programs ran";
         rows.push(row(results, Claim { what, place, why }, |backend| side_by_side(results, backend, plan, printed)));
     }
     rows
@@ -170,11 +170,10 @@ fn reliabilities(results: &Results<'_>) -> Vec<Vec<String>> {
 
 fn others(results: &Results<'_>) -> Vec<Vec<String>> {
     let what = "time depends on the resolution, not on the content".to_owned();
-    let why =
-        "the work depends on the resolution only; what else our times show is the machine's other work and the caches";
+    let why = "the work depends on the resolution only; other programs and the caches change our times too";
     let resolution = Claim { what, place: "in words", why };
     let what = "suitable for embedded systems".to_owned();
-    let why = "nothing was run on one, and the thesis names none";
+    let why = "neither we nor the thesis ran anything on such a system";
     let embedded = Claim { what, place: "in words", why };
     vec![
         row(results, resolution, |backend| time_per_pixel(results, backend)),
