@@ -140,7 +140,68 @@ fn check_report(folder: &Path) {
         assert_eq!(rows.count(), 6 * 6 * BACKENDS.split(',').count(), "{plan}");
     }
     assert!(markdown.contains("not printed") && markdown.contains("synthetic"));
-    assert!(markdown.contains("439") && markdown.contains("113.11"), "the thesis's numbers stand beside ours");
+    check_printed(&markdown);
     assert!(markdown.contains("On the Pareto front, where no other plan is both faster and lower: "));
     assert!(!html.contains("src=\"http") && !html.contains("<script"), "one self-contained page");
+}
+
+/// The numbers that the thesis prints.
+const THESIS: &str = include_str!("../../harness/data/thesis.json");
+
+/// An algorithm's name among the printed numbers, the beginning of its plans' titles, its table of times, and its table against
+/// BP.
+const PRINTED: [(&str, &str, &str, Option<&str>); 5] = [
+    ("bp", "BP", "3.3", None),
+    ("cfbp", "CFBP", "3.6", Some("3.18")),
+    ("cfcsbp", "CFCSBP", "3.9", Some("3.21")),
+    ("ctbp", "CTBP", "3.12", Some("3.24")),
+    ("ctcsbp", "CTCSBP", "3.15", Some("3.26")),
+];
+
+/// Checks that every printed number stands in its table, in each row of its image and algorithm.
+fn check_printed(markdown: &str) {
+    let thesis: serde_json::Value = serde_json::from_str(THESIS).unwrap();
+    for (image, printed) in thesis["images"].as_array().unwrap().iter().enumerate() {
+        let size = format!("{}x{}", printed["width"], printed["height"]);
+        let row = [printed["name"].as_str().unwrap().to_owned(), size, printed["disparity_true"].to_string()];
+        assert_eq!(rows(markdown, "3.2", image, "")[0][1..4], row);
+        let bp = thesis["times_ms"]["bp"][image].to_string();
+        for (name, title, times, against_bp) in PRINTED {
+            let ms = thesis["times_ms"][name][image].to_string();
+            let percent = thesis["speed_up_percent"][name][image].as_f64();
+            let percent = percent.map_or(String::new(), |percent| format!("{percent:.2}"));
+            check_rows(markdown, times, image, title, &[&ms]);
+            check_rows(markdown, "3.29", image, title, &[&ms, &percent]);
+            if let Some(table) = against_bp {
+                check_rows(markdown, table, image, title, &[&bp, &ms, &percent]);
+            }
+        }
+    }
+}
+
+/// Checks the printed cells in the rows of an image and an algorithm, but for plans that the thesis does not have.
+fn check_rows(markdown: &str, table: &str, image: usize, title: &str, printed: &[&str]) {
+    let header = section(markdown, table).find(|cells| cells[0] == "#").unwrap();
+    let at = header.iter().position(|cell| cell.starts_with("printed")).unwrap();
+    let is_ours = |cells: &Vec<String>| cells[3].contains("side by side") || cells[3].contains("in turn");
+    let rows: Vec<_> = rows(markdown, table, image, title).into_iter().filter(|cells| !is_ours(cells)).collect();
+    assert!(!rows.is_empty(), "Table {table}, image {}, {title}", image + 1);
+    for cells in rows {
+        assert_eq!(cells[at..at + printed.len()], *printed, "Table {table}, image {}, {title}", image + 1);
+    }
+}
+
+/// The rows of an image whose plan is this one, or one of CTCSBP's.
+fn rows(markdown: &str, table: &str, image: usize, title: &str) -> Vec<Vec<String>> {
+    let number = (image + 1).to_string();
+    let is_of = |plan: &str| title.is_empty() || plan.split(',').next() == Some(title);
+    section(markdown, table).filter(|cells| cells[0] == number && is_of(&cells[3])).collect()
+}
+
+/// The cells of a table, row by row.
+fn section<'a>(markdown: &'a str, table: &str) -> impl Iterator<Item = Vec<String>> + use<'a> {
+    let (_, from) = markdown.split_once(&format!("### Table {table}: ")).unwrap();
+    let text = from.split("\n### ").next().unwrap();
+    let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
+    text.lines().filter(|line| line.starts_with('|')).map(cells)
 }

@@ -2,6 +2,7 @@
 
 /// A node of a grid, by its column and row. The nodes of grid 0 are the pixels of the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Node {
     /// The column.
     pub x: usize,

@@ -22,8 +22,8 @@ impl Plan {
     ///
     /// # Errors
     /// [`Error::Plan`] if a count is 0, there are more than [`MAX_GRIDS`] grids, a cut lies outside the image or comes with
-    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`], or label sets with another schedule. Also
-    /// the errors of [`Size::new`].
+    /// more than one grid, or [`MessageStart::Sender`] comes with [`Schedule::Sweep`], or label sets with another schedule, or
+    /// [`Schedule::Outward`] starts outside the image or comes with more than one grid. Also the errors of [`Size::new`].
     pub fn new(size: Size, model: Model, settings: Settings) -> Result<Self, Error> {
         let size = Size::new(size.width, size.height)?;
         if settings.grids == 0 || settings.steps == 0 {
@@ -37,6 +37,14 @@ impl Plan {
         }
         if settings.cut.is_some() && settings.grids > 1 {
             return Err(Error::Plan("an image that is cut into parts has one grid"));
+        }
+        if let Schedule::Outward { start } = settings.schedule {
+            if settings.grids > 1 {
+                return Err(Error::Plan("the schedule outward has one grid"));
+            }
+            if start.x >= size.width || start.y >= size.height {
+                return Err(Error::Plan("the start node lies outside the image"));
+            }
         }
         if settings.schedule == Schedule::Sweep && settings.message_start == MessageStart::Sender {
             return Err(Error::Plan("message start sender has no meaning under the schedule sweep"));
@@ -225,7 +233,7 @@ impl Plan {
             if grid < 2 {
                 let messages_per_node = match self.settings.schedule {
                     Schedule::Sync => 2 * 4,
-                    Schedule::Checkerboard => 4,
+                    Schedule::Checkerboard | Schedule::Outward { .. } => 4,
                     Schedule::Sweep => 2,
                 };
                 buffers.push(Buffer { name: "messages", grid, bytes: volume.saturating_mul(messages_per_node) });
@@ -354,5 +362,11 @@ mod tests {
         assert!(with(|s| s.cut = Some(Cut { x: 620, y: 0, seed_start: true })).is_err());
         assert!(with(|s| (s.cut, s.grids) = (None, MAX_GRIDS + 1)).is_err());
         assert!(with(|s| (s.schedule, s.message_start) = (Schedule::Sweep, MessageStart::Sender)).is_err());
+        assert!(with(|s| s.schedule = Schedule::Outward { start: Node { x: 619, y: 554 } }).is_ok());
+        assert!(with(|s| s.schedule = Schedule::Outward { start: Node { x: 619, y: 555 } }).is_err());
+        assert!(
+            with(|s| (s.schedule, s.cut, s.grids) = (Schedule::Outward { start: Node { x: 0, y: 0 } }, None, 2))
+                .is_err()
+        );
     }
 }

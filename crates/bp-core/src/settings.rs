@@ -1,6 +1,6 @@
 //! The settings of a plan, and the algorithms as ways to fill them.
 
-use crate::Size;
+use crate::{Node, Size};
 
 /// The algorithms of Doan Van Tuan's thesis (2019), and one of ours. Each is a way to fill [`Settings`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -150,10 +150,19 @@ pub enum Schedule {
     /// For the first row of a band, f_up are labels that were decided when the seam was prepared. Missing neighbours add
     /// nothing.
     Sweep,
+    /// Sequential passing outward from a start node, in place: an experiment with one grid, which only the backends on
+    /// processors run. In a loop every node sends once, to all its neighbours, in the order of the distance
+    /// `|x - x0| + |y - y0|` from the start node (x0, y0). Each message is computed from what the node holds before it sends any.
+    /// Nodes of one distance are no neighbours, so their order has no effect. From (0, 0) this equals the order of rows.
+    /// In a cut image, each part's passing starts from its node nearest to the start node.
+    Outward {
+        /// The node that sends first.
+        start: Node,
+    },
 }
 
 impl Schedule {
-    /// All schedules.
+    /// The schedules that every backend has: all but the experiment [`Schedule::Outward`].
     pub const ALL: [Self; 3] = [Self::Sync, Self::Checkerboard, Self::Sweep];
 
     /// The name used in options and records.
@@ -163,6 +172,7 @@ impl Schedule {
             Self::Sync => "sync",
             Self::Checkerboard => "checkerboard",
             Self::Sweep => "sweep",
+            Self::Outward { .. } => "outward",
         }
     }
 
@@ -170,7 +180,7 @@ impl Schedule {
     #[must_use]
     pub fn steps_per_loop(self) -> u32 {
         match self {
-            Self::Sync | Self::Sweep => 1,
+            Self::Sync | Self::Sweep | Self::Outward { .. } => 1,
             Self::Checkerboard => 2,
         }
     }

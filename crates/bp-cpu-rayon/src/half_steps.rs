@@ -1,6 +1,8 @@
-//! The schedules `sync` and `checkerboard`: half-steps in which the nodes of one colour send.
+//! The schedules `sync` and `checkerboard`: half-steps in which the nodes of one colour send. `outward` is beside them, because
+//! it keeps its messages in the same way.
 
 mod edges;
+mod outward;
 mod pass;
 mod refine;
 mod select_labels;
@@ -26,6 +28,9 @@ pub(crate) fn steps_at_a_time(layout: &Layout) -> usize {
 
 /// Runs steps of the plan's schedule on the two sets of messages of a grid.
 pub(crate) fn run(grid: &Pass<'_>, steps: Range<usize>, sets: &mut [Edges; 2]) {
+    if let Schedule::Outward { start } = grid.plan.settings().schedule {
+        return outward::run(grid, start, steps, sets.each_mut().map(|set| set.rows_mut(grid.layout)));
+    }
     let last = grid.plan.settings().steps as usize - 1;
     let at_a_time = steps_at_a_time(grid.layout);
     for start in steps.clone().step_by(at_a_time) {

@@ -37,8 +37,8 @@ pub(crate) struct RayonSolver {
 ///
 /// A grid is bipartite. So a synchronous run consists of two independent runs of half-steps: in one the even nodes send
 /// first, in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is only the first run; its
-/// last half-step writes to the second set, so that the messages its senders received are not lost. `sweep` keeps none here,
-/// see [`Swept`].
+/// last half-step writes to the second set, so that the messages its senders received are not lost. `outward` has a set for
+/// the messages that even nodes receive, and one for those of odd nodes. `sweep` keeps none here, see [`Swept`].
 struct Messages {
     sets: [Edges; 2],
 }
@@ -139,6 +139,7 @@ fn received_in(plan: &Plan) -> [usize; 2] {
         Schedule::Checkerboard => usize::from(colour == steps % 2),
         // Nothing is kept.
         Schedule::Sweep => 0,
+        Schedule::Outward { .. } => colour,
     })
 }
 
@@ -204,7 +205,7 @@ impl Solver for RayonSolver {
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
             Schedule::Sweep => labels.copy_from_slice(self.swept.labels()),
-            Schedule::Sync | Schedule::Checkerboard => select_labels(&self.answer(), labels),
+            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => select_labels(&self.answer(), labels),
         }
         Ok(())
     }
@@ -212,7 +213,7 @@ impl Solver for RayonSolver {
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         match self.plan.settings().schedule {
             Schedule::Sweep => self.swept.read_messages(&self.grid(0), side, messages),
-            Schedule::Sync | Schedule::Checkerboard => {
+            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
                 self.answer().read_messages(&self.plan, side, messages);
                 Ok(())
             }
@@ -222,7 +223,9 @@ impl Solver for RayonSolver {
     fn fused_steps(&self) -> u32 {
         match self.plan.settings().schedule {
             Schedule::Sweep => u32::MAX,
-            Schedule::Sync | Schedule::Checkerboard => half_steps::steps_at_a_time(&self.layouts[0]) as u32,
+            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
+                half_steps::steps_at_a_time(&self.layouts[0]) as u32
+            }
         }
     }
 

@@ -4,7 +4,10 @@
 use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings};
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
-use bp_testkit::{Answer, Case, Difference, compare_at_random, conform, noise_pair, random_case, solve, stepped_pair};
+use bp_testkit::{
+    Answer, Case, Difference, compare, compare_at_random, conform, noise_pair, outward_cases, random_case, solve,
+    stepped_pair,
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{collections::BTreeSet, sync::LazyLock};
 
@@ -22,6 +25,13 @@ fn solve_on(device: usize, pool: usize, case: &Case) -> Answer {
 fn every_instruction_set_conforms() -> Result<(), Difference> {
     (0..Rayon.devices().len())
         .try_for_each(|device| POOLS[device % 4].install(|| conform(&Scalar, Rayon.open(device).unwrap().as_ref())))
+}
+
+#[test]
+fn passing_outward_equals_the_reference() -> Result<(), Difference> {
+    let device = Rayon.open(0).unwrap();
+    let compared = |(index, case): (usize, Case)| POOLS[index % 4].install(|| compare(&Scalar, device.as_ref(), &case));
+    outward_cases().enumerate().try_for_each(compared)
 }
 
 #[test]

@@ -7,7 +7,9 @@ use crate::{beliefs::lowest_beliefs, decode::decode, grid::Grid, messages::Messa
 /// Writes the label of every node of grid 0. `sums` has room for one node's labels.
 pub(crate) fn select_labels(grid: &Grid<'_>, messages: &Messages, seams: &Seams, labels: &mut [u16], sums: &mut [u8]) {
     match grid.plan.settings().schedule {
-        Schedule::Sync | Schedule::Checkerboard => lowest_beliefs(grid.costs, messages, labels, sums),
+        Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
+            lowest_beliefs(grid.costs, messages, labels, sums)
+        }
         Schedule::Sweep => decode(grid, messages, seams, labels, sums),
     }
 }

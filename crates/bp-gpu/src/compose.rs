@@ -50,6 +50,7 @@ impl Program {
 
 /// Composes the program of a plan, however much memory it needs.
 fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
+    check_schedule(plan, limits)?;
     check_sums(plan, limits)?;
     let grids = layout::grids(plan, limits)?;
     let buffers = Buffers::new(plan, &grids);
@@ -64,6 +65,17 @@ fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
         bind_groups: IndexSet::new(),
     };
     Ok(composer.program())
+}
+
+/// Fails under a schedule in which only one node sends at a time.
+fn check_schedule(plan: &Plan, limits: &Limits) -> Result<(), Error> {
+    match plan.settings().schedule {
+        Schedule::Sync | Schedule::Checkerboard | Schedule::Sweep => Ok(()),
+        Schedule::Outward { .. } => {
+            let reason = "the schedule outward runs on the backends scalar and rayon only".to_owned();
+            Err(Error::Unsupported { device: limits.device.clone(), reason })
+        }
+    }
 }
 
 /// Fails if sums of data costs may exceed 32 bits.

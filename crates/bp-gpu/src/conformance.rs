@@ -5,7 +5,7 @@
 
 use std::{env, thread, time::Duration};
 
-use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
+use bp_core::{Algorithm, Device, Driver, Error, Model, Node, Plan, Profile, Schedule, Settings};
 use bp_testkit::{Case, Difference, compare, compare_at_random, conform_every, noise_pair};
 
 use crate::Limits;
@@ -128,6 +128,13 @@ pub fn refuses(open: impl Fn(&dyn Fn(&mut Limits)) -> Result<Box<dyn Device>, Er
     };
     let small = prepare(&|limits| limits.binding_bytes = 4 << 10);
     assert!(matches!(small, None | Some(Some(Error::Unsupported { .. }))), "{small:?}");
+    let settings =
+        Settings { schedule: Schedule::Outward { start: Node { x: 0, y: 0 } }, grids: 1, ..*plan.settings() };
+    let outward = Plan::new(plan.image_size(), *plan.model(), settings).and_then(|plan| {
+        let device = open(&|_| ())?;
+        Driver::new(device.as_ref(), plan).map(|_| ())
+    });
+    assert!(matches!(outward, Err(Error::Unsupported { .. } | Error::Unavailable { .. })), "{outward:?}");
     let little = prepare(&|limits| limits.memory_bytes = Some(1 << 16));
     assert!(matches!(little, None | Some(Some(Error::OutOfMemory { available: Some(65_536), .. }))), "{little:?}");
     let few = open(&|limits| limits.bindings = 4).err();

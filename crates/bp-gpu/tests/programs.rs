@@ -84,6 +84,7 @@ fn expected(kernel: Kernel, schedule: Schedule, height: u32, (row, colour): (u32
         // A program contains two steps.
         (Kernel::UpdateMessages, Schedule::Sync) => 2,
         (Kernel::UpdateMessages, Schedule::Checkerboard) => 1,
+        (Kernel::UpdateMessages, Schedule::Outward { .. }) => 0,
         (Kernel::UpdateMessages, Schedule::Sweep) => sweeps(height, row, colour),
         (Kernel::Refine, Schedule::Sweep) => restored(height, row, colour),
         (Kernel::CoarsenGreys | Kernel::Coarsen | Kernel::Refine, _) => 0,

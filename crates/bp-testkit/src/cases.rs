@@ -1,7 +1,8 @@
 //! The cases that backends are compared on.
 
 use bp_core::{
-    Algorithm, Cut, EdgeLevels, Error, MessageStart, Model, Profile, Schedule, Settings, Size, Smoothness, StereoPair,
+    Algorithm, Cut, EdgeLevels, Error, MessageStart, Model, Node, Profile, Schedule, Settings, Size, Smoothness,
+    StereoPair,
 };
 
 use crate::{Case, noise_pair, stepped_pair};
@@ -30,6 +31,28 @@ pub fn cases() -> impl Iterator<Item = Case> {
         settings(pair.size()).into_iter().filter_map(move |settings| case(&pair, model, settings))
     });
     whole.chain(strips()).chain(label_sets())
+}
+
+/// Cases of [`Schedule::Outward`]: start nodes at corners, borders and inside, whole images and parts.
+pub fn outward_cases() -> impl Iterator<Item = Case> {
+    let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (13, 11), (35, 6), (9, 40)];
+    let labels = [1, 2, 16, 70];
+    let starts = |width, height| [(0, 0), (width / 2, height / 2), (width - 1, 0), (width / 3, height - 1)];
+    let problems = sizes.into_iter().flat_map(move |size| labels.map(|labels| (size, labels)));
+    problems.flat_map(move |((width, height), labels)| {
+        let pair = noise_pair(width, height, labels as u64);
+        let of = move |((x, y), model)| {
+            let schedule = Schedule::Outward { start: Node { x, y } };
+            let whole = Algorithm::Bp.settings(pair.size(), 3, 1, schedule);
+            let cut = Cut { x: 2 * width / 3, y: height / 3, seed_start: false };
+            let parts = Algorithm::Ctbp.settings(pair.size(), 2, 1, schedule);
+            [whole, parts, Settings { cut: Some(cut), ..parts }].map(|settings| case(&pair, model, settings))
+        };
+        let all = starts(width, height)
+            .into_iter()
+            .flat_map(move |start| models(labels).into_iter().map(move |model| (start, model)));
+        all.flat_map(of).flatten()
+    })
 }
 
 /// Plans with label sets on two or three grids: of pictures whose sets differ between patches, bands and seams, and of noise,

@@ -27,7 +27,7 @@ pub mod synthetic;
 mod videos;
 
 pub use case::{Answer, Case, solve};
-pub use cases::cases;
+pub use cases::{cases, outward_cases};
 pub use difference::{Difference, Fault};
 pub use noise::{noise_pair, stepped_pair};
 pub use oracle::Oracle;

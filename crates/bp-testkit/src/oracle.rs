@@ -41,6 +41,21 @@ impl State {
         }
     }
 
+    /// Runs a loop in which nodes send one after another, in the order of their distance from the start node.
+    fn pass_outward(&mut self, grid: usize, start: Node) {
+        let mut nodes: Vec<Node> = self.plan.size(grid).nodes().collect();
+        nodes.sort_by_key(|node| node.x.abs_diff(start.x) + node.y.abs_diff(start.y));
+        for node in nodes {
+            let received = self.grids[grid].received[self.index(grid, node)].clone();
+            for to in Side::ALL {
+                let Some(receiver) = self.plan.neighbour(grid, node, to) else { continue };
+                let message = self.message(grid, node, &received, to);
+                let receiver = self.index(grid, receiver);
+                self.grids[grid].received[receiver][to.opposite() as usize] = message;
+            }
+        }
+    }
+
     /// The first message that a fine node holds from `side`.
     fn first_message(&self, grid: usize, node: Node, side: Side) -> Option<Vec<i64>> {
         let coarse = self.grids.get(grid + 1)?;
@@ -108,6 +123,7 @@ impl Solver for State {
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
         steps.for_each(|step| match self.plan.settings().schedule {
             Schedule::Sync | Schedule::Checkerboard => self.step(grid, step),
+            Schedule::Outward { start } => self.pass_outward(grid, start),
             Schedule::Sweep => {
                 self.sweep(grid);
                 if step + 1 == self.plan.settings().steps {

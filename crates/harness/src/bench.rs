@@ -1,140 +1,184 @@
-//! The measurements of `cargo bench`: the cells of the thesis's tables and some kernels, measured by the code of `bp
-//! reproduce` and `bp speed`. Criterion itself would measure one contestant after another, and the machine would drift
-//! between them. Here the contestants take turns first, and then criterion receives the samples.
+//! The settings of `cargo bench`, and its first bench: the cells of the thesis's tables, measured in turns by the code of `bp
+//! reproduce`. The second, `benches/matches.rs`, is criterion's own.
+//!
+//! Settings are environment variables, because the command line of a bench belongs to criterion.
 
-mod list;
-mod settings;
-
-use std::{collections::HashSet, ffi::OsString, path::Path};
-
-pub use list::Bench;
-use list::Of;
-use settings::Settings;
-
-use bp_stereo::Watch;
-
-use crate::{
-    failure::Failure,
-    machine,
-    measure::Asked,
-    record::speed::Speed,
-    report, reproduce,
-    scenes::Source,
-    speed::{self, Files, SpeedOptions},
-    threads,
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
 };
 
-/// Reads an environment variable by its name.
-pub type Environment<'a> = dyn Fn(&str) -> Option<OsString> + Sync + 'a;
+use bp_core::{Backend, DeviceKind};
+use bp_stereo::Watch;
 
-/// All possible benches, without samples. Only a measurement shows whether a device has a clock.
-///
-/// # Errors
-/// A message that names the invalid environment variable.
-pub fn possible(environment: &Environment<'_>, watch: &Watch<'_>) -> Result<Vec<Bench>, String> {
-    let job = Settings::read(environment).and_then(|settings| Job::new(settings, watch));
-    Ok(job.map_err(|failure| failure.to_string())?.possible)
+use crate::{backends, failure::Failure, machine, measure::Asked, report, reproduce, scenes::Source, threads};
+
+/// The size of the run: "quick" or "full".
+const SIZE: &str = "BP_BENCH";
+
+/// The backends, separated by commas.
+const BACKEND: &str = "BP_BENCH_BACKEND";
+
+/// The folder of public data, as for `bp`.
+const DATA: &str = "BP_DATA";
+
+/// Rounds of a quick run, as in that of `bp reproduce`.
+const QUICK_ROUNDS: u32 = 1;
+
+/// Rounds of a full run.
+const ROUNDS: u32 = 20;
+
+/// The settings of a run.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Small images and few iterations, on every backend.
+    pub quick: bool,
+    /// The backends, if named.
+    named: Option<Vec<String>>,
+    /// The folder of public data, relative to the workspace, because cargo runs benches in their package's folder.
+    data: Option<PathBuf>,
 }
 
-/// Measures the scenes and problems of all benches whose names satisfy `is_asked`. Writes records, tables and charts to
-/// a new folder in `results`, and passes all benches to `show`.
-///
-/// # Errors
-/// A message that says what could not be measured or written.
-pub fn run(
-    is_asked: &(dyn Fn(&str) -> bool + Sync),
-    results: &Path,
-    environment: &Environment<'_>,
-    watch: &Watch<'_>,
-    show: impl FnOnce(&[Bench]),
-) -> Result<(), String> {
-    let measure = || {
-        let job = Job::new(Settings::read(environment)?, watch)?;
-        let asked = job.possible.iter().filter(|bench| is_asked(&bench.id())).map(|bench| bench.of).collect();
-        job.measure(&asked, results, watch)
-    };
-    let measured = threads::run_on(None, measure).and_then(|measured| measured.shown(watch, show));
-    measured.map_err(|failure| failure.to_string())
-}
-
-/// What can be measured.
-struct Job {
-    settings: Settings,
-    source: Source,
-    backends: Vec<String>,
-    possible: Vec<Bench>,
-}
-
-/// What was measured.
-struct Measured {
-    storage: reproduce::Storage,
-    /// Whether any scene was measured.
-    scenes: bool,
-    late: Vec<String>,
-    speed: Option<Speed>,
-    benches: Vec<Bench>,
-}
-
-impl Job {
-    fn new(settings: Settings, watch: &Watch<'_>) -> Result<Self, Failure> {
-        let source = Source::new(settings.data.clone(), settings.quick)?;
-        let backends = settings.backends(watch)?;
-        let possible = list::benches(&source.names(), &backends, None);
-        Ok(Self { settings, source, backends, possible })
+impl Settings {
+    /// Reads the settings. An empty variable counts as unset.
+    ///
+    /// # Errors
+    /// A message that names the invalid variable.
+    pub fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, Failure> {
+        let value = |name| variable(name).filter(|value| !value.is_empty());
+        let text = |name| value(name).map(|value| value.to_string_lossy().into_owned());
+        let quick = match text(SIZE).as_deref() {
+            None | Some("full") => false,
+            Some("quick") => true,
+            Some(other) => return Err(Failure::usage(format!("{SIZE}={other}: it is quick or full"))),
+        };
+        let named = text(BACKEND).map(|names| names.split(',').map(str::to_owned).collect());
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        Ok(Self { quick, named, data: value(DATA).map(|folder| workspace.join(folder)) })
     }
 
-    fn measure(&self, asked: &HashSet<Of>, results: &Path, watch: &Watch<'_>) -> Result<Measured, Failure> {
-        let Self { settings, source, backends, .. } = self;
-        let devices = Asked::open_all(backends, watch).map_err(|failure| failure.of(settings::BACKEND))?;
-        let is_asked = |name: &str| asked.iter().any(|of| matches!(of, Of::Scene(scene) if *scene == name));
-        let scenes = source.names().into_iter().any(is_asked);
-        if scenes {
-            watch.note(&format!("scenes: {}", source.set.described));
-            source.check()?;
+    /// The scenes.
+    ///
+    /// # Errors
+    /// If the folder of public data lacks them.
+    pub fn source(&self) -> Result<Source, Failure> {
+        Source::new(self.data.clone(), self.quick)
+    }
+
+    /// Opens the devices.
+    ///
+    /// # Errors
+    /// If a name is wrong, or none of them is available.
+    pub fn open(&self, watch: &Watch<'_>) -> Result<Vec<Asked>, Failure> {
+        Asked::open_all(&self.backends(watch)?, watch).map_err(|failure| failure.of(BACKEND))
+    }
+
+    /// Number of rounds. Every contestant takes one turn in each.
+    fn rounds(&self) -> u32 {
+        if self.quick { QUICK_ROUNDS } else { ROUNDS }
+    }
+
+    /// The backends by their names in records: those requested, otherwise all, or in a full run those that matter.
+    fn backends(&self, watch: &Watch<'_>) -> Result<Vec<String>, Failure> {
+        let by_default = || backends::ALL.iter().filter(|backend| self.quick || matters(**backend, watch));
+        let names =
+            self.named.clone().unwrap_or_else(|| by_default().map(|backend| backend.name().to_owned()).collect());
+        let mut chosen: Vec<String> = Vec::new();
+        for name in &names {
+            let name = backends::choose(name, None).map_err(|failure| failure.of(BACKEND))?.name;
+            if chosen.contains(&name) {
+                return Err(Failure::usage(format!("{BACKEND} names {name} twice")));
+            }
+            chosen.push(name);
         }
-        let run = reproduce::settings(source, &devices, settings.quick, settings.rounds());
+        Ok(chosen)
+    }
+}
+
+/// Measures the thesis's tables on the scenes whose names contain one of `scenes`, or on all if there are none. Writes the
+/// record, tables and charts to a new folder in `results`.
+///
+/// # Errors
+/// If something could not be measured or written, or no scene has such a name.
+pub fn thesis(settings: &Settings, scenes: &[&String], results: &Path, watch: &Watch<'_>) -> Result<(), Failure> {
+    threads::run_on(None, || {
+        let (source, devices) = (settings.source()?, settings.open(watch)?);
+        let is_asked = |name: &str| scenes.is_empty() || scenes.iter().any(|part| name.contains(part.as_str()));
+        if !source.names().into_iter().any(is_asked) {
+            return Err(Failure::usage(format!("no scene is called so; there are {}", source.names().join(", "))));
+        }
+        watch.note(&format!("scenes: {}", source.set.described));
+        source.check()?;
+        let run = reproduce::settings(&source, &devices, settings.quick, settings.rounds());
         let mut storage = reproduce::begin(results, machine::program()?, machine::machine(None), run)?;
-        let mut late = Vec::new();
-        if scenes {
-            let ran = reproduce::run(source, &devices, &mut storage, &is_asked, watch);
-            late = ran.inspect_err(|_| {
-                let folder = storage.folder().display();
-                watch.note(&format!(
-                    "what was measured is in {folder}; `bp report {folder}` makes its tables and charts"
-                ));
-            })?;
-            report::write(storage.folder(), storage.record())?;
-        }
-        let problem = |of: &Of| if let Of::Problem(name) = of { Some((*name).to_owned()) } else { None };
-        let speed = kernels(settings, asked.iter().filter_map(problem).collect(), &devices, watch)?;
-        if let Some(speed) = &speed {
-            watch.note(&Files::new(storage.folder())?.write(speed)?);
-        }
-        let benches = list::benches(&source.names(), backends, Some((storage.record(), speed.as_ref())));
-        Ok(Measured { storage, scenes, late, speed, benches })
+        let late = reproduce::run(&source, &devices, &mut storage, &is_asked, watch).inspect_err(|_| {
+            let folder = storage.folder().display();
+            watch.note(&format!("what was measured is in {folder}; `bp report {folder}` makes its tables and charts"));
+        })?;
+        report::write(storage.folder(), storage.record())?;
+        watch.note(&format!("tables and charts: {}", storage.folder().join(report::PAGE_FILE).display()));
+        reproduce::check_cells(storage.record(), late)
+    })
+}
+
+/// Whether a full run includes the backend by default. The reference and software rasterisers would turn minutes into
+/// an hour, and a quick run says as much about the algorithms on them.
+fn matters(backend: &dyn Backend, watch: &Watch<'_>) -> bool {
+    let name = backend.name();
+    let software = backend.devices().into_iter().next().filter(|info| info.kind == DeviceKind::SoftwareRasteriser);
+    let why = match software {
+        Some(info) => format!("{} is a software rasteriser", info.name),
+        None if name == backends::ALL[0].name() => "it is the reference, and slow".to_owned(),
+        None => return true,
+    };
+    watch.note(&format!("{name}: left out of a full run: {why}; {BACKEND}={name} asks for it"));
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(variables: &[(&str, &str)]) -> Result<Settings, Failure> {
+        Settings::read(|name| Some(variables.iter().find(|(known, _)| *known == name)?.1.into()))
     }
-}
 
-/// Measures the problems, if any.
-fn kernels(
-    settings: &Settings,
-    problems: Vec<String>,
-    devices: &[Asked],
-    watch: &Watch<'_>,
-) -> Result<Option<Speed>, Failure> {
-    let options = SpeedOptions { rounds: Some(settings.rounds()), quick: settings.quick, problems, output: None };
-    let asked = (!options.problems.is_empty()).then(|| speed::measure(&options, devices, watch));
-    asked.transpose()
-}
+    #[test]
+    fn variables_are_followed_and_empty_ones_are_none() {
+        let full = Settings { quick: false, named: None, data: None };
+        assert_eq!(read(&[]).unwrap(), full);
+        assert_eq!(read(&[(SIZE, ""), (BACKEND, ""), (DATA, "")]).unwrap(), full);
+        assert_eq!(read(&[(SIZE, "full")]).unwrap(), full);
+        let quick = read(&[(SIZE, "quick"), (BACKEND, "rayon,scalar"), (DATA, "/data")]).unwrap();
+        assert_eq!(quick.data, Some(PathBuf::from("/data")));
+        assert_eq!(quick.backends(&Watch::default()).unwrap(), ["rayon", "scalar"]);
+        assert!(quick.rounds() < full.rounds());
+    }
 
-impl Measured {
-    /// Shows the benches and reports where the tables and charts are; fails if something could not be measured.
-    fn shown(self, watch: &Watch<'_>, show: impl FnOnce(&[Bench])) -> Result<(), Failure> {
-        show(&self.benches);
-        if self.scenes {
-            watch.note(&format!("tables and charts: {}", self.storage.folder().join(report::PAGE_FILE).display()));
-            reproduce::check_cells(self.storage.record(), self.late)?;
+    #[test]
+    fn a_folder_of_data_is_taken_from_the_workspace_s() {
+        let data = read(&[(DATA, "crates/harness/src")]).unwrap().data.unwrap();
+        assert!(data.join("bench.rs").exists(), "{}", data.display());
+    }
+
+    #[test]
+    fn every_backend_is_in_a_quick_run_and_the_slow_reference_not_in_a_full_one() {
+        let backends = |size| read(&[(SIZE, size)]).unwrap().backends(&Watch::default()).unwrap();
+        let [quick, full] = ["quick", "full"].map(backends);
+        assert_eq!(quick.len(), backends::ALL.len());
+        assert!(full.contains(&"rayon".to_owned()) && !full.contains(&"scalar".to_owned()), "{full:?}");
+    }
+
+    #[test]
+    fn what_a_variable_must_not_say_is_refused_by_its_name() {
+        let told = |variables: &[(&str, &str)]| {
+            read(variables).and_then(|settings| settings.backends(&Watch::default())).unwrap_err().to_string()
+        };
+        let size = told(&[(SIZE, "fast")]);
+        assert!(size.contains("BP_BENCH=fast") && size.contains("quick or full"), "{size}");
+        for (names, word) in [("magic", "scalar"), ("rayon,", "scalar"), ("rayon,rayon:0", "rayon twice")] {
+            let backend = told(&[(BACKEND, names)]);
+            assert!(backend.contains(BACKEND) && backend.contains(word), "{backend}");
         }
-        self.speed.as_ref().map_or(Ok(()), speed::check)
     }
 }

@@ -11,7 +11,7 @@ impl Plan {
     pub fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         let (grids, settings, pixels) = (self.grids(), self.settings(), self.image_size().pixels() as u64);
         let costs_of_step = |grid: usize| match settings.schedule {
-            Schedule::Sync => Some(self.volume(grid) as u64),
+            Schedule::Sync | Schedule::Outward { .. } => Some(self.volume(grid) as u64),
             Schedule::Checkerboard => Some(self.volume(grid) as u64 / 2),
             Schedule::Sweep => None,
         };

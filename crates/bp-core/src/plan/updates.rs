@@ -15,7 +15,7 @@ impl Plan {
     pub fn updates_per_step(&self, grid: usize) -> u64 {
         let edges = self.edges(grid);
         let messages = match self.settings.schedule {
-            Schedule::Sync => 2 * edges,
+            Schedule::Sync | Schedule::Outward { .. } => 2 * edges,
             Schedule::Checkerboard => edges,
             Schedule::Sweep => {
                 let seams = Seam::all(self.sizes[grid].height);

@@ -1,4 +1,4 @@
-//! The 14 diagrams of the thesis.
+//! The 14 diagrams of the thesis. Beside each of times there is one of speed-ups.
 
 use bp_charts::{Axis, DotChart, Fill, Key, Level, Series, Style, Value};
 
@@ -7,7 +7,7 @@ use super::{
     format::{Spread, mebibytes, number},
     legend,
     results::{Part, Results, Row},
-    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family, with_parts},
+    tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, Table, family, thesis_plans, with_parts},
 };
 use crate::{failure::Failure, record::Measurement};
 
@@ -46,14 +46,14 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
         let what = format!("{} against BP", family(plans));
         // However the parts are arranged, the labels are the same.
         let arranged = with_parts(results, plans);
-        drawings.push(speed_ups(results, speed, &what, &arranged, &both)?);
+        drawings.extend(speeds(results, speed, &what, &arranged, &both)?);
         let with_bp = [&[BP], arranged.as_slice()].concat();
         drawings.extend(memory.map(|memory| memories(results, memory, &what, &with_bp)).transpose()?);
         drawings.push(errors(results, reliability, &what, &[&[BP], plans].concat())?);
     }
     let five = [BP, CFBP, CFCSBP, CTBP, CTCSBP[0]];
     let what = "All algorithms against BP";
-    drawings.push(speed_ups(results, numbers("4.12", "3.29"), what, &five[1..], &[Part::Total])?);
+    drawings.extend(speeds(results, numbers("4.12", "3.29"), what, &thesis_plans()[1..], &[Part::Total])?);
     drawings.push(memories(results, numbers("4.13", "3.30"), "All algorithms", &five)?);
     drawings.push(errors(results, numbers("4.14", "3.31"), "All algorithms", &five)?);
     for (drawing, why) in drawings.iter_mut().flat_map(|drawing| Some((drawing, results.unavailable()?))) {
@@ -62,39 +62,93 @@ pub(super) fn all(results: &Results<'_>) -> Result<Vec<Drawing>, Failure> {
     Ok(drawings)
 }
 
-fn speed_ups(
+/// What a diagram of processing speed shows.
+#[derive(Clone, Copy)]
+enum Speed {
+    /// Times, as in the thesis.
+    Milliseconds,
+    /// The same as speed-ups over BP.
+    SpeedUp,
+}
+
+impl Speed {
+    fn measured(self, row: &Row<'_>, plan: &Named, part: Part) -> Option<Spread> {
+        match self {
+            Self::Milliseconds => row.time(plan.plan, part),
+            Self::SpeedUp => row.speed_up(plan.plan, part),
+        }
+    }
+
+    fn printed(self, results: &Results<'_>, plan: &Named, index: usize) -> Option<f64> {
+        let ms = results.thesis.time_ms(plan.printed?, index)?;
+        match self {
+            Self::Milliseconds => Some(ms),
+            Self::SpeedUp => Some(results.thesis.time_ms("bp", index)? / ms),
+        }
+    }
+
+    /// The heading, the axis and how to read the values.
+    fn words(self) -> [&'static str; 3] {
+        match self {
+            Self::Milliseconds => ["processing time", "ms from images to labels", "Lower is faster."],
+            Self::SpeedUp => [
+                "speed-up",
+                "time of BP / time of the plan",
+                "A value above 1 is faster than BP; parts side by side are compared with BP on one worker.",
+            ],
+        }
+    }
+}
+
+/// A diagram of BP's and these plans' times, and beside it that of their speed-ups over BP.
+fn speeds(
     results: &Results<'_>,
     numbers: Numbers,
     what: &str,
     plans: &[Named],
     parts: &[Part],
+) -> Result<[Drawing; 2], Failure> {
+    let times = speed(results, numbers, what, &[&[BP], plans].concat(), parts, Speed::Milliseconds)?;
+    let speed_ups = speed(results, numbers, what, plans, parts, Speed::SpeedUp)?;
+    let (name, title) = (format!("{}-speed-up", times.name), format!("{}, beside it", speed_ups.title));
+    Ok([times, Drawing { name, title, ..speed_ups }])
+}
+
+fn speed(
+    results: &Results<'_>,
+    numbers: Numbers,
+    what: &str,
+    plans: &[Named],
+    parts: &[Part],
+    shown: Speed,
 ) -> Result<Drawing, Failure> {
+    let overlaps = results.rows().any(|row| plans.iter().any(|plan| row.workers(plan.plan).is_some()));
     let group = |plan: &Named| {
         let mut group = Group::default();
-        let overlaps = results.rows().any(|row| row.workers(plan.plan).is_some());
         for &part in parts.iter().filter(|&&part| part == Part::Total || !overlaps) {
             let (name, fill) = match part {
                 Part::MessagePassing => ("message passing", Fill::Pale),
                 Part::Total => ("total", Fill::Solid),
             };
             let name = format!("{}: {name}", plan.title);
-            group.add_measured(results, plan, name, fill, |row| row.speed_up(plan.plan, part));
+            group.add_measured(results, plan, name, fill, |row| shown.measured(row, plan, part));
         }
         if plan.printed.is_some() {
-            group.add_printed(results, plan);
+            group.add_printed(results, plan, |index| shown.printed(results, plan, index));
         }
         group
     };
-    let axis = Axis::logarithmic("time of BP / time of the plan");
-    let chart = chart(results, format!("{what}: speed-up"), axis, plans.iter().map(group), Some(1.0));
-    let pale = if parts.len() == 1 { "" } else { " Pale markers show message passing alone." };
+    let [heading, axis, note] = shown.words();
+    let as_fast = matches!(shown, Speed::SpeedUp).then_some(1.0);
+    let groups = plans.iter().map(group);
+    let chart = chart(results, format!("{what}: {heading}"), Axis::logarithmic(axis), groups, as_fast);
+    let pale = if parts.len() == 1 || overlaps { "" } else { " Pale markers show message passing alone." };
     let caption = format!(
-        "A value above 1 is faster than BP; parts side by side are compared with BP on one worker. Filled markers show the total time, measured in this run. Hollow markers beside \
-         them show what the thesis prints for the same plan on its GPU.{pale} Whiskers are ranges over rounds."
+        "{note} Filled markers show the total time, measured in this run. Hollow markers beside them show what the thesis \
+         prints for the same plan on its GPU.{pale} Whiskers are ranges over rounds."
     );
     drawing(numbers, chart, &caption)
 }
-
 fn memories(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
     let groups = measured(results, plans, |measured| mebibytes(measured.allocated_bytes));
     let chart = chart(results, format!("{what}: required memory"), Axis::linear("MiB allocated"), groups, None);
@@ -146,17 +200,14 @@ impl Group {
         self.keys.push(Key { style: legend::any_device(results, plan).filled(fill), name });
     }
 
-    /// Adds the printed speed-ups of a plan, beside the measured ones. The thesis's Z'''' is not known, so all plans of
-    /// CTCSBP have the same.
-    fn add_printed(&mut self, results: &Results<'_>, plan: &Named) {
-        let value = |index| {
-            let value = results.thesis.time_ms("bp", index)? / results.thesis.time_ms(plan.printed?, index)?;
-            Some(value.into())
-        };
+    /// Adds the printed values of a plan, beside the measured ones. The thesis's Z'''' is not known, so all plans of CTCSBP
+    /// have the same.
+    fn add_printed(&mut self, results: &Results<'_>, plan: &Named, value: impl Fn(usize) -> Option<f64>) {
         let name = format!("{}: printed", plan.title);
         let style: Style = legend::any_device(results, plan).filled(Fill::Hollow);
         self.keys.push(Key { name: name.clone(), style });
-        self.series.push(Series { name, style, points: results.scenes().map(|(index, _)| value(index)).collect() });
+        let points = results.scenes().map(|(index, _)| value(index).map(Value::from)).collect();
+        self.series.push(Series { name, style, points });
     }
 }
 

@@ -73,7 +73,8 @@ pub(super) fn part(page: &Path, run: &Path, results: &Results<'_>) -> String {
         devices.join("; "),
         own_plans(results)
     );
-    let chart = format!("![Speed-up of all algorithms over BP, printed and measured]({link}/diagram-4.12.svg)");
+    let chart =
+        format!("![Speed-up of all algorithms over BP, printed and measured]({link}/diagram-4.12-speed-up.svg)");
     format!("{chart}\n\n{}\n{note}\n", grid(&means::table(results)))
 }
 
