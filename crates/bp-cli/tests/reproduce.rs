@@ -119,7 +119,8 @@ fn check_report(folder: &Path) {
     }
     // The diagrams A.1 to A.4 are our own: error, memory, and the energies of two profiles.
     let diagrams = (1..=14).map(|i| format!("diagram-4.{i}")).chain((1..=4).map(|i| format!("diagram-A.{i}")));
-    let diagrams: Vec<_> = diagrams.collect();
+    let speed_ups = [1, 4, 7, 9, 12].map(|i| format!("diagram-4.{i}-speed-up"));
+    let diagrams: Vec<_> = diagrams.chain(speed_ups).collect();
     for name in &diagrams {
         let (width, height) = image::image_dimensions(folder.join(format!("{name}.png"))).unwrap();
         assert!(width == 1800 && height >= 960, "{name}");
@@ -134,6 +135,15 @@ fn check_report(folder: &Path) {
         BACKENDS.contains("vulkan"),
         "the reason beneath the tables"
     );
+    let all_plans = fs::read_to_string(folder.join("diagram-4.12.svg")).unwrap();
+    for text in [
+        "ms; ",
+        "BP: printed",
+        "CTCSBP, Z&apos;&apos;&apos;&apos;=3: total",
+        "CTCSBP, Z&apos;&apos;&apos;&apos;=4: printed",
+    ] {
+        assert!(all_plans.contains(text) || all_plans.contains(&text.replace("&apos;", "'")), "{text}");
+    }
     for plan in ["CTBP, side by side", "CTBP, in turn", "CTCSBP, Z''''=2, side by side", "CTCSBP, Z''''=2, in turn"] {
         let rows = markdown.lines().filter(|line| line.contains(&format!("| {plan} |")));
         // Three tables of the algorithm and three against BP have a row for each scene and backend.
@@ -161,6 +171,11 @@ const PRINTED: [(&str, &str, &str, Option<&str>); 5] = [
 /// Checks that every printed number stands in its table, in each row of its image and algorithm.
 fn check_printed(markdown: &str) {
     let thesis: serde_json::Value = serde_json::from_str(THESIS).unwrap();
+    assert_eq!((&thesis["times_ms"]["bp"][0], &thesis["speed_up_percent"]["cfbp"][0]), (&439.into(), &113.11.into()));
+    for part in thesis["computer"].as_array().unwrap() {
+        let printed = [0, 1].map(|column| part[column].as_str().unwrap());
+        assert!(section(markdown, "3.1").any(|cells| cells[..2] == printed), "{printed:?}");
+    }
     for (image, printed) in thesis["images"].as_array().unwrap().iter().enumerate() {
         let size = format!("{}x{}", printed["width"], printed["height"]);
         let row = [printed["name"].as_str().unwrap().to_owned(), size, printed["disparity_true"].to_string()];

@@ -173,6 +173,11 @@ impl Algorithm {
 
     /// Fails if options contradict each other.
     pub(crate) fn check(&self) -> Result<(), Error> {
+        if matches!(self.loops().map(Loops::schedule), Some(Schedule::Outward { .. })) {
+            return Err(Error::Options(
+                "the schedule `outward` is an experiment of `bp-core`: take another".to_owned(),
+            ));
+        }
         let is_total = matches!(self.loops(), Some(Loops::Total { .. }));
         if self.hierarchy().is_some_and(|hierarchy| hierarchy.grids.is_some()) && is_total {
             return Err(Error::Options("`grids` needs `loops` that count on each grid".to_owned()));
@@ -298,6 +303,9 @@ mod tests {
         let hierarchy = Hierarchy { label_sets: true, ..Hierarchy::default() };
         let cfbp = |schedule| Algorithm::Cfbp { loops: Loops::Total { k: None, schedule }, hierarchy };
         assert!(cfbp(schedule).check().is_err() && cfbp(Schedule::Sweep).check().is_ok());
+        let start = bp_core::Node { x: 0, y: 0 };
+        let outward = Loops::Total { k: None, schedule: Schedule::Outward { start } };
+        assert!(Algorithm::Bp { loops: outward }.check().is_err(), "an experiment of bp-core only");
         assert!(cfbp(Schedule::Sweep).settings(size, 50).label_sets);
     }
 }

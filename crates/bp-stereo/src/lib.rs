@@ -44,7 +44,7 @@ mod watch;
 
 pub use algorithm::{Algorithm, Hierarchy, Loops};
 pub use alignment::align_camera;
-pub use bp_core::{Alignment, DisparityMap, Energy, Image, Node, Profile, Schedule, Size, StereoPair};
+pub use bp_core::{Alignment, DisparityMap, Energy, Image, Profile, Schedule, Size, StereoPair};
 pub use bp_io as io;
 pub use error::{Cause, Error};
 pub use finishing::AnswerTimes;

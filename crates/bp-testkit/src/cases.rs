@@ -34,24 +34,21 @@ pub fn cases() -> impl Iterator<Item = Case> {
 }
 
 /// Cases of [`Schedule::Outward`]: start nodes at corners, borders and inside, whole images and parts.
-pub fn outward_cases() -> impl Iterator<Item = Case> {
+pub(crate) fn outward_cases() -> impl Iterator<Item = Case> {
     let sizes = [(1, 1), (1, 5), (7, 1), (2, 3), (13, 11), (35, 6), (9, 40)];
-    let labels = [1, 2, 16, 70];
-    let starts = |width, height| [(0, 0), (width / 2, height / 2), (width - 1, 0), (width / 3, height - 1)];
-    let problems = sizes.into_iter().flat_map(move |size| labels.map(|labels| (size, labels)));
-    problems.flat_map(move |((width, height), labels)| {
-        let pair = noise_pair(width, height, labels as u64);
-        let of = move |((x, y), model)| {
+    let problems = sizes.into_iter().flat_map(|size| [1, 2, 16, 70].map(|labels| (size, labels)));
+    let models = problems.flat_map(|(size, labels)| models(labels).into_iter().map(move |model| (size, model)));
+    models.flat_map(|((width, height), model)| {
+        let pair = noise_pair(width, height, model.labels() as u64);
+        let starts = [(0, 0), (width / 2, height / 2), (width - 1, 0), (width / 3, height - 1)];
+        let cut = Cut { x: 2 * width / 3, y: height / 3, seed_start: false };
+        let settings = starts.into_iter().flat_map(move |(x, y)| {
             let schedule = Schedule::Outward { start: Node { x, y } };
-            let whole = Algorithm::Bp.settings(pair.size(), 3, 1, schedule);
-            let cut = Cut { x: 2 * width / 3, y: height / 3, seed_start: false };
-            let parts = Algorithm::Ctbp.settings(pair.size(), 2, 1, schedule);
-            [whole, parts, Settings { cut: Some(cut), ..parts }].map(|settings| case(&pair, model, settings))
-        };
-        let all = starts(width, height)
-            .into_iter()
-            .flat_map(move |start| models(labels).into_iter().map(move |model| (start, model)));
-        all.flat_map(of).flatten()
+            let of = |algorithm: Algorithm| algorithm.settings(Size { width, height }, 3, 1, schedule);
+            let parts = of(Algorithm::Ctbp);
+            [of(Algorithm::Bp), parts, Settings { cut: Some(cut), ..parts }]
+        });
+        settings.map(move |settings| Case::new(pair.clone(), model, settings).unwrap_or_else(|error| panic!("{error}")))
     })
 }
 

@@ -27,9 +27,9 @@ pub mod synthetic;
 mod videos;
 
 pub use case::{Answer, Case, solve};
-pub use cases::{cases, outward_cases};
+pub use cases::cases;
 pub use difference::{Difference, Fault};
 pub use noise::{noise_pair, stepped_pair};
 pub use oracle::Oracle;
 pub use random::random_case;
-pub use suite::{compare, compare_at_random, conform, conform_every};
+pub use suite::{compare, compare_at_random, conform, conform_every, conform_outward};

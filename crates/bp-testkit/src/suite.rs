@@ -5,8 +5,13 @@ use std::ops::ControlFlow;
 use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
 
 use crate::{
-    Answer, Case, Difference, Fault, cases, difference::same, noise_pair, parts::compare_parts, random_case, solve,
-    videos::compare_videos,
+    Answer, Case, Difference, Fault, cases,
+    cases::outward_cases,
+    difference::same,
+    noise_pair,
+    parts::compare_parts,
+    random_case, solve,
+    videos::{compare_outward_videos, compare_videos},
 };
 
 /// Bytes of scratch memory that a device may allocate beyond its plan.
@@ -35,6 +40,17 @@ pub fn conform_every(n: usize, reference: &dyn Device, tested: &dyn Device) -> R
         forgets(tested, &case)?;
         allocates_as_planned(tested, &case.plan)
     })
+}
+
+/// Runs a suite for the experiment [`Schedule::Outward`], which only some backends have.
+///
+/// # Errors
+/// The first difference.
+pub fn conform_outward(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
+    outward_cases().try_for_each(|case| compare(reference, tested, &case))?;
+    compare_outward_videos(reference, tested)?;
+    outward_cases().step_by(37).try_for_each(|case| forgets(tested, &case))?;
+    outward_cases().step_by(37).try_for_each(|case| allocates_as_planned(tested, &case.plan))
 }
 
 /// Checks that two devices give the same labels and messages for a case.

@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use bp_core::{Algorithm, Cut, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings, Size, StereoPair};
+use bp_core::{
+    Algorithm, Cut, Device, Driver, Error, Model, Node, Plan, Profile, Schedule, Settings, Size, StereoPair,
+};
 
 use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve};
 
@@ -15,31 +17,42 @@ const FRAMES: u64 = 3;
 /// The first difference. The tested device may refuse only the schedule `sweep`, if the reference does too, and `sync`
 /// with an odd number of steps.
 pub(crate) fn compare_videos(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
-    plans().try_for_each(|plan| {
-        let Size { width, height } = plan.image_size();
-        let frames: Vec<StereoPair> = (0..FRAMES).map(|seed| noise_pair(width, height, seed)).collect();
-        let schedule = plan.settings().schedule;
-        match (video(reference, &plan, &frames), video(tested, &plan, &frames)) {
-            (Err(Error::Plan(_)), Err(Error::Plan(_))) if schedule == Schedule::Sweep => Ok(()),
-            (Ok(_), Err(Error::Unsupported { .. })) if schedule == Schedule::Sync && plan.settings().steps % 2 == 1 => {
-                Ok(())
-            }
-            (Ok(expected), Ok(found)) => {
-                for ((expected, found), pair) in expected.iter().zip(&found).zip(&frames) {
-                    same(expected, found, &Case { pair: pair.clone(), plan: plan.clone() })?;
-                }
-                forgets(tested, &plan, &frames)
-            }
-            (expected, found) => {
-                Err(Difference::new(Fault::Refusal { expected: expected.err(), found: found.err() }, &plan))
-            }
-        }
-    })
+    plans(&Schedule::ALL).try_for_each(|plan| compare_video(reference, tested, plan))
 }
 
-fn plans() -> impl Iterator<Item = Plan> {
+/// The same under [`Schedule::Outward`].
+///
+/// # Errors
+/// The first difference.
+pub(crate) fn compare_outward_videos(reference: &dyn Device, tested: &dyn Device) -> Result<(), Difference> {
+    let start = Node { x: 0, y: 0 };
+    plans(&[Schedule::Outward { start }]).try_for_each(|plan| compare_video(reference, tested, plan))
+}
+
+fn compare_video(reference: &dyn Device, tested: &dyn Device, plan: Plan) -> Result<(), Difference> {
+    let Size { width, height } = plan.image_size();
+    let frames: Vec<StereoPair> = (0..FRAMES).map(|seed| noise_pair(width, height, seed)).collect();
+    let schedule = plan.settings().schedule;
+    match (video(reference, &plan, &frames), video(tested, &plan, &frames)) {
+        (Err(Error::Plan(_)), Err(Error::Plan(_))) if schedule == Schedule::Sweep => Ok(()),
+        (Ok(_), Err(Error::Unsupported { .. })) if schedule == Schedule::Sync && plan.settings().steps % 2 == 1 => {
+            Ok(())
+        }
+        (Ok(expected), Ok(found)) => {
+            for ((expected, found), pair) in expected.iter().zip(&found).zip(&frames) {
+                same(expected, found, &Case { pair: pair.clone(), plan: plan.clone() })?;
+            }
+            forgets(tested, &plan, &frames)
+        }
+        (expected, found) => {
+            Err(Difference::new(Fault::Refusal { expected: expected.err(), found: found.err() }, &plan))
+        }
+    }
+}
+
+fn plans(schedules: &[Schedule]) -> impl Iterator<Item = Plan> {
     let sizes = [(1, 1), (1, 4), (7, 1), (13, 11), (67, 40)].map(|(width, height)| Size { width, height });
-    let all = sizes.into_iter().flat_map(|size| Schedule::ALL.map(|schedule| (size, schedule)));
+    let all = sizes.into_iter().flat_map(|size| schedules.iter().map(move |&schedule| (size, schedule)));
     all.flat_map(|(size, schedule)| {
         let several = Settings { grids: 3, ..Algorithm::Cfbp.settings(size, 1, 1, schedule) };
         let cut = Some(Cut { x: size.width / 3, y: size.height / 2, seed_start: true });

@@ -32,6 +32,10 @@ fn tell(event: Event<'_>) {
 fn run(arguments: &[String]) -> Result<(), String> {
     let (options, scenes): (Vec<_>, Vec<_>) = arguments.iter().partition(|argument| argument.starts_with('-'));
     let has = |option: &str| options.iter().any(|argument| *argument == option);
+    let known = ["--bench", "--test", "--list", "--quiet"];
+    if let Some(option) = options.iter().find(|option| !known.contains(&option.as_str())) {
+        return Err(format!("{option}: this bench only takes scenes; for criterion's options, name --bench matches"));
+    }
     // Cargo and criterion distinguish a run of benches from a test of them in the same way.
     if !has("--bench") || has("--test") || has("--list") {
         eprintln!("nothing is measured: run it by cargo bench");

@@ -1,4 +1,4 @@
-//! What a start node changes: the energy and the errors of BP after each loop, in five orders of passing messages.
+//! What a start node changes: the energy and the errors of BP after each loop, in six orders of passing messages.
 //!
 //! `cargo run --release -p harness --example start_node -- DATA FOLDER` measures the thesis's six scenes on the reference
 //! backend (half an hour of one core) and writes `energies.json`, `start-node.md` and `start-node.svg` to FOLDER.

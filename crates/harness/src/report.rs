@@ -21,7 +21,6 @@ use bp_charts::png;
 pub use grid::lines;
 pub use opening::headline;
 pub use opening::{device_fact, machine_fact, program_fact};
-pub use tables::of_times as table_of_times;
 
 use crate::{
     failure::Failure,

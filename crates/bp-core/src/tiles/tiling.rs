@@ -44,9 +44,13 @@ impl Tiling {
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
     /// around them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
     /// keeps have the same costs as in the whole image; likewise on the right. Under [`Schedule::Sweep`] no halo has more
-    /// than 64 rows.
+    /// than 64 rows. Under [`Schedule::Outward`] the image is one tile.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
+        if let Schedule::Outward { .. } = plan.settings().schedule {
+            // Its messages reach every node from the start node, however far away.
+            return Self::whole(plan);
+        }
         let Size { width, height } = plan.image_size();
         let (model, align) = (plan.model(), align(&plan));
         let [left, right] = [model.disparity(model.labels() as u16 - 1), -model.min_disparity()]

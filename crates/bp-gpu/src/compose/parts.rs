@@ -191,8 +191,7 @@ impl Composer<'_> {
                 self.join_strips(part, grid, written, &[Side::Up, Side::Down]);
             }
             Schedule::Sweep => self.sweep(part, grid),
-            // No such plan is composed.
-            Schedule::Outward { .. } => {}
+            Schedule::Outward { .. } => unreachable!("no such plan is composed"),
         }
     }
 

@@ -90,7 +90,7 @@ impl Speed {
     /// The heading, the axis and how to read the values.
     fn words(self) -> [&'static str; 3] {
         match self {
-            Self::Milliseconds => ["processing time", "ms from images to labels", "Lower is faster."],
+            Self::Milliseconds => ["processing time", "ms", "Lower is faster."],
             Self::SpeedUp => [
                 "speed-up",
                 "time of BP / time of the plan",
@@ -110,8 +110,8 @@ fn speeds(
 ) -> Result<[Drawing; 2], Failure> {
     let times = speed(results, numbers, what, &[&[BP], plans].concat(), parts, Speed::Milliseconds)?;
     let speed_ups = speed(results, numbers, what, plans, parts, Speed::SpeedUp)?;
-    let (name, title) = (format!("{}-speed-up", times.name), format!("{}, beside it", speed_ups.title));
-    Ok([times, Drawing { name, title, ..speed_ups }])
+    let name = format!("{}-speed-up", times.name);
+    Ok([times, Drawing { name, ..speed_ups }])
 }
 
 fn speed(
@@ -122,9 +122,9 @@ fn speed(
     parts: &[Part],
     shown: Speed,
 ) -> Result<Drawing, Failure> {
-    let overlaps = results.rows().any(|row| plans.iter().any(|plan| row.workers(plan.plan).is_some()));
     let group = |plan: &Named| {
         let mut group = Group::default();
+        let overlaps = results.rows().any(|row| row.workers(plan.plan).is_some());
         for &part in parts.iter().filter(|&&part| part == Part::Total || !overlaps) {
             let (name, fill) = match part {
                 Part::MessagePassing => ("message passing", Fill::Pale),
@@ -142,13 +142,14 @@ fn speed(
     let as_fast = matches!(shown, Speed::SpeedUp).then_some(1.0);
     let groups = plans.iter().map(group);
     let chart = chart(results, format!("{what}: {heading}"), Axis::logarithmic(axis), groups, as_fast);
-    let pale = if parts.len() == 1 || overlaps { "" } else { " Pale markers show message passing alone." };
+    let pale = if parts.len() == 1 { "" } else { " Pale markers show message passing alone." };
     let caption = format!(
         "{note} Filled markers show the total time, measured in this run. Hollow markers beside them show what the thesis \
          prints for the same plan on its GPU.{pale} Whiskers are ranges over rounds."
     );
     drawing(numbers, chart, &caption)
 }
+
 fn memories(results: &Results<'_>, numbers: Numbers, what: &str, plans: &[Named]) -> Result<Drawing, Failure> {
     let groups = measured(results, plans, |measured| mebibytes(measured.allocated_bytes));
     let chart = chart(results, format!("{what}: required memory"), Axis::linear("MiB allocated"), groups, None);

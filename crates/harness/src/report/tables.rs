@@ -116,12 +116,6 @@ const SINGLE: [(&[Named], [&str; 3]); 5] = [
     (&CTCSBP, ["3.15", "3.16", "3.17"]),
 ];
 
-/// The table with a plan's times: its number, and the algorithm it is about.
-pub fn of_times(plan: &str) -> (&'static str, &'static str) {
-    let single = SINGLE.iter().find(|(plans, _)| plans.iter().any(|named| named.plan == plan));
-    single.map_or((ours::PROFILES, "ours"), |&(plans, [speed, ..])| (speed, family(plans)))
-}
-
 /// All tables, in order.
 pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
     let mut tables = vec![setting::computer(results), setting::images(results)];
