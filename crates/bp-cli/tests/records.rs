@@ -159,3 +159,20 @@ fn recorded_accuracy_is_that_of_the_prototypes() {
     }
     assert!(compared > 0);
 }
+
+/// The table of start nodes on the page of claims is that of its record, and the record's.
+#[test]
+fn the_table_of_start_nodes_is_made_from_its_record() {
+    let folder = root().join("results/2026-11-23-amd-epyc-2-cores-start-node");
+    let files = [root().join("docs/claims.md"), folder.join("start-node.md"), folder.join("energies.json")];
+    let [page, made, record] = files.map(|path| fs::read_to_string(path).unwrap());
+    let rows: Vec<_> = made.lines().filter(|line| line.starts_with('|')).collect();
+    assert!(page.contains(&rows.join("\n")));
+    let record: serde_json::Value = serde_json::from_str(&record).unwrap();
+    let runs = |order: &str| record["runs"].as_array().unwrap().iter().filter(move |run| run["order"] == order);
+    for row in &rows[2..] {
+        let cells: Vec<_> = row.split('|').map(str::trim).collect();
+        let wrong: Vec<_> = runs(cells[1]).map(|run| run["bad"][111].as_f64().unwrap()).collect();
+        assert_eq!((wrong.len(), cells[13]), (6, format!("{:.1}", wrong.iter().sum::<f64>() / 6.0).as_str()), "{row}");
+    }
+}
