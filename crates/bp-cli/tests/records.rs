@@ -169,10 +169,11 @@ fn the_table_of_start_nodes_is_made_from_its_record() {
     let rows: Vec<_> = made.lines().filter(|line| line.starts_with('|')).collect();
     assert!(page.contains(&rows.join("\n")));
     let record: serde_json::Value = serde_json::from_str(&record).unwrap();
-    let runs = |order: &str| record["runs"].as_array().unwrap().iter().filter(move |run| run["order"] == order);
+    let runs = record["runs"].as_array().unwrap();
     for row in &rows[2..] {
         let cells: Vec<_> = row.split('|').map(str::trim).collect();
-        let wrong: Vec<_> = runs(cells[1]).map(|run| run["bad"][111].as_f64().unwrap()).collect();
+        let wrong: Vec<_> =
+            runs.iter().filter(|run| run["order"] == cells[1]).map(|run| run["bad"][111].as_f64().unwrap()).collect();
         assert_eq!((wrong.len(), cells[13]), (6, format!("{:.1}", wrong.iter().sum::<f64>() / 6.0).as_str()), "{row}");
     }
 }
