@@ -3,7 +3,7 @@
 use std::{
     fmt::Display,
     fs,
-    io::{BufWriter, Write},
+    io::{BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
@@ -17,12 +17,14 @@ use crate::Error;
 pub struct Files {
     /// The prefix of the names of temporary files, by which those of a killed process can be found.
     temporary: String,
+    /// The folder below which no links are followed, if any.
+    owned: Option<PathBuf>,
 }
 
 /// Temporary files are named `.bp-` and random characters.
 impl Default for Files {
     fn default() -> Self {
-        Self { temporary: Self::PREFIX.to_owned() }
+        Self { temporary: Self::PREFIX.to_owned(), owned: None }
     }
 }
 
@@ -33,7 +35,35 @@ impl Files {
     /// Files whose temporary names begin with [`Files::PREFIX`], `owner` and a hyphen.
     #[must_use]
     pub fn of(owner: &str) -> Self {
-        Self { temporary: format!("{}{owner}-", Self::PREFIX) }
+        Self { temporary: format!("{}{owner}-", Self::PREFIX), owned: None }
+    }
+
+    /// The same, but below `folder` only regular files are written, and only folders are entered. A link there, which another
+    /// user of the folder may have made, would otherwise replace a file elsewhere.
+    #[must_use]
+    pub fn owning(self, folder: &Path) -> Self {
+        Self { owned: Some(folder.to_owned()), ..self }
+    }
+
+    /// Fails if a path below [`Files::owning`] is anything but a regular file or nothing, in folders.
+    ///
+    /// # Errors
+    /// [`Error::Write`], with the link or the other thing that is in the way.
+    pub fn check_own(&self, path: &Path) -> Result<(), Error> {
+        let Some(folder) = &self.owned else { return Ok(()) };
+        let Ok(below) = path.strip_prefix(folder) else { return Ok(()) };
+        let mut at = folder.clone();
+        for part in below {
+            at.push(part);
+            let Ok(about) = at.symlink_metadata() else { continue };
+            if about.is_symlink() {
+                return Err(Error::writing(&at, &"it is a link, which could lead out of the output folder; remove it"));
+            }
+            if at == path && !about.is_file() && !about.is_dir() {
+                return Err(Error::writing(&at, &"it is not a regular file; remove it"));
+            }
+        }
+        Ok(())
     }
 
     /// The prefix of the names of these temporary files.
@@ -51,11 +81,13 @@ impl Files {
         path: &Path,
         write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
     ) -> Result<(), Error> {
+        self.check_own(path)?;
         if is_stream(path) {
             return stream(path, write);
         }
-        // A symbolic link stays, and its target is replaced.
-        let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        // A symbolic link stays, and its target is replaced; but not one that came since the check above.
+        let path =
+            &if self.owned.is_some() { None } else { path.canonicalize().ok() }.unwrap_or_else(|| path.to_owned());
         self.filled_beside(path, write)?.persist(path).map_err(|failed| Error::writing(path, &failed.error))?;
         Ok(())
     }
@@ -92,8 +124,12 @@ impl Files {
     /// # Errors
     /// [`Error::Write`].
     pub fn check_writable(&self, path: &Path) -> Result<(), Error> {
-        if path.is_dir() {
-            return Err(Error::writing(path, &"it is a folder"));
+        self.check_own(path)?;
+        match path.metadata() {
+            Ok(about) if about.is_dir() => return Err(Error::writing(path, &"it is a folder")),
+            // A name that is too long, for example, or one with a NUL.
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::writing(path, &error)),
+            _ => {}
         }
         if is_stream(path) {
             return Ok(());

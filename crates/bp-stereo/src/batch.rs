@@ -94,28 +94,44 @@ impl Also {
 ///
 /// # Errors
 /// [`Error::Options`] and [`Error::Input`] before the work begins, [`Error::Stopped`], and errors that end the batch,
-/// such as an output that cannot be written or a device that is gone. A pair that fails is an entry of
+/// such as a device that is gone. A pair that fails, or whose outputs cannot be written, is an entry of
 /// [`Summary::failures`].
 pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
     check(options)?;
     let found = options.source.find(&options.output)?;
     found.notes.iter().for_each(|note| watch.note(note));
     let shard = options.shard;
+    let files = Files::of(&shard.file_part()).owning(&options.output);
+    let making = &Making { files, ..making.clone() };
     let jobs = job::jobs(options, making, &found.pairs)?;
-    let making = &Making { files: bp_io::Files::of(&shard.file_part()), ..making.clone() };
-    let _lock = shard.lock(&options.output.join(job::RECORDS))?;
+    let _lock = shard.lock(&options.output.join(job::RECORDS), &making.files)?;
+    making.files.check_writable(&shard.summary_path(&options.output))?;
     job::clear_leftovers(options, &jobs, &making.files)?;
     let options = &with_alignment(options, &found.pairs, &making.files, watch)?;
     let settings_sha256 = record::settings_sha256(options, making)?;
     let is_complete = |chain: &&[Job]| !options.force && job::are_complete(chain, &settings_sha256);
     let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
     let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
-    due.iter().try_for_each(|job| job.check(making))?;
-    let failures =
-        match_due(&Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() }, &due)?;
+    let (due, mut failures) = writable(due, making, watch)?;
+    let run = Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() };
+    failures.extend(match_due(&run, &due)?);
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
     summary.write(&making.files, &shard.summary_path(&options.output))?;
     Ok(summary)
+}
+
+/// The jobs whose files can be written, and those that fail because a name or what is there does not allow it. What is wrong
+/// with the options fails for all.
+fn writable<'a>(due: Vec<&'a Job>, making: &Making, watch: &Watch<'_>) -> Result<(Vec<&'a Job>, Vec<Failed>), Error> {
+    let (mut writable, mut failures) = (Vec::new(), Vec::new());
+    for job in due {
+        match job.check(making) {
+            Ok(()) => writable.push(job),
+            Err(error) if error.cause() != Cause::Options => failures.push(Failed::told(&job.pair, &error, watch)),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((writable, failures))
 }
 
 /// The options with the alignment of the camera, if all pairs come from one.

@@ -13,6 +13,7 @@ mod resumed;
 mod running;
 mod speed;
 mod survey;
+mod unwritable;
 
 use std::{fs, path::Path, process::Command};
 

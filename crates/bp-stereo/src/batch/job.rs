@@ -44,7 +44,7 @@ pub(super) fn jobs(options: &BatchOptions, making: &Making, pairs: &[Pair]) -> R
     let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(options, making, index, pair)).collect();
     check_apart(options, &jobs)?;
     let jobs: Vec<Job> = jobs.into_iter().filter(|job| options.shard.has(job.chain)).collect();
-    folders(options, &jobs).iter().try_for_each(|folder| create_folder(folder))?;
+    create_folder(&options.output)?;
     Ok(jobs)
 }
 
@@ -76,8 +76,13 @@ impl Job {
         self.images().into_iter().chain(self.calibration.as_deref()).collect()
     }
 
-    /// Fails if an output cannot be written.
+    /// Creates the folders of its files; fails if one of them cannot be written.
     pub(super) fn check(&self, making: &Making) -> Result<(), Error> {
+        for folder in self.files().filter_map(Path::parent) {
+            making.files.check_own(folder)?;
+            create_folder(folder)?;
+        }
+        making.files.check_writable(&self.record)?;
         self.outputs.check(making, &self.inputs())
     }
 
@@ -170,7 +175,8 @@ fn folders(options: &BatchOptions, jobs: &[Job]) -> BTreeSet<PathBuf> {
 /// Removes temporary files of a killed run of this shard, and abandoned ones of other shards.
 pub(super) fn clear_leftovers(options: &BatchOptions, jobs: &[Job], files: &Files) -> Result<(), Error> {
     for folder in folders(options, jobs) {
-        let entries = fs::read_dir(&folder).map_err(|error| bp_io::Error::writing(&folder, &error))?;
+        // A folder that is missing, or leads elsewhere, has no files of ours.
+        let Some(entries) = files.check_own(&folder).ok().and_then(|()| fs::read_dir(&folder).ok()) else { continue };
         for entry in entries.flatten() {
             let name = entry.file_name();
             let is_old = || {

@@ -94,8 +94,7 @@ impl Run<'_> {
             let solved = self.solve_all(to_match, matched);
             let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             self.warned.tell_others(self.watch);
-            // If writing fails, its channel closes and matching ends too; the error to report is the writer's.
-            written.and_then(|failed| solved.map(|()| failed))
+            solved.map(|()| written)
         })
     }
 
@@ -210,38 +209,37 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Result<Vec<Failed>, Error> {
+    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Vec<Failed> {
         for (index, Matched { job, origin, answer }) in from.into_iter().enumerate() {
-            match answer {
-                Ok(answer) => {
-                    let done = self.write(job, answer)?;
-                    job.remove_others();
-                    self.record(job, origin, done)?;
-                }
-                Err(error) => {
-                    self.run.watch.tell(Event::Failed(&format!("{}: {error}", job.pair.name.display())));
-                    job.remove_stale(&origin.inputs);
-                    self.failed.push(Failed::new(&job.pair, &error));
-                }
+            if let Err(error) = self.finish(job, &origin, answer) {
+                job.remove_stale(&origin.inputs);
+                self.failed.push(Failed::told(&job.pair, &error, self.run.watch));
             }
             let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
             self.run.watch.tell(Event::Task(&format!("{} pairs{failed}", index + 1)));
             // Only the matching thread stops. Answers that it has handed over are still written.
             let _ = self.run.watch.progress(index as u64 + 1, self.pairs);
         }
-        Ok(self.failed)
+        self.failed
     }
 
-    fn record(&mut self, job: &Job, origin: PairOrigin, done: Done) -> Result<(), Error> {
+    /// Writes the outputs of an answer, then its record.
+    fn finish(&mut self, job: &Job, origin: &PairOrigin, answer: Result<Answer, Error>) -> Result<(), Error> {
+        let done = self.write(job, answer?)?;
+        job.remove_others();
+        self.record(job, origin, done)
+    }
+
+    fn record(&mut self, job: &Job, origin: &PairOrigin, done: Done) -> Result<(), Error> {
         let elapsed_ms = milliseconds_since(self.last);
         self.last = Instant::now();
         let record = PairRecord {
             name: job.pair.name.clone(),
             left: job.pair.left.clone(),
             right: job.pair.right.clone(),
-            follows: origin.follows,
+            follows: origin.follows.clone(),
             settings_sha256: self.run.settings_sha256.to_owned(),
-            inputs: origin.inputs,
+            inputs: origin.inputs.clone(),
             elapsed_ms,
             done,
         };

@@ -8,7 +8,7 @@ use std::{
 };
 
 use crate::Error;
-use bp_io::create_folder;
+use bp_io::{Files, create_folder};
 
 /// One of several processes that share the pairs. By default it is the only one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +38,10 @@ impl Shard {
 
     /// Locks the shard. Fails if another process matches it, because each would remove the other's temporary files as
     /// leftovers. The system releases the lock when the process ends, however it ends.
-    pub(super) fn lock(self, folder: &Path) -> Result<File, Error> {
-        create_folder(folder)?;
+    pub(super) fn lock(self, folder: &Path, files: &Files) -> Result<File, Error> {
         let path = folder.join(format!("{}.lock", self.file_part()));
+        files.check_own(&path)?;
+        create_folder(folder)?;
         let file = File::options().create(true).truncate(false).write(true).open(&path);
         // The lock file of another user, in a shared folder, can be locked without write permission.
         let file = file.or_else(|error| File::open(&path).map_err(|_| bp_io::Error::writing(&path, &error)))?;

@@ -14,7 +14,7 @@ use super::{
 };
 use bp_io::Files;
 
-use crate::{Error, Tiles, description, pairs::Pair};
+use crate::{Error, Event, Tiles, Watch, description, pairs::Pair};
 
 /// The contents of summary.json and of `--json`.
 #[derive(Serialize)]
@@ -108,6 +108,12 @@ impl Failed {
     pub(super) fn new(pair: &Pair, failure: &Error) -> Self {
         let Pair { name, left, right } = pair.clone();
         Self { name, left, right, failure: failure.to_string() }
+    }
+
+    /// The same, reported to the watch.
+    pub(super) fn told(pair: &Pair, failure: &Error, watch: &Watch<'_>) -> Self {
+        watch.tell(Event::Failed(&format!("{}: {failure}", pair.name.display())));
+        Self::new(pair, failure)
     }
 }
 

@@ -1,0 +1,86 @@
+//! Batches into folders where something is in the way: links of others, names that no file can have.
+#![cfg(unix)]
+
+use std::{fs, os::unix::fs::symlink, process::Command};
+
+use crate::{
+    folder::{Folder, text},
+    many::{TINY, names},
+};
+
+/// Pairs a to d, the last of them in a folder of its own, are to be matched into `out`.
+fn four_pairs() -> (Folder, String) {
+    let folder = Folder::new();
+    let list = ["a", "b", "c", "e/d"].map(|name| format!("left.png right.png {name}\n")).concat();
+    fs::write(folder.path("list"), list).unwrap();
+    fs::create_dir_all(folder.path("out/records")).unwrap();
+    fs::write(folder.path("treasure"), "mine").unwrap();
+    (folder, format!("match --pairs list --output out {TINY}"))
+}
+
+#[test]
+fn a_link_in_the_output_folder_is_named_and_nothing_goes_through_it() {
+    let links = [("records/a.json", "treasure"), ("b.pfm", "treasure"), ("c.pfm", "new"), ("e", "elsewhere")];
+    let (folder, run) = four_pairs();
+    fs::create_dir(folder.path("elsewhere")).unwrap();
+    for (link, target) in links {
+        symlink(folder.path(target), folder.path("out").join(link)).unwrap();
+    }
+    let output = folder.run(&run);
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
+    for (link, _) in links {
+        assert!(text(&output.stderr).contains(&format!("out/{link}: it is a link")), "{}", text(&output.stderr));
+    }
+    assert_eq!(fs::read(folder.path("treasure")).unwrap(), b"mine");
+    assert!(!folder.path("new").exists() && fs::read_dir(folder.path("elsewhere")).unwrap().next().is_none());
+    // Once they are gone, the same command completes the batch.
+    links.iter().for_each(|(link, _)| fs::remove_file(folder.path("out").join(link)).unwrap());
+    assert!(folder.run(&run).status.success());
+    assert_eq!(names(&folder.path("out")), ["a", "b", "c", "e/d"]);
+}
+
+#[test]
+fn links_in_place_of_the_folder_of_records_its_lock_or_the_summary_are_refused() {
+    for link in ["records", "records/1-of-1.lock", "summary.json"] {
+        let (folder, run) = four_pairs();
+        if link == "records" {
+            fs::remove_dir(folder.path("out/records")).unwrap();
+        }
+        let target = folder.path("target");
+        symlink(&target, folder.path("out").join(link)).unwrap();
+        folder.fails(&run, 1, &[&format!("out/{link}: it is a link")]);
+        assert!(!target.exists() && names(&folder.path("out")).is_empty(), "{link}");
+    }
+}
+
+/// The folder itself is the user's choice.
+#[test]
+fn the_output_folder_may_be_a_link() {
+    let (folder, run) = four_pairs();
+    fs::rename(folder.path("out"), folder.path("real")).unwrap();
+    symlink(folder.path("real"), folder.path("out")).unwrap();
+    assert!(folder.run(&run).status.success());
+    assert_eq!(names(&folder.path("real")), ["a", "b", "c", "e/d"]);
+}
+
+#[test]
+fn a_name_that_cannot_be_written_stops_no_other_pair() {
+    let (folder, run) = four_pairs();
+    let long = "n".repeat(300);
+    let list =
+        format!("left.png right.png {long}\nleft.png right.png e/d\nleft.png right.png pipe\nleft.png right.png z\n");
+    fs::write(folder.path("list"), list).unwrap();
+    // A file where a folder is needed, and a pipe that nobody reads where a map is to be written.
+    fs::write(folder.path("out/e"), "").unwrap();
+    assert!(Command::new("mkfifo").arg(folder.path("out/pipe.pfm")).status().unwrap().success());
+    let output = folder.run(&run);
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{told}");
+    for words in
+        ["File name too long", "out/e: a file is there", "pipe.pfm: it is not a regular file", "3 of 4 pairs failed"]
+    {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    fs::remove_file(folder.path("out/pipe.pfm")).unwrap();
+    assert_eq!(names(&folder.path("out")), ["z"]);
+}
