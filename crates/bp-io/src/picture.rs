@@ -47,19 +47,28 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Writes a map as a coloured PNG over its own range. A map without known pixels gets no bar.
+    /// Writes a map as a coloured PNG over its own range. A map without known pixels gets no bar, nor does one so narrow or low
+    /// that most of the picture would be the bar and white.
     ///
     /// # Errors
     /// [`Error::Write`].
     pub fn write(self, files: &Files, path: &Path, map: &DisparityMap) -> Result<(), Error> {
         let (low, high) = map.range().unwrap_or((0.0, 1.0));
         let mut picture = coloured(map, low..=high, self.colours);
-        if let Some(draw) = self.bar.filter(|_| map.range().is_some()) {
+        if let Some(draw) = self.bar.filter(|_| map.range().is_some() && has_room(map.size())) {
             let bar = ColourBar { low, high, height: picture.height, colours: self.colours };
             picture = beside(&picture, &draw(&bar).map_err(|error| Error::writing(path, &error))?);
         }
         files.whole(path, |file| encode(file, &picture))
     }
+}
+
+/// Whether a bar makes the picture of a map larger by two thirds at most, or leaves it small. Limits of memory count on that.
+fn has_room(map: Size) -> bool {
+    const BAR: Size = Size { width: 512, height: 72 };
+    const SMALL: usize = 2 << 20;
+    let with_bar = (map.width + BAR.width).saturating_mul(map.height.max(BAR.height));
+    with_bar <= SMALL || with_bar <= map.pixels() / 3 * 5
 }
 
 /// Encodes a map as a coloured PNG: the near end of `range` is bright, the far end dark, and unknown pixels are black.
@@ -96,4 +105,27 @@ fn beside(left: &Pixels, right: &Pixels) -> Pixels {
 fn encode(file: &mut dyn Write, picture: &Pixels) -> Result<(), ImageError> {
     let bytes = picture.colours.as_flattened();
     PngEncoder::new(file).write_image(bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bar(bar: &ColourBar) -> Result<Pixels, String> {
+        let height = bar.height.clamp(72, 4096);
+        Ok(Pixels { width: 100, height, colours: vec![[9; 3]; 100 * height as usize] })
+    }
+
+    #[test]
+    fn narrow_and_low_maps_get_no_bar_that_takes_more_memory_than_they_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let written = |width: usize, height: usize| {
+            let map = DisparityMap::new(Size { width, height }, vec![3.0; width * height]).unwrap();
+            Picture { bar: Some(bar), ..Picture::default() }.write(&Files::default(), &path, &map).unwrap();
+            image::image_dimensions(&path).unwrap()
+        };
+        assert_eq!([written(1, 300_000), written(300_000, 1)], [(1, 300_000), (300_000, 1)]);
+        assert_eq!([written(640, 480), written(1, 1), written(1500, 1200)], [(740, 480), (101, 72), (1600, 1200)]);
+    }
 }

@@ -3,6 +3,8 @@
 
 use std::{fs, os::unix::fs::symlink, process::Command};
 
+use serde_json::Value;
+
 use crate::{
     folder::{Folder, text},
     many::{TINY, names},
@@ -61,6 +63,27 @@ fn the_output_folder_may_be_a_link() {
     symlink(folder.path("real"), folder.path("out")).unwrap();
     assert!(folder.run(&run).status.success());
     assert_eq!(names(&folder.path("real")), ["a", "b", "c", "e/d"]);
+}
+
+/// What an earlier run wrote besides is removed, but only files that could be that pair's outputs.
+#[test]
+fn a_forged_record_removes_no_file_of_others() {
+    let (folder, run) = four_pairs();
+    assert!(folder.run(&format!("{run} --also picture")).status.success());
+    let record = folder.path("out/records/a.json");
+    let mut forged: Value = serde_json::from_slice(&fs::read(&record).unwrap()).unwrap();
+    for name in ["treasure.pfm", "a.mine.pfm", "b.pfm", "../treasure.pfm"] {
+        fs::copy(folder.path("out/a.pfm"), folder.path("out").join(name)).unwrap();
+        let mut state = forged["done"]["outputs"][0].clone();
+        state["path"] = folder.path("out").join(name).display().to_string().into();
+        forged["done"]["outputs"].as_array_mut().unwrap().push(state);
+    }
+    fs::write(&record, forged.to_string()).unwrap();
+    assert!(folder.run(&format!("{run} --format npy")).status.success());
+    assert!(!folder.path("out/a.pfm").exists() && !folder.path("out/a.picture.png").exists(), "its own are removed");
+    for name in ["out/treasure.pfm", "out/a.mine.pfm", "treasure.pfm"] {
+        assert!(folder.path(name).exists(), "{name}");
+    }
 }
 
 #[test]

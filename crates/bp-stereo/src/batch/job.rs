@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeSet, HashMap, HashSet},
-    ffi::OsString,
+    ffi::{OsStr, OsString},
     fs,
     io::ErrorKind,
     path::{Display, Path, PathBuf},
@@ -107,9 +107,20 @@ impl Job {
     /// folder, which may have been moved. A changed file of the same name may belong to another pair or to the user.
     fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = PathBuf> {
         earlier.done.outputs.iter().filter_map(|state| {
-            let here = self.paths.first()?.with_file_name(state.path.file_name()?);
+            let name = state.path.file_name().filter(|name| self.is_own(name))?;
+            let here = self.paths.first()?.with_file_name(name);
             state.is_still(&here).then_some(here)
         })
+    }
+
+    /// Whether some options give an output of this pair this name. A record may be forged, and so name any file.
+    fn is_own(&self, name: &OsStr) -> bool {
+        let pair = self.pair.name.file_name().and_then(OsStr::to_str);
+        let ending = name.to_str().zip(pair).and_then(|(name, pair)| name.strip_prefix(pair)?.strip_prefix('.'));
+        let Some(ending) = ending.map(|ending| ending.strip_suffix(".json").unwrap_or(ending)) else { return false };
+        let map = ["depth.", "confidence."].iter().find_map(|kind| ending.strip_prefix(kind)).unwrap_or(ending);
+        let is_map = !map.contains('.') && MapFormat::of(&Path::new("NAME").with_added_extension(map)).is_ok();
+        is_map || ["picture.png", "points.ply"].contains(&ending)
     }
 
     fn files(&self) -> impl Iterator<Item = &Path> {
