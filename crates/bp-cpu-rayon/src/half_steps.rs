@@ -1,5 +1,5 @@
-//! The schedules `sync` and `checkerboard`: half-steps in which the nodes of one colour send. `outward` is beside them, because
-//! it keeps its messages in the same way.
+//! The schedules `sync` and `checkerboard`, whose half-steps have all nodes of one colour send, and `outward`, which stores its
+//! messages in the same way.
 
 mod edges;
 mod outward;

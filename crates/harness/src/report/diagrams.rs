@@ -1,4 +1,4 @@
-//! The 14 diagrams of the thesis. Beside each of times there is one of speed-ups.
+//! The 14 diagrams of the thesis. Those of times come with one of speed-ups each.
 
 use bp_charts::{Axis, DotChart, Fill, Key, Level, Series, Style, Value};
 
@@ -100,7 +100,7 @@ impl Speed {
     }
 }
 
-/// A diagram of BP's and these plans' times, and beside it that of their speed-ups over BP.
+/// Two diagrams: the times of BP and of these plans, and the speed-ups of these plans over BP.
 fn speeds(
     results: &Results<'_>,
     numbers: Numbers,
@@ -144,7 +144,7 @@ fn speed(
     let chart = chart(results, format!("{what}: {heading}"), Axis::logarithmic(axis), groups, as_fast);
     let pale = if parts.len() == 1 { "" } else { " Pale markers show message passing alone." };
     let caption = format!(
-        "{note} Filled markers show the total time, measured in this run. Hollow markers beside them show what the thesis \
+        "{note} Filled markers show the total time, measured in this run. Hollow markers show what the thesis \
          prints for the same plan on its GPU.{pale} Whiskers are ranges over rounds."
     );
     drawing(numbers, chart, &caption)
@@ -201,7 +201,7 @@ impl Group {
         self.keys.push(Key { style: legend::any_device(results, plan).filled(fill), name });
     }
 
-    /// Adds the printed values of a plan, beside the measured ones. The thesis's Z'''' is not known, so all plans of CTCSBP
+    /// Adds the printed values of a plan. The thesis's Z'''' is not known, so all plans of CTCSBP
     /// have the same.
     fn add_printed(&mut self, results: &Results<'_>, plan: &Named, value: impl Fn(usize) -> Option<f64>) {
         let name = format!("{}: printed", plan.title);
