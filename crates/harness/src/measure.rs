@@ -17,4 +17,4 @@ pub use arranged::Arranged;
 pub use meter::Meter;
 pub use runner::{Asked, Runner};
 pub use solve::Solve;
-pub use turns::{Contestant, Entrant, Rules, SLOW_MS, take_turns};
+pub use turns::{Contestant, Entrant, Rules, SLOW_MS, SLOW_ROUNDS, take_turns};

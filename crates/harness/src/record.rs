@@ -90,7 +90,8 @@ pub struct Run {
     pub labels: usize,
     /// Loops of plain BP (k).
     pub k: u32,
-    /// Samples of a cell that takes less than [`crate::reproduce::ONE_SAMPLE_ABOVE_MS`]; slower cells get one.
+    /// Samples of a cell. One that takes more than [`crate::measure::SLOW_MS`] gets at most
+    /// [`crate::measure::SLOW_ROUNDS`] (older records: one).
     pub samples: u32,
     /// Backends, in order.
     pub backends: Vec<String>,

@@ -6,7 +6,6 @@ mod run;
 mod storage;
 
 pub use plans::all as plans;
-pub use run::ONE_SAMPLE_ABOVE_MS;
 pub use run::run;
 pub use storage::{Storage, begin};
 

@@ -29,7 +29,7 @@ pub(crate) struct ReproduceArgs {
     /// Threads of the backend rayon. [default: RAYON_NUM_THREADS, else one per core]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) threads: Option<u16>,
-    /// Samples for each scene, plan and backend; only one if it takes more than 5 s. [default: 5; 1 with --quick]
+    /// Samples for each scene, plan and backend; at most 3 if it takes more than 5 s. [default: 5; 1 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) samples: Option<u32>,
     /// Folder for recorded runs; every run gets a new folder in it.

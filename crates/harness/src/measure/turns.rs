@@ -3,9 +3,12 @@
 use super::Meter;
 use crate::{failure::Failure, record::Sample};
 
-/// A solve that takes more milliseconds is slow. All rounds of it would take too long, and short disturbances average
-/// out within a long solve anyway.
+/// A solve that takes more milliseconds is slow. All rounds of it would take too long, and it needs fewer, because
+/// short disturbances average out within a long solve.
 pub const SLOW_MS: f64 = 5000.0;
+
+/// Rounds of a slow contestant: the fewest that have a median and a range.
+pub const SLOW_ROUNDS: u32 = 3;
 
 /// Assumed nanoseconds per message entry, to guess which contestants are slow before their first solve.
 const GUESSED_NS: f64 = 2.5;

@@ -15,13 +15,10 @@ use super::{
 use crate::{
     failure::Failure,
     files::hex,
-    measure::{Arranged, Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_MS, take_turns},
+    measure::{Arranged, Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_ROUNDS, take_turns},
     record::{self, Cell, Measurement, Outcome, Sample, Settings},
     scenes::{Scene, Source},
 };
-
-/// A cell whose first sample takes more milliseconds than this gets no other.
-pub const ONE_SAMPLE_ABOVE_MS: f64 = SLOW_MS;
 
 /// Runs all cells that are missing in the record, on these devices and the requested scenes. Returns the failures of
 /// cells that keep earlier samples, because their outcomes do not show these failures.
@@ -56,7 +53,7 @@ fn measure(
     watch: &Watch<'_>,
 ) -> Result<Vec<String>, Failure> {
     let run = storage.record().run.clone();
-    let rules = Rules { rounds: run.samples, slow_rounds: 1, warm_up: false, fail_fast: false };
+    let rules = Rules { rounds: run.samples, slow_rounds: SLOW_ROUNDS, warm_up: false, fail_fast: false };
     let plans: Vec<_> = plans::all().into_iter().chain(plans::arranged()).collect();
     let storage = RefCell::new(storage);
     let mut entrants = Vec::new();

@@ -13,7 +13,7 @@ use crate::{
     failure::Failure,
     files::hex,
     machine,
-    measure::{Asked, Contestant, Entrant, Meter, Rules, Runner, Solve, take_turns},
+    measure::{Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_ROUNDS, Solve, take_turns},
     record::{
         Outcome, Sample, Settings, milliseconds,
         speed::{self, Contest, Entry, Measurement, SCHEMA_VERSION, Speed},
@@ -22,9 +22,6 @@ use crate::{
 
 /// Default number of rounds of a full run.
 const ROUNDS: u32 = 9;
-
-/// Rounds of a contestant whose first solve is slow.
-const SLOW_ROUNDS: u32 = 3;
 
 /// A quick run divides the sides of images by this.
 const QUICK_DIVISOR: usize = 3;
