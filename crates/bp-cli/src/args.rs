@@ -23,6 +23,8 @@ pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use outputs::{ConvertArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
 
+use crate::failure::Failure;
+
 /// Stereo matching by belief propagation: match pairs, evaluate maps, reproduce the thesis's tables.
 #[derive(Debug, Parser)]
 #[command(name = "bp", version, max_term_width = 110, after_help = examples::program())]
@@ -145,8 +147,20 @@ pub(crate) struct DoctorArgs {
     pub(crate) json: bool,
 }
 
+/// The most threads that may be asked for.
+const MOST_THREADS: u16 = 1024;
+
 fn threads() -> impl TypedValueParser<Value = u16> {
-    clap::value_parser!(u16).range(1..=1024)
+    clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS))
+}
+
+/// Fails if RAYON_NUM_THREADS asks for more threads than `--threads` may.
+pub(crate) fn check_environment() -> Result<(), Failure> {
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<u64>().ok());
+    match asked.filter(|&threads| threads > u64::from(MOST_THREADS)) {
+        Some(threads) => Err(Failure::usage(format!("RAYON_NUM_THREADS={threads}: at most {MOST_THREADS} threads"))),
+        None => Ok(()),
+    }
 }
 
 fn positive(text: &str) -> Result<f32, String> {

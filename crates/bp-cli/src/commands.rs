@@ -8,7 +8,6 @@ mod doctor;
 pub(crate) mod evaluate;
 mod export;
 mod gate;
-mod limits;
 mod match_pair;
 mod match_report;
 mod match_summary;
@@ -35,7 +34,12 @@ pub(crate) use scenes::scenes;
 pub(crate) use shell::{completions, man};
 pub(crate) use speed::speed;
 
-use crate::failure::Failure;
+use crate::{failure::Failure, notes::printable};
+
+/// Prints a text on standard output.
+fn print(text: &str) -> Result<(), Failure> {
+    Ok(write!(std::io::stdout(), "{}", printable(text))?)
+}
 
 /// Prints a report as JSON.
 pub(crate) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {

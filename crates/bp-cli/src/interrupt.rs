@@ -9,6 +9,19 @@ use crate::failure::Failure;
 /// Set by Ctrl-C and SIGTERM.
 pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
 
+/// Makes a write beyond the largest size that the system allows a file (`ulimit -f`) fail like one on a full disk. By default
+/// it would end the program, which would leave a temporary file.
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "only the C library can ignore a signal")]
+pub(crate) fn survive_size_limit() {
+    // SAFETY: the signal is ignored from the start, and no handler runs.
+    let _ = unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
+}
+
+/// Other systems have no such limit.
+#[cfg(not(unix))]
+pub(crate) fn survive_size_limit() {}
+
 /// Makes Ctrl-C and SIGTERM stop the program at the next step. A second signal stops it at once. Commands without steps
 /// do not call this; the system stops them.
 pub(crate) fn listen() -> Result<(), Failure> {

@@ -23,9 +23,10 @@ use notes::tell;
 
 fn main() -> ExitCode {
     notes::quieten_driver();
+    interrupt::survive_size_limit();
     let cli = Cli::parse();
     notes::set_up(cli.quiet);
-    match run(&cli.command) {
+    match args::check_environment().and_then(|()| run(&cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure.code() != 0 {

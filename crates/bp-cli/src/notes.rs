@@ -1,6 +1,7 @@
 //! Messages and logs on standard error.
 
 use std::{
+    borrow::Cow,
     collections::HashSet,
     io::{self, Write},
     sync::{
@@ -54,7 +55,20 @@ pub(crate) fn is_quiet() -> bool {
 /// Prints a line to standard error, above the progress bar if one is shown. Ignores errors: if standard error is full
 /// or closed, nobody can read them.
 pub(crate) fn tell(line: &str) {
-    bar::beside_bar(|| drop(writeln!(io::stderr(), "{line}")));
+    bar::beside_bar(|| drop(writeln!(io::stderr(), "{}", printable(line))));
+}
+
+/// A text in which terminals find nothing to obey. Names of files and texts in them may hold control characters, and marks that
+/// reverse the order in which text is read; these become escapes such as `\u{1b}`.
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
+    let is_obeyed = |c: char| {
+        c.is_control() && !matches!(c, '\n' | '\t') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(is_obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = |c: char| if is_obeyed(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(escaped).collect())
 }
 
 /// Prints a note, unless only errors are wanted. A note that several pairs cause is printed once.
@@ -72,5 +86,16 @@ pub(crate) fn quieten_driver() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
         // SAFETY: called first in `main`, before any other thread starts.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terminals_find_nothing_to_obey() {
+        assert_eq!(printable("a\tb\n\u{e4} 5"), "a\tb\n\u{e4} 5");
+        assert_eq!(printable("\x1b]0;x\x07\r\u{9b}2J\u{202e}"), "\\u{1b}]0;x\\u{7}\\r\\u{9b}2J\\u{202e}");
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     bar::ProgressBar,
     failure::as_options,
     interrupt::STOP,
-    notes::{self, note, tell},
+    notes::{self, note, printable, tell},
 };
 
 /// The progress bar of the current work.
@@ -40,7 +40,7 @@ fn show(event: Event<'_>) {
         }
         Event::Task(text) => {
             if let Some(bar) = BAR.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
-                bar.message(text.split_whitespace().collect::<Vec<_>>().join(" "));
+                bar.message(printable(&text.split_whitespace().collect::<Vec<_>>().join(" ")).into_owned());
             }
         }
         Event::Line(text) if !notes::is_quiet() => tell(text),

@@ -1,45 +1,141 @@
-//! The peak memory of `bp match`, measured by the system.
+//! The peak memory of the program, measured by the system.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use std::{fs, path::Path, process::Command};
+use std::{env, fs, path::Path, process::Command};
 
+use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 use nix::sys::resource::{UsageWho, getrusage};
+use tempfile::TempDir;
 
 /// A size whose buffers include both kinds: those that allocators treat as large, and those that they keep.
-const SIZE: (usize, usize) = (2500, 2000);
+const SIZE: [u32; 2] = [2500, 2000];
 
-fn pair(folder: &Path) {
-    let (width, height) = SIZE;
-    for (name, shift) in [("left.ppm", 0), ("right.ppm", 5)] {
-        let value = |x: usize, y: usize| [((x + shift) * (x + shift) * 7 + y * 31) as u8, (x + shift) as u8, y as u8];
-        let pixels = (0..height).flat_map(|y| (0..width).flat_map(move |x| value(x, y)));
-        let header = format!("P6\n{width} {height}\n255\n").into_bytes();
-        fs::write(folder.join(name), header.into_iter().chain(pixels).collect::<Vec<u8>>()).unwrap();
+/// The arguments for [`in_a_process_of_its_own`].
+const ARGUMENTS: &str = "BP_TESTED_ARGUMENTS";
+
+/// What the test process prints before the exit code and the peak.
+const MEASURED: &str = "measured:";
+
+/// An end of the program.
+#[derive(Debug)]
+struct End {
+    code: i32,
+    peak: u64,
+    told: String,
+}
+
+/// Runs the program from a process that has no other children: the system tells the largest peak of all of them.
+fn run(folder: &TempDir, arguments: &str) -> End {
+    let mut command = Command::new(env::current_exe().unwrap());
+    command.args(["--exact", "in_a_process_of_its_own", "--nocapture"]).current_dir(folder.path());
+    let output = command.env(ARGUMENTS, arguments).output().unwrap();
+    let (printed, told) = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).into();
+    let measured = printed.split(MEASURED).nth(1).unwrap_or_else(|| panic!("{printed}{told}"));
+    let numbers: Vec<u64> = measured.split_whitespace().take(2).map(|number| number.parse().unwrap()).collect();
+    End { code: numbers[0] as i32, peak: numbers[1], told }
+}
+
+/// Not a test of its own: [`run`] calls it.
+#[test]
+fn in_a_process_of_its_own() {
+    let Ok(arguments) = env::var(ARGUMENTS) else { return };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bp"));
+    let output = command.args(arguments.split_whitespace()).env("RUST_BACKTRACE", "0").output().unwrap();
+    eprint!("{}", String::from_utf8_lossy(&output.stderr));
+    let peak = getrusage(UsageWho::RUSAGE_CHILDREN).unwrap().max_rss() * 1024;
+    println!("{MEASURED} {} {peak}", output.status.code().unwrap());
+}
+
+/// The right one is shifted by 5 px.
+fn save_pair(folder: &Path, ending: &str, convert: impl Fn(RgbImage) -> DynamicImage) {
+    for (name, shift) in [("left", 0), ("right", 5)] {
+        let [width, height] = SIZE;
+        let pixel = |x: u32, y: u32| Rgb([(x * x * 7 + y * 31) as u8, x as u8, y as u8]);
+        let image = RgbImage::from_fn(width, height, |x, y| pixel(x + shift, y));
+        convert(image).save(folder.join(name).with_extension(ending)).unwrap();
     }
 }
 
-/// The refusal of a tiny limit names the smallest possible one. The program keeps to that limit with all kinds of
-/// outputs.
+/// The refusal of a tiny limit names a larger one, first for reading, then for the rest. The program keeps to the limit that it
+/// asks for, with all kinds of inputs and outputs.
 #[test]
 fn the_least_memory_limit_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    pair(folder.path());
-    for options in ["", "--picture p.png", "--speckle 20", "--check left-right --median 3 --confidence c.npy"] {
-        let run = |limit: &str| {
-            let mut command = Command::new(env!("CARGO_BIN_EXE_bp"));
-            command.args("match left.ppm right.ppm -o m.pfm --labels 16 --threads 2 --quiet".split(' '));
-            command.args(options.split_whitespace()).args(["--max-memory", limit]);
-            command.current_dir(folder.path()).env("RUST_BACKTRACE", "0").output().unwrap()
-        };
-        let refused = String::from_utf8(run("1").stderr).unwrap();
-        let words = refused.split("at least ").nth(1).unwrap_or_else(|| panic!("{refused}"));
-        let least = words.split(',').next().unwrap().replace(' ', "");
-        let output = run(&least);
-        let least = (least.strip_suffix("MiB").unwrap().parse::<f64>().unwrap() * f64::from(1 << 20)) as u64;
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        // The peak of the largest child process so far. No other test runs at the same time.
-        let held = getrusage(UsageWho::RUSAGE_CHILDREN).unwrap().max_rss() as u64 * 1024;
-        assert!(held <= least, "{options:?}: {held} bytes held, {least} allowed");
+    save_pair(folder.path(), "ppm", Into::into);
+    save_pair(folder.path(), "jpg", Into::into);
+    save_pair(folder.path(), "png", |image| DynamicImage::from(image).into_rgb16().into());
+    save_pair(folder.path(), "tif", |image| DynamicImage::from(image).into_rgb16().into());
+    for (ending, options) in [
+        ("ppm", ""),
+        ("ppm", "--picture p.png"),
+        ("ppm", "--speckle 20"),
+        ("ppm", "--check left-right --median 3 --confidence c.npy"),
+        ("jpg", ""),
+        ("png", ""),
+        ("tif", ""),
+    ] {
+        let arguments = format!(
+            "match left.{ending} right.{ending} -o m.pfm --labels 16 --threads 2 --quiet {options} --max-memory"
+        );
+        let mut limit = "1".to_owned();
+        let kept = (0..6).find_map(|_| {
+            let end = run(&folder, &format!("{arguments} {limit}"));
+            let allowed =
+                limit.strip_suffix("MiB").map_or(0, |number| (number.parse::<f64>().unwrap() * 1048576.0) as u64);
+            if end.code == 0 {
+                assert!(end.peak <= allowed, "{ending} {options}: {limit} allowed, {} bytes held", end.peak);
+                return Some(());
+            }
+            let words = end.told.split("at least ").nth(1).unwrap_or_else(|| panic!("{end:?}"));
+            limit = words.split(',').next().unwrap().replace(' ', "");
+            None
+        });
+        assert!(kept.is_some(), "{ending} {options}: refused with {limit} too");
+    }
+}
+
+/// All compressed data of a PNG, which inflates to the bytes of its rows.
+fn compressed(png: &[u8]) -> Vec<u8> {
+    let (mut data, mut rest) = (Vec::new(), &png[8..]);
+    while let [a, b, c, d, kind @ ..] = rest {
+        let len = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+        if kind.starts_with(b"IDAT") {
+            data.extend(&kind[4..4 + len]);
+        }
+        rest = &rest[12 + len..];
+    }
+    data
+}
+
+/// Small files that stand for a lot, and images with one row or column.
+#[test]
+fn limits_are_kept_for_files_that_are_larger_than_they_seem_and_for_images_of_odd_shapes() {
+    let folder = tempfile::tempdir().unwrap();
+    let save = |name: &str, width, height| GrayImage::new(width, height).save(folder.path().join(name)).unwrap();
+    save("huge.png", 9999, 9999);
+    save("wide.png", 3_000_000, 1);
+    save("high.png", 1, 3_000_000);
+    let huge = compressed(&fs::read(folder.path().join("huge.png")).unwrap());
+    let file = fs::File::create(folder.path().join("profile.png")).unwrap();
+    let mut encoder = png::Encoder::new(file, 8, 8);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_chunk(png::chunk::iCCP, &[b"profile\0\0", &huge[..]].concat()).unwrap();
+    writer.write_image_data(&[7; 64]).unwrap();
+    writer.finish().unwrap();
+    for (image, options, megabytes, code) in [
+        ("profile.png", "", 60, 0),
+        ("huge.png", "", 200, 6),
+        ("wide.png", "", 200, 6),
+        ("wide.png", "--whole-pixels", 200, 0),
+        ("high.png", "", 200, 0),
+        ("high.png", "--picture p.png --median 5", 200, 0),
+        ("wide.png", "--picture p.png --median 5", 300, 6),
+    ] {
+        let arguments = format!("match {image} {image} -o m.pfm --labels 8 --threads 2 {options}");
+        let end = run(&folder, &format!("{arguments} --max-memory {megabytes}MB"));
+        assert!(end.peak <= megabytes * 1_000_000, "{image} {options}: {end:?}");
+        assert_eq!(end.code, code, "{image} {options}: {end:?}");
     }
 }

@@ -48,7 +48,7 @@ fn committed_records_fit_the_schema_and_are_whole() {
             match &cell.outcome {
                 Outcome::Measured(measured) => {
                     assert!(!measured.samples.is_empty() && run.join(&measured.map).exists());
-                    let planned = cell.settings.planned_bytes;
+                    let planned = cell.settings.planned_bytes.unwrap();
                     // With label sets, the plan says what is needed at most.
                     let differ = if cell.settings.label_sets {
                         measured.allocated_bytes.saturating_sub(planned)

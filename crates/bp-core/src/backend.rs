@@ -102,6 +102,15 @@ pub trait Device: Send + Sync {
         Ok(())
     }
 
+    /// Checks that a solve of the plan can start from the messages of the solve before. The default accepts every plan.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`], as [`Solver::keep_messages`] would report.
+    fn check_warm(&self, plan: &Plan) -> Result<(), Error> {
+        let _ = plan;
+        Ok(())
+    }
+
     /// The bytes that [`Device::prepare`] will allocate, by default [`Plan::bytes`]. Devices may pad or omit buffers.
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         plan.bytes()

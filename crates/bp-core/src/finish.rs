@@ -18,6 +18,7 @@ pub use check::{AGREE, check_left_right};
 pub use confidence::confidence;
 pub use fill::fill;
 pub use median::{MEDIANS, median};
+pub use offsets::window_bytes;
 pub use speckles::remove_speckles;
 pub use subpixel::subpixel;
 

@@ -26,4 +26,4 @@ pub use limits::Limits;
 pub use parameters::Parameters;
 pub use program::{BindGroup, Buffer, Command, Memory, Program, Segment};
 pub use queue::{PATIENCE, Queue};
-pub use solver::GpuSolver;
+pub use solver::{GpuSolver, check_warm};

@@ -57,6 +57,20 @@ impl GpuSolver {
     }
 }
 
+/// Checks that after a solve of the plan, the messages are where the first step of the next one reads them. After an odd number
+/// of synchronous loops they are not: the last loop wrote to the buffers that the first loop would write to.
+///
+/// # Errors
+/// [`Error::Unsupported`].
+pub fn check_warm(plan: &Plan) -> Result<(), Error> {
+    let Settings { schedule, steps, .. } = *plan.settings();
+    if schedule == Schedule::Sync && steps % 2 == 1 {
+        let reason = "a warm start needs an even number of loops here, or the schedule checkerboard".to_owned();
+        return Err(Error::Unsupported { device: "the GPU".to_owned(), reason });
+    }
+    Ok(())
+}
+
 impl Solver for GpuSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         self.stages.clear();
@@ -76,15 +90,8 @@ impl Solver for GpuSolver {
         self.run(Stage::Refine, [Part::Refine(grid)].into_iter())
     }
 
-    /// The messages are still where the first step reads them, except after an odd number of synchronous loops: then
-    /// the last loop wrote to the buffers that the first loop would write to.
     fn keep_messages(&mut self) -> Result<(), Error> {
-        let Settings { schedule, steps, .. } = *self.plan.settings();
-        if schedule == Schedule::Sync && steps % 2 == 1 {
-            let reason = "a warm start needs an even number of loops here, or the schedule checkerboard".to_owned();
-            return Err(Error::Unsupported { device: "the GPU".to_owned(), reason });
-        }
-        Ok(())
+        check_warm(&self.plan)
     }
 
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {

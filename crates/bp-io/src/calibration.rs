@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bp_core::{Calibration, Size};
 
-use crate::{Error, Limits, images::read_limited};
+use crate::{Contents, Error, read::MOST_DESCRIPTION};
 
 /// A geometry that was not yet checked against the size of the images.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ impl Geometry {
     /// # Errors
     /// [`Error::Read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        Self::parse(path, &read_limited(path, Limits { pixels: 0, memory: None })?)
+        Self::parse(path, &Contents::of(path, MOST_DESCRIPTION)?.bytes)
     }
 
     /// Parses a `calib.txt` in memory; messages call it `path`.

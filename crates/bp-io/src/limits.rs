@@ -9,7 +9,7 @@ use crate::Error;
 pub struct Limits {
     /// Most pixels.
     pub pixels: u64,
-    /// Most bytes of memory, if limited.
+    /// Most bytes of memory for reading, the file itself included, if limited.
     pub memory: Option<u64>,
 }
 
@@ -36,7 +36,13 @@ impl Limits {
         Self { memory, ..self }
     }
 
-    /// Most bytes that a file within the limit may have, and that its decoder may allocate.
+    /// The same limits after so many bytes of the memory were taken.
+    #[must_use]
+    pub fn without(self, taken: u64) -> Self {
+        Self { memory: self.memory.map(|memory| memory.saturating_sub(taken)), ..self }
+    }
+
+    /// Most bytes that a file within the limit may have.
     pub(crate) fn file_bytes(self) -> u64 {
         self.pixels.saturating_mul(16).saturating_add(1 << 20)
     }

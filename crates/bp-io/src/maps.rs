@@ -6,8 +6,9 @@ use bp_core::{DisparityMap, Size};
 use image::ImageFormat;
 
 use crate::{
-    Error, Limits, Quantity,
-    images::{StoredGrey, decoded, read_limited, stored_grey},
+    Contents, Error, Limits, Quantity,
+    decode::decoded,
+    images::{StoredGrey, stored_grey},
     npy, pfm,
     sidecar::{sidecar_of, told_quantity},
     tiff,
@@ -26,7 +27,7 @@ pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<Dispar
         let what = format!("it holds {quantity}, as {} tells, and disparities are needed", sidecar.display());
         return Err(Error::reading(path, &what));
     }
-    parse_map(path, &read_limited(path, limit)?, scale, limit)
+    parse_map(path, &Contents::of_pixels(path, limit)?.bytes, scale, limit)
 }
 
 /// Parses a map in memory; messages call it `path`.
@@ -74,7 +75,7 @@ pub struct Mask {
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
 pub fn read_mask(path: &Path, limit: Limits) -> Result<Mask, Error> {
-    parse_mask(path, &read_limited(path, limit)?, limit)
+    parse_mask(path, &Contents::of_pixels(path, limit)?.bytes, limit)
 }
 
 /// Parses a mask in memory; messages call it `path`.

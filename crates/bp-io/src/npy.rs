@@ -53,7 +53,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<(Size, V
     if data.len() != needed {
         return Err(failed(&format!("{} bytes of values where {size} pixels need {needed}", data.len())));
     }
-    limit.check_memory(path, 4 * size.pixels() as u64)?;
+    limit.check_memory(path, (bytes.len() + 4 * size.pixels()) as u64)?;
     Ok((size, data.chunks_exact(value.bytes).map(|bytes| value.read(bytes)).collect()))
 }
 

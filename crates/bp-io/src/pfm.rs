@@ -56,7 +56,8 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Pfm, Err
         let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
         if order < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
-    limit.check_memory(path, needed as u64)?;
+    // The file, its values and, of an image, their 8-bit colours.
+    limit.check_memory(path, (bytes.len() + needed + 3 * size.pixels()) as u64)?;
     let rows = data.chunks_exact(4 * channels * size.width).rev();
     let mut values = Vec::with_capacity(channels * size.pixels());
     values.extend(rows.flat_map(|row| row.chunks_exact(4).map(value)));

@@ -5,7 +5,7 @@ use std::{io::Write, ops::RangeInclusive, path::Path};
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, ImageError, codecs::png::PngEncoder};
 
-use crate::{Colours, Error, Files};
+use crate::{Colours, Error, Files, Staged};
 
 /// The colour of unknown pixels.
 const UNKNOWN: [u8; 3] = [0; 3];
@@ -53,13 +53,21 @@ impl Picture {
     /// # Errors
     /// [`Error::Write`].
     pub fn write(self, files: &Files, path: &Path, map: &DisparityMap) -> Result<(), Error> {
+        self.staged(files, path, map)?.put()
+    }
+
+    /// [`Picture::write`] up to its last step, see [`Files::staged`].
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn staged(self, files: &Files, path: &Path, map: &DisparityMap) -> Result<Staged, Error> {
         let (low, high) = map.range().unwrap_or((0.0, 1.0));
         let mut picture = coloured(map, low..=high, self.colours);
         if let Some(draw) = self.bar.filter(|_| map.range().is_some() && has_room(map.size())) {
             let bar = ColourBar { low, high, height: picture.height, colours: self.colours };
             picture = beside(&picture, &draw(&bar).map_err(|error| Error::writing(path, &error))?);
         }
-        files.whole(path, |file| encode(file, &picture))
+        files.staged(path, |file| encode(file, &picture))
     }
 }
 

@@ -5,7 +5,7 @@ use std::{borrow::Cow, path::Path};
 use bp_core::{DisparityMap, Size};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use crate::{Error, Files, MapFormat, Quantity, format::out_of_png_range, npy, pfm, tiff};
+use crate::{Error, Files, MapFormat, Quantity, Staged, format::out_of_png_range, npy, pfm, tiff};
 
 /// One value per pixel, to be written to a file.
 #[derive(Clone, Copy, Debug)]
@@ -70,21 +70,29 @@ impl<'a> Raster<'a> {
     /// # Errors
     /// [`Error::Request`] if the format cannot hold a value, [`Error::Write`].
     pub fn write(&self, files: &Files, path: &Path) -> Result<(), Error> {
+        self.staged(files, path)?.put()
+    }
+
+    /// Writes the values in the format of the path's extension, see [`Files::staged`].
+    ///
+    /// # Errors
+    /// Those of [`Raster::write`].
+    pub fn staged(&self, files: &Files, path: &Path) -> Result<Staged, Error> {
         let Self { size, quantity, .. } = *self;
         let format = MapFormat::of(path)?;
         let values = &*self.stored(format);
         match format {
-            MapFormat::Pfm => files.whole(path, |file| pfm::write(file, size, values)),
-            MapFormat::Npy => files.whole(path, |file| npy::write(file, size, values)),
+            MapFormat::Pfm => files.staged(path, |file| pfm::write(file, size, values)),
+            MapFormat::Npy => files.staged(path, |file| npy::write(file, size, values)),
             MapFormat::Tiff => {
                 let bytes = tiff::encode(size, values).map_err(|error| Error::writing(path, &error))?;
-                files.whole(path, |file| file.write_all(&bytes))
+                files.staged(path, |file| file.write_all(&bytes))
             }
             MapFormat::Png16 => {
                 let stored = whole_numbers(values, quantity.steps()).ok_or_else(|| out_of_png_range(path))?;
                 let bytes: Vec<u8> = stored.iter().flat_map(|value| value.to_ne_bytes()).collect();
                 let (width, height) = (size.width as u32, size.height as u32);
-                files.whole(path, |file| {
+                files.staged(path, |file| {
                     PngEncoder::new(file).write_image(&bytes, width, height, ExtendedColorType::L16)
                 })
             }

@@ -9,7 +9,9 @@ use bp_core::Calibration;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{Colours, Error, Files, MapFormat, Raster};
+use crate::{
+    Colours, Contents, Error, Files, MapFormat, Raster, Staged, read::MOST_DESCRIPTION, write::sync_folder_of,
+};
 
 /// Version of the sidecar's format. Every change of meaning raises it.
 const SCHEMA_VERSION: u32 = 1;
@@ -27,21 +29,32 @@ pub fn sidecar_of(path: &Path) -> PathBuf {
 
 /// The quantity that a map's sidecar names; `None` if there is no sidecar of this program.
 pub(crate) fn told_quantity(path: &Path) -> Option<String> {
-    let sidecar: Value = serde_json::from_slice(&fs::read(sidecar_of(path)).ok()?).ok()?;
+    let bytes = Contents::of_regular(&sidecar_of(path), MOST_DESCRIPTION).ok()?.bytes;
+    let sidecar: Value = serde_json::from_slice(&bytes).ok()?;
     let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
     Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
 }
 
-/// Removes the sidecar of a map, but not another program's file of that name.
+/// Puts a map or picture at its place, `path`, and its sidecar, if it gets one. At every moment the map is whole, the old one or
+/// the new one, and a sidecar, if there is one, is that of the map. If something fails before the map is replaced, for
+/// example because the disk is full, both stay as they were.
 ///
 /// # Errors
 /// [`Error::Write`].
-pub fn remove_sidecar(path: &Path) -> Result<(), Error> {
+pub fn put_described(path: &Path, map: Staged, sidecar: Option<Staged>) -> Result<(), Error> {
+    remove_sidecar(path)?;
+    map.put()?;
+    sidecar.map_or(Ok(()), Staged::put)
+}
+
+/// Removes the sidecar of a map, but not another program's file of that name.
+fn remove_sidecar(path: &Path) -> Result<(), Error> {
     if told_quantity(path).is_none() {
         return Ok(());
     }
     let sidecar = sidecar_of(path);
-    fs::remove_file(&sidecar).map_err(|error| Error::writing(&sidecar, &error))
+    fs::remove_file(&sidecar).map_err(|error| Error::writing(&sidecar, &error))?;
+    sync_folder_of(&sidecar)
 }
 
 /// The origin of a map.
@@ -123,50 +136,49 @@ struct Stored {
     colours: Option<&'static str>,
 }
 
-/// Writes the sidecar of a map that was written to `path`.
+/// Writes the sidecar of a map that goes to `path`, up to its last step, see [`Files::staged`].
 ///
 /// # Errors
 /// [`Error::Write`].
-pub fn write_sidecar<P: Serialize>(
+pub fn staged_sidecar<P: Serialize>(
     files: &Files,
     path: &Path,
     raster: &Raster<'_>,
     origin: &Origin<'_, P>,
-) -> Result<(), Error> {
+) -> Result<Staged, Error> {
     let format = MapFormat::of(path)?;
     let (scale, unknown) = match format {
         MapFormat::Png16 => (1.0 / f64::from(raster.quantity.steps()), Unknown::Number(0)),
         _ if raster.has_nan(format) => (1.0, Unknown::Text("nan")),
         MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
     };
-    write(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
+    staged(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
 }
 
-/// Writes the sidecar of a map's coloured picture that was written to `path`. Stored values are positions in the colour
-/// map, from 0 to 1.
+/// [`staged_sidecar`] of a map's coloured picture. Stored values are positions in the colour map, from 0 to 1.
 ///
 /// # Errors
 /// [`Error::Write`].
-pub fn write_picture_sidecar<P: Serialize>(
+pub fn staged_picture_sidecar<P: Serialize>(
     files: &Files,
     path: &Path,
     raster: &Raster<'_>,
     colours: Colours,
     origin: &Origin<'_, P>,
-) -> Result<(), Error> {
+) -> Result<Staged, Error> {
     let (low, high) = raster.range().map_or((0.0, 1.0), |(low, high)| (f64::from(low), f64::from(high)));
     let (unknown, colours) = (Unknown::Text("black"), Some(colours.name()));
     let stored = Stored { format: "coloured PNG", scale: high - low, offset: low, unknown, colours };
-    write(files, path, raster, origin, stored)
+    staged(files, path, raster, origin, stored)
 }
 
-fn write<P: Serialize>(
+fn staged<P: Serialize>(
     files: &Files,
     path: &Path,
     raster: &Raster<'_>,
     origin: &Origin<'_, P>,
     stored: Stored,
-) -> Result<(), Error> {
+) -> Result<Staged, Error> {
     let sidecar = Sidecar {
         schema_version: SCHEMA_VERSION,
         program: format!("{PROGRAM}{}", env!("CARGO_PKG_VERSION")),
@@ -185,5 +197,5 @@ fn write<P: Serialize>(
         plan: origin.plan,
         inputs: origin.inputs.iter().map(|path| path.display().to_string()).collect(),
     };
-    files.json(&sidecar_of(path), &sidecar)
+    files.staged_json(&sidecar_of(path), &sidecar)
 }

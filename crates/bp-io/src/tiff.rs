@@ -30,15 +30,13 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
         error => Error::reading(path, &error),
     };
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(failed)?;
-    if !matches!(decoder.colortype().map_err(failed)?, ColorType::Gray(32 | 64)) {
-        return Ok(None);
-    }
+    let ColorType::Gray(bits @ (32 | 64)) = decoder.colortype().map_err(failed)? else { return Ok(None) };
     let (width, height) = decoder.dimensions().map_err(failed)?;
     limit.check_size(path, width.into(), height.into())?;
     let size = Size::new(width as usize, height as usize).map_err(|error| Error::reading(path, &error))?;
-    // 8 bytes per pixel for doubles, and 4 for the floats that they are converted to.
-    let needed = 12 * size.pixels() as u64;
-    limit.check_memory(path, needed)?;
+    // The values, and as many bytes of a strip or of the floats that doubles are converted to.
+    let needed = 2 * u64::from(bits / 8) * size.pixels() as u64;
+    limit.check_memory(path, needed.saturating_add(bytes.len() as u64))?;
     let mut limits = tiff::decoder::Limits::default();
     limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;

@@ -81,15 +81,28 @@ impl Files {
         path: &Path,
         write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
     ) -> Result<(), Error> {
+        self.staged(path, write)?.put()
+    }
+
+    /// Writes a file that `write` fills, but leaves what is at `path` until [`Staged::put`]. A pipe or a device is written
+    /// at once.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn staged<E: Display>(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<Staged, Error> {
         self.check_own(path)?;
         if is_stream(path) {
-            return stream(path, write);
+            stream(path, write)?;
+            return Ok(Staged { file: None, path: path.to_owned() });
         }
         // A symbolic link stays, and its target is replaced; but not one that came since the check above.
         let path =
-            &if self.owned.is_some() { None } else { path.canonicalize().ok() }.unwrap_or_else(|| path.to_owned());
-        self.filled_beside(path, write)?.persist(path).map_err(|failed| Error::writing(path, &failed.error))?;
-        Ok(())
+            if self.owned.is_some() { None } else { path.canonicalize().ok() }.unwrap_or_else(|| path.to_owned());
+        Ok(Staged { file: Some(self.filled_beside(&path, write)?), path })
     }
 
     /// Writes a text.
@@ -105,8 +118,16 @@ impl Files {
     /// # Errors
     /// [`Error::Write`].
     pub fn json(&self, path: &Path, value: &impl Serialize) -> Result<(), Error> {
-        let text = serde_json::to_string_pretty(value).map_err(|error| Error::writing(path, &error))?;
-        self.text(path, &(text + "\n"))
+        self.staged_json(path, value)?.put()
+    }
+
+    /// [`Files::json`] up to its last step, see [`Files::staged`].
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn staged_json(&self, path: &Path, value: &impl Serialize) -> Result<Staged, Error> {
+        let text = serde_json::to_string_pretty(value).map_err(|error| Error::writing(path, &error))? + "\n";
+        self.staged(path, |file| file.write_all(text.as_bytes()))
     }
 
     /// Writes a new file. An existing file stays as it was.
@@ -116,7 +137,7 @@ impl Files {
     pub fn new_file(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Error> {
         let file = self.filled_beside(path, |file| file.write_all(contents.as_ref()))?;
         file.persist_noclobber(path).map_err(|failed| Error::writing(path, &failed.error))?;
-        Ok(())
+        sync_folder_of(path)
     }
 
     /// Fails if no file can be written at `path`. A caller can report this before the work begins.
@@ -149,22 +170,94 @@ impl Files {
         write(&mut buffered).map_err(|e| failed(&e))?;
         buffered.flush().map_err(|e| failed(&e))?;
         drop(buffered);
+        #[cfg(unix)]
+        replaced::inherit(file.as_file(), path).map_err(|e| failed(&e))?;
         file.as_file().sync_all().map_err(|e| failed(&e))?;
         Ok(file)
     }
 
     fn temporary_beside(&self, path: &Path) -> Result<NamedTempFile, Error> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         if !folder.is_dir() {
             return Err(Error::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
         }
         let mut builder = tempfile::Builder::new();
-        // Temporary files are private by default. The permissions of an output follow the user's umask instead.
+        // Temporary files are private by default. A new output follows the user's umask instead.
         #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.permissions(replaced::permissions(path));
         // The full message of the error would name the temporary file.
         let failed = |error: std::io::Error| Error::writing(path, &error.kind());
         builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
+    }
+}
+
+/// A file that is complete, but not yet at its place. If it is dropped, what is there stays.
+#[derive(Debug)]
+#[must_use = "it is not at its place yet"]
+pub struct Staged {
+    /// `None` for a pipe or a device, which is already written.
+    file: Option<NamedTempFile>,
+    path: PathBuf,
+}
+
+impl Staged {
+    /// Moves the file to its place, where it survives a loss of power from now on.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn put(self) -> Result<(), Error> {
+        let Some(file) = self.file else { return Ok(()) };
+        file.persist(&self.path).map_err(|failed| Error::writing(&self.path, &failed.error))?;
+        sync_folder_of(&self.path)
+    }
+}
+
+/// Makes the names in the folder of `path` survive a loss of power, as far as the system can.
+pub(crate) fn sync_folder_of(path: &Path) -> Result<(), Error> {
+    // Not every system opens folders, and not every file system syncs them.
+    let Ok(folder) = fs::File::open(folder_of(path)) else { return Ok(()) };
+    match folder.sync_all() {
+        Err(error) if matches!(error.raw_os_error(), Some(IO_ERROR)) => Err(Error::writing(path, &error)),
+        _ => Ok(()),
+    }
+}
+
+/// The number that Unix gives a broken disk (EIO).
+const IO_ERROR: i32 = 5;
+
+/// The folder that holds `path`.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What a new file takes over from the one that it replaces.
+#[cfg(unix)]
+mod replaced {
+    use std::{
+        fs::{File, Metadata, Permissions},
+        io,
+        os::unix::fs::{MetadataExt, PermissionsExt, fchown},
+        path::Path,
+    };
+
+    fn about(path: &Path) -> Option<Metadata> {
+        path.symlink_metadata().ok().filter(Metadata::is_file)
+    }
+
+    /// Those of the file at `path`, or else those that the user's umask restricts. Never more than the file had, not even
+    /// while the new one is written.
+    pub(super) fn permissions(path: &Path) -> Permissions {
+        Permissions::from_mode(about(path).map_or(0o666, |old| old.mode() & 0o777))
+    }
+
+    /// Gives `file` the permissions of the file at `path` and, if the system allows it, its owner.
+    pub(super) fn inherit(file: &File, path: &Path) -> io::Result<()> {
+        let (Some(old), new) = (about(path), file.metadata()?) else { return Ok(()) };
+        if (old.uid(), old.gid()) != (new.uid(), new.gid()) {
+            // Only the administrator may give files away, but members of a group may leave them to it.
+            let _ = fchown(file, Some(old.uid()), Some(old.gid())).or_else(|_| fchown(file, None, Some(old.gid())));
+        }
+        file.set_permissions(permissions(path))
     }
 }
 
@@ -219,4 +312,25 @@ pub fn create_folder(path: &Path) -> Result<(), Error> {
         return Err(Error::writing(path, &"a file is there, and a folder is needed"));
     }
     fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_there_stays_until_a_file_is_put() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let files = Files::default();
+        files.text(&path, "old").unwrap();
+        let staged = files.staged(&path, |file| file.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        drop(files.staged(&path, |file| file.write_all(b"dropped")).unwrap());
+        let failed = files.staged(&path, |_| Err::<(), _>("a reason"));
+        assert!(failed.unwrap_err().to_string().contains("a reason"));
+        staged.put().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 }

@@ -23,8 +23,9 @@ pub use summary::{Failed, Summary};
 use bp_io::Files;
 
 use crate::{
-    Align, Cause, Error, Labels, Making, Options, Watch, align_camera,
+    Align, Cause, Error, Event, Labels, Making, Options, Watch, align_camera,
     pairs::{Pair, Source},
+    read_pair,
 };
 
 /// The pairs of a batch, how they are matched, and what is written.
@@ -98,8 +99,9 @@ impl Also {
 /// [`Summary::failures`].
 pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
     check(options)?;
-    let found = options.source.find(&options.output)?;
+    let found = options.source.find(&options.output, watch)?;
     found.notes.iter().for_each(|note| watch.note(note));
+    found.unread.iter().for_each(|text| watch.tell(Event::Failed(text)));
     let shard = options.shard;
     let files = Files::of(&shard.file_part()).owning(&options.output);
     let making = &Making { files, ..making.clone() };
@@ -116,6 +118,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let run = Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() };
     failures.extend(match_due(&run, &due)?);
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
+    let summary = Summary { unread: found.unread, ..summary };
     summary.write(&making.files, &shard.summary_path(&options.output))?;
     Ok(summary)
 }
@@ -146,7 +149,8 @@ fn with_alignment(
         return Ok(options.clone());
     }
     let file = options.alignment.as_deref().map(|path| (files, path));
-    let align = align_camera(pairs.iter().map(|pair| run::read(options, pair)), file, watch)?;
+    let read = |pair: &Pair| read_pair([&pair.left, &pair.right], options.max_megapixels, options.matching.max_memory);
+    let align = align_camera(pairs.iter().map(read), file, watch)?;
     if let Align::Known(known) = align
         && !known.is_negligible()
     {

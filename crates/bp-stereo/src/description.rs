@@ -56,7 +56,9 @@ pub struct Settings {
     /// Predicted number of message entries to compute. With label sets, the most that there may be.
     pub message_updates: u64,
     /// Predicted bytes on the device, or in general if no device is given. With label sets, the most that there may be.
-    pub planned_bytes: u64,
+    /// Sidecars lack it: it depends on the device and its threads, and they are the same everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_bytes: Option<u64>,
 }
 
 /// The smoothness cost of some edges; see [`bp_core::EdgeLevels`].
@@ -277,7 +279,7 @@ impl Settings {
             rows: None,
             finish: None,
             message_updates: plan.message_updates(),
-            planned_bytes: device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan)),
+            planned_bytes: Some(device.map_or_else(|| plan.bytes(), |device| device.planned_bytes(plan))),
         }
     }
 }

@@ -199,6 +199,21 @@ impl Matcher {
         Ok(answer)
     }
 
+    /// Fails if the device cannot start the next frame of a video from the messages of this one.
+    pub(crate) fn check_warm(&self, plan: &Plan) -> Result<(), Error> {
+        Ok(self.opened.device.check_warm(plan)?)
+    }
+
+    /// Bytes that the device holds for the next pair of the same plan.
+    pub(crate) fn allocated_bytes(&self) -> u64 {
+        self.prepared.as_ref().map_or(0, |prepared| prepared.tiled.allocated_bytes())
+    }
+
+    /// Frees those bytes. Returns whether there were any.
+    pub(crate) fn free(&mut self) -> bool {
+        self.prepared.take().is_some()
+    }
+
     /// SHA-256 of all messages of the last pair: from the left, right, up and down, each `[height][width][labels]`.
     ///
     /// # Errors

@@ -1,11 +1,11 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Plan, Schedule, Size, Tiling};
+use bp_core::{Plan, Schedule, Size, Tiling, finish};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory, tiles::ANSWER};
 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
-const PROGRAM: u64 = 22 << 20;
+pub(crate) const PROGRAM: u64 = 22 << 20;
 
 /// Bytes per pixel of both images.
 const PAIR: u64 = 6;
@@ -36,11 +36,12 @@ const DEPTH: u64 = 4;
 /// Bytes per pixel of the mirrored pair while the right image is matched. The right map that is kept later needs fewer.
 const RIGHT: u64 = 6;
 
-/// Temporary bytes per pixel for finishing a map: a map with a frame and the next map, or the next map and, for fractions, the
-/// rows of windows, which fit as long as images are not very wide and low. For the confidence: besides
-/// both maps, two maps with frames and the worth of each pixel.
-const FINISHING: u64 = 8;
-const CONFIDENCE: u64 = 20;
+/// Temporary bytes per pixel for finishing a map: the next map and, for the confidence, both maps and the worth of each pixel.
+const FINISHING: u64 = 4;
+const CONFIDENCE: u64 = 12;
+
+/// Rows and columns of the frames around maps that are filtered, on both sides together.
+const FRAME: usize = 8;
 
 /// Temporary bytes per pixel for finding surfaces in the speckle filter.
 const SPECKLE: u64 = 9;
@@ -134,14 +135,12 @@ impl Bytes {
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
         let aligned = if_so(is_aligned, ALIGNED);
         let (right, trust) = (if_so(options.needs_right(), RIGHT), if_so(options.confidence, TRUST));
-        let finishing = if options.confidence { CONFIDENCE } else { FINISHING };
-        let finishing = finishing.max(if_so(options.speckle.is_some(), SPECKLE));
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
         Self {
             held: PROGRAM + a_pixel(PAIR + aligned + truth),
             coming: a_pixel(right + others),
-            finishing: a_pixel(MAP + (WRITING + depth).max(LABELS + finishing)),
+            finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }
     }
 
@@ -149,6 +148,18 @@ impl Bytes {
     fn peak(&self, tiles: u64) -> u64 {
         (self.held + self.coming).saturating_add(tiles.max(self.finishing))
     }
+}
+
+/// Temporary bytes for finishing a map of this size on the threads of the current pool.
+fn finishing(options: &Options, size: Size) -> u64 {
+    let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
+    let framed = MAP * ((size.width + FRAME) * (size.height + FRAME)) as u64;
+    let filtered = a_pixel(FINISHING) + framed;
+    let refined = a_pixel(FINISHING) + finish::window_bytes(size, rayon::current_num_threads());
+    let trusted = if options.confidence { a_pixel(CONFIDENCE) + 2 * framed } else { 0 };
+    let speckles = if options.speckle.is_some() { a_pixel(SPECKLE) } else { 0 };
+    let refined = if options.finish().subpixel { refined } else { 0 };
+    filtered.max(refined).max(trusted).max(speckles)
 }
 
 /// A tiling in words.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bp_core::{Calibration, DisparityMap, Image, Plan, Size, depth_map, points};
 use bp_io::{
     Files, Geometry, MapFormat, Origin, Picture, Quantity, Raster, check_distinct, check_ending, check_range,
-    is_stream, remove_sidecar, sidecar_of, write_picture_sidecar, write_points, write_sidecar,
+    is_stream, put_described, sidecar_of, staged_picture_sidecar, staged_sidecar, write_points,
 };
 
 use crate::{Error, Watch, description};
@@ -119,7 +119,8 @@ impl Outputs {
     /// # Errors
     /// [`Error::File`].
     pub fn write(&self, making: &Making, content: &Content<'_>, watch: &Watch<'_>) -> Result<(), Error> {
-        let writer = Writer { making, content, watch };
+        let plan = content.plan.map(|plan| description::Settings { planned_bytes: None, ..plan.clone() });
+        let writer = Writer { making, content, plan, watch };
         self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &Raster::disparities(content.map), None))?;
         self.picture.as_deref().map_or(Ok(()), |path| writer.picture(path))?;
         if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
@@ -156,13 +157,15 @@ impl Outputs {
 struct Writer<'a> {
     making: &'a Making,
     content: &'a Content<'a>,
+    /// The plan as sidecars hold it.
+    plan: Option<description::Settings>,
     watch: &'a Watch<'a>,
 }
 
 impl Writer<'_> {
     /// The origin of the maps, for their sidecars.
     fn origin<'b>(&'b self, calibration: Option<&'b Calibration>) -> Origin<'b, description::Settings> {
-        let Content { plan, inputs, .. } = *self.content;
+        let (plan, inputs) = (self.plan.as_ref(), self.content.inputs);
         let labels = |plan: &description::Settings| {
             let first = i64::from(plan.min_disparity);
             [first, first + plan.labels as i64 - 1]
@@ -172,29 +175,25 @@ impl Writer<'_> {
 
     /// Writes a map and its sidecar.
     fn map(&self, path: &Path, raster: &Raster<'_>, calibration: Option<&Calibration>) -> Result<(), Error> {
-        // Removed first, so that an old sidecar never lies beside a new map, even if the program ends in between.
-        remove_sidecar(path)?;
         let raster = &Raster { nan: self.making.nan, ..*raster };
         if raster.range().is_none() {
             self.watch.warn(&format!("{}: no pixel is known", path.display()));
         }
         let files = &self.making.files;
-        raster.write(files, path)?;
-        if self.making.has_sidecar(path) {
-            write_sidecar(files, path, raster, &self.origin(calibration))?;
-        }
-        Ok(())
+        let map = raster.staged(files, path)?;
+        let has_sidecar = self.making.has_sidecar(path);
+        let sidecar =
+            has_sidecar.then(|| staged_sidecar(files, path, raster, &self.origin(calibration))).transpose()?;
+        Ok(put_described(path, map, sidecar)?)
     }
 
     fn picture(&self, path: &Path) -> Result<(), Error> {
-        remove_sidecar(path)?;
         let Making { picture, files, .. } = self.making;
-        picture.write(files, path, self.content.map)?;
-        if self.making.has_sidecar(path) {
-            let raster = Raster::disparities(self.content.map);
-            write_picture_sidecar(files, path, &raster, picture.colours, &self.origin(None))?;
-        }
-        Ok(())
+        let staged = picture.staged(files, path, self.content.map)?;
+        let raster = Raster::disparities(self.content.map);
+        let described = || staged_picture_sidecar(files, path, &raster, picture.colours, &self.origin(None));
+        let sidecar = self.making.has_sidecar(path).then(described).transpose()?;
+        Ok(put_described(path, staged, sidecar)?)
     }
 
     fn depth(&self, path: &Path, calibration: &Calibration) -> Result<(), Error> {

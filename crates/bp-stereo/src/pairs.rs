@@ -9,7 +9,9 @@ use std::path::{Component, Path, PathBuf};
 
 pub use list::parse;
 
-use crate::Error;
+use bp_io::{Contents, MOST_TEXT};
+
+use crate::{Error, Watch};
 
 /// A pair and its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,13 +31,15 @@ impl Pair {
     }
 }
 
-/// Pairs in order, and notes on files that are not part of a pair.
+/// Pairs in order, notes on files that are not part of a pair, and what may hold more pairs but could not be read.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// The pairs.
     pub pairs: Vec<Pair>,
     /// The notes, a line each.
     pub notes: Vec<String>,
+    /// Folders that could not be read, and why, a line each.
+    pub unread: Vec<String>,
 }
 
 /// Where pairs come from.
@@ -54,25 +58,26 @@ impl Source {
     ///
     /// # Errors
     /// [`Error::Input`] if there is no pair or a list is broken, [`Error::Options`] for a pattern without a
-    /// placeholder.
-    pub fn find(&self, output: &Path) -> Result<Found, Error> {
+    /// placeholder, [`Error::Stopped`].
+    pub fn find(&self, output: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
         let (found, source) = match self {
-            Self::Path(path) if path.is_dir() => (search::search(path, output), path.display().to_string()),
-            Self::Path(path) => (listed(path)?, path.display().to_string()),
+            Self::Path(path) if path.is_dir() => (search::search(path, output, watch)?, path.display().to_string()),
+            Self::Path(path) => (listed(path, watch)?, path.display().to_string()),
             Self::Video([left, right]) => (video::frames(left, right)?, format!("{left} and {right}")),
-            Self::Pairs(pairs, name) => (Found { pairs: pairs.clone(), notes: Vec::new() }, name.clone()),
+            Self::Pairs(pairs, name) => (Found { pairs: pairs.clone(), ..Found::default() }, name.clone()),
         };
         if found.pairs.is_empty() {
-            let notes: String = found.notes.iter().map(|note| format!("\n  {note}")).collect();
+            let notes: String = found.unread.iter().chain(&found.notes).map(|note| format!("\n  {note}")).collect();
             return Err(Error::Input(format!("{source}: no pair found{notes}")));
         }
         Ok(found)
     }
 }
 
-fn listed(path: &Path) -> Result<Found, Error> {
-    let bytes = std::fs::read(path).map_err(|error| bp_io::Error::reading(path, &error))?;
-    Ok(Found { pairs: parse(&bytes, &path.display().to_string())?, notes: Vec::new() })
+fn listed(path: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
+    let (name, path) = (path.display().to_string(), path.to_owned());
+    let bytes = watch.unless_stopped(move || Contents::of(&path, MOST_TEXT))??.bytes;
+    Ok(Found { pairs: parse(&bytes, &name)?, ..Found::default() })
 }
 
 /// The default name of a pair: the path of its left image without root, `..` and extension.

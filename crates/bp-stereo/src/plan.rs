@@ -70,7 +70,7 @@ pub(crate) fn described(
         k,
         z,
         message_updates: tiling.message_updates(),
-        planned_bytes: tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?,
+        planned_bytes: Some(tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?),
         rows: alignment.map(Into::into),
         finish: description::Finish::of(options.finish()),
         ..description::Settings::new(plan, Some(device), options.algorithm.kind())

@@ -3,11 +3,18 @@
 use std::{
     fmt,
     ops::ControlFlow,
+    panic::resume_unwind,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
+        mpsc::{RecvTimeoutError, sync_channel},
     },
+    thread,
+    time::Duration,
 };
+
+/// How soon a stop is noticed while work waits for others.
+const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A request to stop work at its next step. All clones share it.
 #[derive(Clone, Debug, Default)]
@@ -99,6 +106,30 @@ impl<'a> Watch<'a> {
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(Stop::is_stopped)
+    }
+
+    /// Does work that may wait for others, such as a read from a pipe, on a thread of its own. If it should stop meanwhile, that
+    /// thread is left behind.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn unless_stopped<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Stopped> {
+        let Some(stop) = self.stop else { return Ok(work()) };
+        let (done, outcome) = sync_channel(1);
+        let worker = thread::spawn(move || drop(done.send(work())));
+        loop {
+            match outcome.recv_timeout(PATIENCE) {
+                Ok(value) => return Ok(value),
+                Err(RecvTimeoutError::Timeout) if stop.is_stopped() => return Err(Stopped),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return worker.join().map_or_else(|panic| resume_unwind(panic), |()| Err(Stopped));
+                }
+            }
+        }
     }
 
     /// Fails if the work should stop.

@@ -43,6 +43,10 @@ impl Device for VulkanDevice {
         Program::new(plan, &self.limits()).map(drop)
     }
 
+    fn check_warm(&self, plan: &Plan) -> Result<(), Error> {
+        bp_gpu::check_warm(plan)
+    }
+
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         Program::planned_bytes(plan, &self.limits)
     }

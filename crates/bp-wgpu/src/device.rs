@@ -67,6 +67,10 @@ impl Device for WgpuDevice {
         Program::new(plan, &self.limits()).map(drop)
     }
 
+    fn check_warm(&self, plan: &Plan) -> Result<(), Error> {
+        bp_gpu::check_warm(plan)
+    }
+
     fn planned_bytes(&self, plan: &Plan) -> u64 {
         // Host memory holds a second copy of the upload buffer; see `WgpuQueue`.
         let upload = Program::new(plan, &self.limits).map_or(0, |program| program.buffers[Program::UPLOAD].bytes);

@@ -68,12 +68,19 @@ fn load(gpu: &Gpu, adapter: &Adapter) -> Option<Cache> {
     }
     let key = vulkan::cache_key(adapter)?;
     let stored = cache::load(&key);
-    let descriptor = PipelineCacheDescriptor { label: None, data: stored.as_deref(), fallback: true };
-    #[expect(unsafe_code, reason = "wgpu cannot check what a driver wrote")]
+    match made(gpu, stored.as_deref()) {
+        Ok(pipelines) => Some(Cache { key, pipelines, stored: Mutex::new(stored.unwrap_or_default()) }),
+        // To wgpu, data of another device are an error and no reason to begin anew.
+        Err(_) => Some(Cache { key, pipelines: made(gpu, None).ok()?, stored: Mutex::default() }),
+    }
+}
+
+#[expect(unsafe_code, reason = "wgpu cannot check what a driver wrote")]
+fn made(gpu: &Gpu, data: Option<&[u8]>) -> Result<PipelineCache, Error> {
+    let descriptor = PipelineCacheDescriptor { label: None, data, fallback: true };
     // SAFETY: only `Pipelines::store` stores data under this key: all of what `PipelineCache::get_data` returned.
-    // `cache::load` has compared its SHA-256 sum. wgpu itself drops data of another device or driver.
-    let pipelines = unsafe { gpu.device.create_pipeline_cache(&descriptor) };
-    Some(Cache { key, pipelines, stored: Mutex::new(stored.unwrap_or_default()) })
+    // `cache::load` has compared its SHA-256 sum. wgpu itself refuses data of another device or driver.
+    gpu.guard(0, || Ok(unsafe { gpu.device.create_pipeline_cache(&descriptor) }))
 }
 
 fn compile(gpu: &Gpu, pipeline: &Pipeline, cache: Option<&PipelineCache>) -> ComputePipeline {

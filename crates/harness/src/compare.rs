@@ -238,7 +238,7 @@ fn value<'a>(group: Option<&Group<'a>>, base: Option<&[&Measurement]>, firsts: &
 
 /// The settings that define the computation: all but `planned_bytes`, which depend on the device.
 fn problem(settings: &Settings) -> Settings {
-    Settings { planned_bytes: 0, ..settings.clone() }
+    Settings { planned_bytes: None, ..settings.clone() }
 }
 
 fn means(measured: &[&Measurement], base: Option<&[&Measurement]>) -> Option<Means> {

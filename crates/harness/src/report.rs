@@ -17,6 +17,7 @@ mod tradeoffs;
 use std::path::{Path, PathBuf};
 
 use bp_charts::png;
+use bp_io::read_text;
 
 pub use grid::lines;
 pub use opening::headline;
@@ -124,7 +125,7 @@ pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
 /// A message that names the file, also if it lacks the markers.
 pub fn renew_page(run: &Path, page: &Path) -> Result<(), Failure> {
     let record = load(run)?;
-    let text = std::fs::read_to_string(page).map_err(|error| Failure::reading(page, &error))?;
+    let text = read_text(page)?;
     let renewed = readme::renewed(&text, page, folder(run), &Results::new(&record)?);
     let begin = readme::PARTS.map(|name| format!("<!-- {name}: begin -->")).join(" or ");
     let missing =

@@ -1,10 +1,13 @@
 //! Translates the arguments of `bp match` and `bp convert` into the library's options. All checks of arguments against
 //! each other are here.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+};
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
-use bp_io::{Geometry, Picture, read_alignment};
+use bp_io::{Geometry, MOST_TEXT, Picture, read_alignment};
 use bp_stereo::{
     Algorithm, Align, Hierarchy, Labels, Loops, Making, Options, Outputs, Quality,
     batch::{Also, BatchOptions},
@@ -113,10 +116,12 @@ impl ManyArgs {
     fn source(&self) -> Result<Option<Source>, Failure> {
         match (&self.pairs, self.video.as_deref()) {
             (Some(path), _) if path == Path::new("-") => {
-                let mut bytes = Vec::new();
-                let read = std::io::Read::read_to_end(&mut std::io::stdin().lock(), &mut bytes);
-                read.map_err(|error| Failure::input(format!("standard input: {error}")))?;
-                let name = "standard input".to_owned();
+                let (mut bytes, name) = (Vec::new(), "standard input".to_owned());
+                let read = std::io::stdin().lock().take(MOST_TEXT + 1).read_to_end(&mut bytes);
+                read.map_err(|error| Failure::input(format!("{name}: {error}")))?;
+                if bytes.len() as u64 > MOST_TEXT {
+                    return Err(Failure::input(format!("{name}: more than {} MiB; split the list", MOST_TEXT >> 20)));
+                }
                 Ok(Some(Source::Pairs(pairs::parse(&bytes, &name)?, name)))
             }
             (Some(path), _) => Ok(Some(Source::Path(path.clone()))),

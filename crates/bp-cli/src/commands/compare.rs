@@ -1,8 +1,8 @@
 //! `bp compare`: compares records of several machines, commits or backends in one table.
 
-use std::{io::Write, path::Path};
+use std::path::Path;
 
-use super::print_json;
+use super::{print, print_json};
 use harness::{
     compare::{Comparison, page},
     record::{Record, load},
@@ -19,5 +19,5 @@ pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
     if args.json {
         return print_json(&comparison);
     }
-    Ok(write!(std::io::stdout(), "{}", page(&comparison))?)
+    print(&page(&comparison))
 }

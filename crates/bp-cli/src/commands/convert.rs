@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bp_core::{DisparityMap, Image};
 use bp_io::{Limits, read_image, read_map};
-use bp_stereo::Content;
+use bp_stereo::{Content, reading_limits};
 
-use super::limits::limits;
 use crate::{args::ConvertArgs, failure::Failure, interrupt, terminal};
 
 /// Runs the command.
@@ -22,17 +21,17 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     if outputs.points.is_none() && args.image.is_some() {
         return Err(Failure::usage("--image is for --points: give --points too"));
     }
-    interrupt::listen()?;
     let calib = args.outputs.calibration();
     let inputs: Vec<&Path> =
         [Some(&args.map), args.image.as_ref(), calib].into_iter().flatten().map(PathBuf::as_path).collect();
     outputs.check(&making, &inputs)?;
-    let limit = limits(args.max_megapixels);
+    let limit = reading_limits(args.max_megapixels, None, 0);
     let map = read_map(&args.map, args.map_scale, limit)?;
     outputs.check_map(&making, map.range().unwrap_or((0.0, 0.0)), map.size())?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;
+    // Only now: what reads can be stopped at any moment, and a read from a pipe may wait for ever.
+    interrupt::listen()?;
     let watch = terminal::watch();
-    watch.check()?;
     let content = Content { map: &map, confidence: None, image: image.as_ref(), plan: None, inputs: &inputs };
     Ok(outputs.write(&making, &content, &watch)?)
 }

@@ -1,13 +1,13 @@
 //! `bp evaluate`: measures the errors of a disparity map.
 
-use std::{fmt::Write as _, io::Write as _, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use bp_core::{Distribution, Errors, GroundTruth, MapErrors, THRESHOLDS, finish};
+use bp_io::{Error, Limits, Mask, read_map, read_mask};
+use bp_stereo::reading_limits;
 use serde::Serialize;
 
-use bp_io::{Error, Limits, Mask, read_map, read_mask};
-
-use super::{limits::limits, print_json};
+use super::{print, print_json};
 use crate::{
     args::{EvaluateArgs, TruthArgs},
     failure::Failure,
@@ -113,7 +113,7 @@ impl Measured {
 
 /// Runs the command.
 pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
-    let limit = limits(args.max_megapixels);
+    let limit = reading_limits(args.max_megapixels, None, 0);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
     let map = args.limit.into_iter().fold(map, |map, largest| map.limited(0.0, largest));
@@ -132,7 +132,7 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     if args.json {
         return print_json(&Report { width: map_size.width, height: map_size.height, errors });
     }
-    Ok(write!(std::io::stdout(), "{}", error_table(&errors))?)
+    print(&error_table(&errors))
 }
 
 /// Reads ground truth, and the right ground truth or the mask that shows its non-occluded pixels.

@@ -36,7 +36,7 @@ pub(crate) fn gate(args: &GateArgs) -> Result<(), Failure> {
 }
 
 fn print(args: &GateArgs, judgement: &impl Serialize, page: &str) -> Result<(), Failure> {
-    if args.json { print_json(judgement) } else { Ok(write!(std::io::stdout(), "{page}")?) }
+    if args.json { print_json(judgement) } else { super::print(page) }
 }
 
 fn written(files: &str) -> Result<(), Failure> {

@@ -7,17 +7,16 @@ use std::{
 };
 
 use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
-use bp_io::{Limits, MapFormat, Raster, read_image};
+use bp_io::{MapFormat, Raster};
 use bp_stereo::{
-    Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Outputs, Planned, Start, align_camera,
-    batch,
+    Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, Start,
+    align_camera, batch, read_pair, reading_limits,
 };
 
 use super::{
     evaluate,
-    limits::limits,
     match_report::{Asked, Report, text},
-    match_summary, print_json,
+    match_summary, print, print_json,
 };
 use crate::{
     args::MatchArgs,
@@ -44,12 +43,13 @@ fn match_many(args: &MatchArgs, options: &batch::BatchOptions) -> Result<(), Fai
     if args.json {
         print_json(&summary)?;
     } else {
-        write!(std::io::stdout(), "{}", match_summary::text(&summary))?;
+        print(&match_summary::text(&summary))?;
     }
-    match summary.failures.len() {
-        0 => Ok(()),
-        failed => {
-            let path = options.shard.summary_path(&options.output);
+    let path = options.shard.summary_path(&options.output);
+    match (summary.failures.len(), summary.unread.len()) {
+        (0, 0) => Ok(()),
+        (0, folders) => Err(Failure::input(format!("{folders} folders could not be read; see {}", path.display()))),
+        (failed, _) => {
             Err(Failure::input(format!("{failed} of {} pairs failed; see {}", summary.pairs, path.display())))
         }
     }
@@ -70,9 +70,8 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
-    let limits = limits(args.max_megapixels);
-    let pair = read_pair(files, limits)?;
-    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), limits)).transpose()?;
+    let pair = read_pair(files.map(PathBuf::as_path), args.max_megapixels, options.max_memory)?;
+    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), &options)).transpose()?;
     interrupt::listen()?;
     if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {
         options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
@@ -85,7 +84,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     match () {
         () if args.json => print_json(&report),
         () if args.is_piped() => Ok(()),
-        () => Ok(write!(std::io::stdout(), "{}", text(&report))?),
+        () => print(&text(&report)),
     }
 }
 
@@ -166,12 +165,12 @@ fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }
 
-fn read_pair([left, right]: [&PathBuf; 2], limits: Limits) -> Result<StereoPair, Failure> {
-    let named = |error| Failure::input(format!("{} and {}: {error}", left.display(), right.display()));
-    StereoPair::new(read_image(left, limits)?, read_image(right, limits)?).map_err(named)
-}
+/// Bytes per pixel beside ground truth that is read: the pair, and truth of the left image.
+const PAIR_AND_TRUTH: u64 = 10;
 
-fn read_truth(args: &MatchArgs, path: &Path, size: Size, limits: Limits) -> Result<GroundTruth, Failure> {
+fn read_truth(args: &MatchArgs, path: &Path, size: Size, options: &Options) -> Result<GroundTruth, Failure> {
+    let held = PAIR_AND_TRUTH * size.pixels() as u64;
+    let limits = reading_limits(args.max_megapixels, options.max_memory, held);
     let truth = evaluate::read_truth(path, &args.truth, limits)?;
     let found = truth.disparities().size();
     if found == size {

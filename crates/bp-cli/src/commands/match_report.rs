@@ -153,8 +153,9 @@ pub(super) fn text(report: &Report) -> String {
     if settings.finish.is_some() {
         let _ = writeln!(text, "{:<14}{:<16}{:>10.1} ms", "", "after matching", report.finishing_ms);
     }
-    let [planned, allocated, peak] = [settings.planned_bytes, report.allocated_bytes, report.peak_bytes]
-        .map(|bytes| ByteSize(bytes).display().iec());
+    let [planned, allocated, peak] =
+        [settings.planned_bytes.unwrap_or_default(), report.allocated_bytes, report.peak_bytes]
+            .map(|bytes| ByteSize(bytes).display().iec());
     let all = format!("{peak} with images and answer");
     let _ = writeln!(text, "{:<10}{allocated} allocated, {planned} predicted, {all}", "memory");
     let Energy { total, data, smoothness } = report.energy;

@@ -13,7 +13,7 @@ pub(super) fn text(summary: &Summary) -> String {
     let _ = writeln!(text, "{:<10}{pairs}{shard}: {done} done, {skipped} of them earlier, {failed} failed", "pairs");
     let PairTimes { read_ms, match_ms, write_ms, .. } = summary.times;
     let [read, matching, written, total] = [read_ms, match_ms, write_ms, summary.total_ms].map(|ms| ms / 1000.0);
-    let parts = format!("{read:.1} s reading, {matching:.1} s matching, {written:.1} s writing, at the same time");
+    let parts = format!("{read:.1} s reading, {matching:.1} s matching, {written:.1} s writing, which may overlap");
     let _ = writeln!(text, "{:<10}{total:.1} s in total; {parts}", "time");
     if let (Some(all), Some(solved), Some(median)) =
         (summary.pairs_per_second, summary.solved_per_second, summary.median_solve_ms)

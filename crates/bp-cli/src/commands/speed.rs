@@ -1,13 +1,12 @@
 //! `bp speed`: compares the speed of devices.
 
-use std::io::Write;
-
 use harness::{
     measure::Asked,
     speed::{self, Files},
     threads,
 };
 
+use super::print;
 use crate::{args::SpeedArgs, failure::Failure, interrupt, notes::note, terminal};
 
 /// Runs the command.
@@ -27,6 +26,6 @@ pub(crate) fn speed(args: &SpeedArgs) -> Result<(), Failure> {
     if let Some(files) = &files {
         note(&files.write(&measured)?);
     }
-    write!(std::io::stdout(), "{}", speed::page(&measured))?;
+    print(&speed::page(&measured))?;
     Ok(speed::check(&measured)?)
 }

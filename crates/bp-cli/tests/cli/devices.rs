@@ -2,7 +2,12 @@
 
 use std::{fs, process::Command};
 
-use crate::folder::{Folder, MATCH, text};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    folder::{Folder, MATCH, text},
+    many::TINY,
+};
 
 #[test]
 fn every_backend_is_listed_with_its_devices_or_why_it_has_none() {
@@ -126,5 +131,57 @@ fn too_little_memory_is_told() {
             let arguments = format!("match large.pgm large.pgm --output a.pfm {plan} --backend {name}");
             folder.command_fails(&mut limited(1_000_000, &arguments), 6, &["out of memory", "needed for"]);
         }
+    }
+}
+
+/// The GPU backends that have a device, at least one if the environment requires it.
+fn gpus(folder: &Folder) -> Vec<String> {
+    let backends = folder.json("devices --json").as_array().unwrap()[2..].to_vec();
+    let found = backends.iter().filter(|backend| !backend["devices"].as_array().unwrap().is_empty());
+    let names: Vec<String> = found.map(|backend| backend["backend"].as_str().unwrap().to_owned()).collect();
+    assert!(!names.is_empty() || std::env::var_os("BP_REQUIRE_GPU").is_none(), "no GPU");
+    names
+}
+
+/// Bytes of the header are changed in turn, with a checksum that fits, as another device's data would have.
+#[test]
+fn a_cache_of_kernels_of_another_device_is_made_anew() {
+    let folder = Folder::new();
+    let cache = folder.path("cache");
+    for backend in gpus(&folder) {
+        let mut run = folder.command(&format!("{MATCH} m.pfm --backend {backend}"));
+        run.env("XDG_CACHE_HOME", &cache);
+        assert!(run.output().unwrap().status.success());
+        let files = walkdir::WalkDir::new(&cache).into_iter().map(|entry| entry.unwrap());
+        let name = |entry: &walkdir::DirEntry| entry.file_name().to_string_lossy().into_owned();
+        let Some(file) = files.into_iter().find(|entry| name(entry).starts_with(&backend)) else { continue };
+        let stored = fs::read(file.path()).unwrap();
+        for at in (0..stored.len() - 32).step_by(5).take(10) {
+            let mut data = stored[32..].to_vec();
+            data[at] ^= 1;
+            fs::write(file.path(), [Sha256::digest(&data).as_slice(), &data].concat()).unwrap();
+            let output = run.output().unwrap();
+            assert!(output.status.success(), "{backend}, byte {at}: {}", text(&output.stderr));
+        }
+    }
+}
+
+#[test]
+fn a_warm_start_that_a_device_cannot_do_is_refused_at_the_first_frame() {
+    let folder = Folder::new();
+    for frame in 1..3 {
+        fs::copy(folder.path("left.png"), folder.path(&format!("l{frame}.png"))).unwrap();
+        fs::copy(folder.path("right.png"), folder.path(&format!("r{frame}.png"))).unwrap();
+    }
+    for backend in gpus(&folder) {
+        let run = |loops: u32| {
+            let plan = format!("--algorithm bp --loops {loops} --warm-start {TINY} --backend {backend}");
+            folder.run(&format!("match --video l%d.png r%d.png --output {backend} {plan}"))
+        };
+        let output = run(3);
+        assert_eq!(output.status.code(), Some(5), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("even number of loops"), "{}", text(&output.stderr));
+        assert!(!folder.path(&backend).join("1.pfm").exists());
+        assert!(run(4).status.success());
     }
 }

@@ -4,6 +4,7 @@
 mod align;
 mod devices;
 mod folder;
+mod hostile;
 mod manners;
 mod many;
 mod outputs;

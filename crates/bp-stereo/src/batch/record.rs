@@ -1,7 +1,7 @@
 //! The record of a matched pair. It shows a later run that the pair is complete.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, Metadata},
     io::{self, Read as _},
     ops::Add,
     path::{Path, PathBuf},
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use bp_core::Size;
-use bp_io::{CalibrationFile, Colours, Files, Geometry, hex};
+use bp_io::{CalibrationFile, Colours, Contents, Files, Geometry, MOST_DESCRIPTION, hex};
 
 use super::{Also, BatchOptions};
 use crate::{Error, Making, Options, Tiles, description};
@@ -26,7 +26,7 @@ pub(super) struct FileState {
     modified_ns: Option<u64>,
     /// Time of the last change of any kind (ctime), which `cp --preserve` and `tar` do not restore.
     changed_ns: Option<i128>,
-    sha256: String,
+    pub(super) sha256: String,
 }
 
 /// The outputs of a pair and how they were made.
@@ -100,7 +100,7 @@ pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
 impl PairRecord {
     /// Reads a record. Returns `None` if it is missing or broken.
     pub(super) fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&fs::read(path).ok()?).ok()
+        serde_json::from_slice(&Contents::of_regular(path, MOST_DESCRIPTION).ok()?.bytes).ok()
     }
 
     /// Writes the record, whole or not at all.
@@ -124,19 +124,29 @@ impl PairRecord {
 
 impl FileState {
     /// The current state of a file.
-    pub(super) fn of(path: &Path) -> io::Result<Self> {
-        let path = std::path::absolute(path)?;
-        let mut file = File::open(&path)?;
-        let (bytes, modified_ns, changed_ns) = Self::stamp(&file.metadata()?);
-        let mut hash = Sha256::new();
-        let mut part = vec![0; 1 << 16];
+    pub(super) fn of(path: &Path) -> Result<Self, bp_io::Error> {
+        let failed = |error: io::Error| bp_io::Error::reading(path, &error);
+        let mut file = File::open(path).map_err(failed)?;
+        let about = file.metadata().map_err(failed)?;
+        let (mut hash, mut part) = (Sha256::new(), vec![0; 1 << 16]);
         loop {
-            match file.read(&mut part)? {
+            match file.read(&mut part).map_err(failed)? {
                 0 => break,
                 bytes => hash.update(&part[..bytes]),
             }
         }
-        Ok(Self { path, bytes, modified_ns, changed_ns, sha256: hex(&hash.finalize()) })
+        Self::new(path, &about, hex(&hash.finalize()))
+    }
+
+    /// The state of a file when it was read into memory: that of the very bytes which are decoded.
+    pub(super) fn read(path: &Path, contents: &Contents) -> Result<Self, bp_io::Error> {
+        Self::new(path, &contents.metadata, hex(&Sha256::digest(&contents.bytes)))
+    }
+
+    fn new(path: &Path, about: &Metadata, sha256: String) -> Result<Self, bp_io::Error> {
+        let path = std::path::absolute(path).map_err(|error| bp_io::Error::reading(path, &error))?;
+        let (bytes, modified_ns, changed_ns) = Self::stamp(about);
+        Ok(Self { path, bytes, modified_ns, changed_ns, sha256 })
     }
 
     /// Whether `path` has the same contents. Reads the file only if its path or times changed.
@@ -151,7 +161,7 @@ impl FileState {
     }
 
     /// Length and times of a file.
-    fn stamp(metadata: &fs::Metadata) -> (u64, Option<u64>, Option<i128>) {
+    fn stamp(metadata: &Metadata) -> (u64, Option<u64>, Option<i128>) {
         #[cfg(unix)]
         let changed_ns = {
             use std::os::unix::fs::MetadataExt;

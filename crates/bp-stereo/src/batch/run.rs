@@ -1,8 +1,8 @@
-//! Runs a batch on three threads: one reads, one matches and one writes, each a different pair.
+//! Runs a batch on three threads: one reads, one matches and one writes, each a different pair. With a limit of memory, one
+//! pair after another.
 
 use std::{
     collections::BTreeMap,
-    io,
     sync::{
         Mutex, PoisonError,
         mpsc::{Receiver, SyncSender, sync_channel},
@@ -11,8 +11,8 @@ use std::{
     time::Instant,
 };
 
-use bp_core::{DeviceKind, StereoPair};
-use bp_io::{Limits, read_image};
+use bp_core::StereoPair;
+use bp_io::{Contents, parse_image};
 
 use super::{
     BatchOptions,
@@ -21,16 +21,21 @@ use super::{
     summary::Failed,
 };
 use crate::{
-    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Memory, Start, Warning, Watch, description,
-    pairs::Pair,
+    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Start, Stopped, Warning, Watch, description,
+    pairs::Pair, reading::Room,
 };
 
 /// A pair in memory.
 struct Read<'a> {
     job: &'a Job,
-    inputs: Vec<FileState>,
-    pair: Result<StereoPair, Error>,
+    images: Images,
     read_ms: f64,
+}
+
+/// The images of a pair, and the states of the files that they were decoded from: none if a file cannot be read.
+struct Images {
+    pair: Result<StereoPair, Error>,
+    states: Vec<FileState>,
 }
 
 /// An answer, not yet written.
@@ -50,6 +55,23 @@ struct Answer {
     done: Done,
     disparity: Disparity,
     pair: StereoPair,
+}
+
+impl Images {
+    /// Reads the files once: what is hashed is what is decoded, even if somebody replaces a file meanwhile.
+    fn read(pair: &Pair, room: Room) -> Self {
+        let paths = [pair.left.as_path(), pair.right.as_path()];
+        let mut states = Vec::new();
+        let pair = room.pair(paths, |room, path| {
+            let contents = room.explained(Contents::of_pixels(path, room.limits))?;
+            states.push(FileState::read(path, &contents)?);
+            room.explained(parse_image(path, &contents.bytes, room.limits))
+        });
+        if states.len() < paths.len() {
+            states = paths.into_iter().map(FileState::of).collect::<Result<_, _>>().unwrap_or_default();
+        }
+        Self { pair, states }
+    }
 }
 
 /// A running batch.
@@ -84,16 +106,42 @@ impl Warned {
 impl Run<'_> {
     /// Matches and writes all jobs. If a pair fails, the others continue.
     pub(super) fn all(&self, jobs: &[&Job]) -> Result<Vec<Failed>, Error> {
+        let writer =
+            Writer { run: self, pairs: jobs.len() as u64, last: Instant::now(), written: 0, failed: Vec::new() };
+        let is_limited = self.options.matching.max_memory.is_some();
+        let written = if is_limited { self.one_by_one(jobs, writer) } else { self.side_by_side(jobs, writer) };
+        self.warned.tell_others(self.watch);
+        written
+    }
+
+    /// Reads, matches and writes one pair after another, so that only one is in memory.
+    fn one_by_one(&self, jobs: &[&Job], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
+        let mut solver = PairSolver::new(self)?;
+        for job in jobs {
+            self.watch.check()?;
+            let room = Room::new(self.options.max_megapixels, self.options.matching.max_memory);
+            let beside = self.read(job, room.without(solver.matcher.allocated_bytes()))?;
+            let is_short = beside.images.pair.as_ref().is_err_and(|error| error.cause() == Cause::Memory);
+            // A warm start needs what the matcher holds.
+            let is_freed = is_short && self.options.warm_start.is_none() && solver.matcher.free();
+            writer.write(solver.solve(if is_freed { self.read(job, room)? } else { beside })?);
+        }
+        Ok(writer.failed)
+    }
+
+    /// Reads, matches and writes three pairs at a time.
+    fn side_by_side(&self, jobs: &[&Job], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
         // The channels have no buffer, so at most three pairs are in memory.
         let (read, to_match) = sync_channel(0);
         let (matched, to_write) = sync_channel(0);
-        let writer = Writer { run: self, pairs: jobs.len() as u64, last: Instant::now(), failed: Vec::new() };
         thread::scope(|scope| {
             scope.spawn(move || self.read_all(jobs, &read));
-            let writer = scope.spawn(|| writer.write_all(to_write));
+            let writer = scope.spawn(move || {
+                to_write.into_iter().for_each(|matched| writer.write(matched));
+                writer.failed
+            });
             let solved = self.solve_all(to_match, matched);
             let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            self.warned.tell_others(self.watch);
             solved.map(|()| written)
         })
     }
@@ -101,37 +149,26 @@ impl Run<'_> {
     /// Reads one pair after another until the batch stops or the receiver is gone.
     fn read_all<'a>(&self, jobs: &[&'a Job], to: &SyncSender<Read<'a>>) {
         for &job in jobs {
-            let start = Instant::now();
-            // Recorded before the images are decoded, so that a later run notices any change since.
-            let inputs: io::Result<Vec<FileState>> = job.images().into_iter().map(FileState::of).collect();
-            let pair = read(self.options, &job.pair);
-            let read = Read { job, inputs: inputs.unwrap_or_default(), pair, read_ms: milliseconds_since(start) };
+            let room = Room::new(self.options.max_megapixels, None);
+            let Ok(read) = self.read(job, room) else { return };
             if self.watch.is_stopped() || to.send(read).is_err() {
                 return;
             }
         }
     }
 
-    /// Matches one pair after another. If the device is lost, it is opened again for the next pair.
+    fn read<'a>(&self, job: &'a Job, room: Room) -> Result<Read<'a>, Stopped> {
+        let (start, pair) = (Instant::now(), job.pair.clone());
+        let images = self.watch.unless_stopped(move || Images::read(&pair, room))?;
+        Ok(Read { job, images, read_ms: milliseconds_since(start) })
+    }
+
+    /// Matches one pair after another.
     fn solve_all<'a>(&self, from: Receiver<Read<'a>>, to: SyncSender<Matched<'a>>) -> Result<(), Error> {
-        let mut matcher = self.matcher()?;
-        let mut before: Option<(usize, String)> = None;
-        for Read { job, inputs, pair, read_ms } in from {
-            // Never from the messages of another chain: the result must not depend on whether this run matched it.
-            let follows = before.take().filter(|(chain, _)| *chain == job.chain).map(|(_, history)| history);
-            let start = if follows.is_some() { Start::Warm } else { Start::Cold };
-            let answer = pair.and_then(|pair| self.match_one(&mut matcher, job, pair, start, read_ms));
-            let history = if answer.is_ok() { Some(history(follows.as_deref(), &inputs)) } else { follows.clone() };
-            before = history.map(|history| (job.chain, history));
-            let cause = answer.as_ref().err().map(Error::cause);
-            if cause == Some(Cause::Stopped) {
+        let mut solver = PairSolver::new(self)?;
+        for read in from {
+            if to.send(solver.solve(read)?).is_err() {
                 break;
-            }
-            if to.send(Matched { job, origin: PairOrigin { inputs, follows }, answer }).is_err() {
-                break;
-            }
-            if cause == Some(Cause::DeviceLost) {
-                matcher = self.matcher()?;
             }
         }
         Ok(self.watch.check()?)
@@ -140,7 +177,8 @@ impl Run<'_> {
     fn matcher(&self) -> Result<Matcher, Error> {
         let depth = self.options.also.contains(&super::Also::Depth);
         let whole = self.options.warm_start.map(|_| "warm_start");
-        Ok(Matcher::new(&self.options.matching)?.beside(Beside { truth: false, depth, batch: true, whole }))
+        let batch = self.options.matching.max_memory.is_none();
+        Ok(Matcher::new(&self.options.matching)?.beside(Beside { truth: false, depth, batch, whole }))
     }
 
     fn match_one(
@@ -159,6 +197,7 @@ impl Run<'_> {
         let firsts = planned.warnings.iter().zip(&warnings).filter(|(warning, _)| is_first(warning));
         firsts.for_each(|(_, text)| self.watch.warn(text));
         job.outputs.check_plan(self.making, &planned.plan)?;
+        self.options.warm_start.map_or(Ok(()), |_| matcher.check_warm(&planned.plan))?;
         // The batch counts pairs, not the work within one.
         let events = |event: Event<'_>| {
             if !matches!(event, Event::Progress { .. }) {
@@ -171,12 +210,38 @@ impl Run<'_> {
     }
 }
 
-/// Reads the images of a pair.
-pub(super) fn read(options: &BatchOptions, pair: &Pair) -> Result<StereoPair, Error> {
-    let limits = Limits::megapixels(options.max_megapixels);
-    let limits = limits.within(Memory::available_to(DeviceKind::Processor));
-    let images = StereoPair::new(read_image(&pair.left, limits)?, read_image(&pair.right, limits)?);
-    images.map_err(|error| Error::from(error).of(pair.images()))
+/// Matches one pair after another on one device.
+struct PairSolver<'a> {
+    run: &'a Run<'a>,
+    matcher: Matcher,
+    /// The chain of the pair before, if it has an answer, and its history.
+    before: Option<(usize, String)>,
+}
+
+impl<'r> PairSolver<'r> {
+    fn new(run: &'r Run<'r>) -> Result<Self, Error> {
+        Ok(Self { run, matcher: run.matcher()?, before: None })
+    }
+
+    /// Matches a pair. What would fail for all pairs ends the batch: a stop, a lost device that cannot be opened again, or a warm
+    /// start that the device cannot do.
+    fn solve<'a>(&mut self, Read { job, images, read_ms }: Read<'a>) -> Result<Matched<'a>, Error> {
+        let Images { pair, states: inputs } = images;
+        // Never from the messages of another chain: the result must not depend on whether this run matched it.
+        let follows = self.before.take().filter(|(chain, _)| *chain == job.chain).map(|(_, history)| history);
+        let start = if follows.is_some() { Start::Warm } else { Start::Cold };
+        let answer = pair.and_then(|pair| self.run.match_one(&mut self.matcher, job, pair, start, read_ms));
+        let history = if answer.is_ok() { Some(history(follows.as_deref(), &inputs)) } else { follows.clone() };
+        self.before = history.map(|history| (job.chain, history));
+        match answer.as_ref().err().map(|error| (error.cause(), error)) {
+            Some((Cause::Stopped, _)) => return Err(Error::Stopped),
+            // The other frames of the video have the same plan.
+            Some((Cause::Unsupported, error)) if self.run.options.warm_start.is_some() => return Err(error.clone()),
+            Some((Cause::DeviceLost, _)) => self.matcher = self.run.matcher()?,
+            _ => {}
+        }
+        Ok(Matched { job, origin: PairOrigin { inputs, follows }, answer })
+    }
 }
 
 fn milliseconds_since(start: Instant) -> f64 {
@@ -205,27 +270,27 @@ struct Writer<'a> {
     run: &'a Run<'a>,
     pairs: u64,
     last: Instant,
+    written: u64,
     failed: Vec<Failed>,
 }
 
 impl Writer<'_> {
-    fn write_all(mut self, from: Receiver<Matched<'_>>) -> Vec<Failed> {
-        for (index, Matched { job, origin, answer }) in from.into_iter().enumerate() {
-            if let Err(error) = self.finish(job, &origin, answer) {
-                job.remove_stale(&origin.inputs);
-                self.failed.push(Failed::told(&job.pair, &error, self.run.watch));
-            }
-            let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
-            self.run.watch.tell(Event::Task(&format!("{} pairs{failed}", index + 1)));
-            // Only the matching thread stops. Answers that it has handed over are still written.
-            let _ = self.run.watch.progress(index as u64 + 1, self.pairs);
+    /// Writes the files of a pair, or reports its failure.
+    fn write(&mut self, Matched { job, origin, answer }: Matched<'_>) {
+        if let Err(error) = self.finish(job, &origin, answer) {
+            job.remove_stale(&origin.inputs);
+            self.failed.push(Failed::told(&job.pair, &error, self.run.watch));
         }
-        self.failed
+        self.written += 1;
+        let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
+        self.run.watch.tell(Event::Task(&format!("{} pairs{failed}", self.written)));
+        // Only the matching thread stops. Answers that it has handed over are still written.
+        let _ = self.run.watch.progress(self.written, self.pairs);
     }
 
     /// Writes the outputs of an answer, then its record.
     fn finish(&mut self, job: &Job, origin: &PairOrigin, answer: Result<Answer, Error>) -> Result<(), Error> {
-        let done = self.write(job, answer?)?;
+        let done = self.outputs(job, answer?)?;
         job.remove_others();
         self.record(job, origin, done)
     }
@@ -246,7 +311,7 @@ impl Writer<'_> {
         record.write(&self.run.making.files, &job.record)
     }
 
-    fn write(&self, job: &Job, Answer { done, disparity, pair }: Answer) -> Result<Done, Error> {
+    fn outputs(&self, job: &Job, Answer { done, disparity, pair }: Answer) -> Result<Done, Error> {
         let start = Instant::now();
         let content = Content {
             map: &disparity.map,
@@ -256,8 +321,41 @@ impl Writer<'_> {
             inputs: &job.inputs(),
         };
         job.outputs.write(self.run.making, &content, self.run.watch)?;
-        let state = |path| FileState::of(path).map_err(|error| bp_io::Error::writing(path, &error));
-        let outputs = job.paths.iter().map(|path| state(path)).collect::<Result<_, _>>()?;
+        let outputs = job.paths.iter().map(|path| FileState::of(path)).collect::<Result<_, _>>()?;
         Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::{fs, process::Command, time::Duration};
+
+    use bp_io::hex;
+    use sha2::{Digest, Sha256};
+
+    use super::*;
+
+    /// A pipe gives other bytes to everybody who opens it.
+    #[test]
+    fn what_is_hashed_is_what_is_decoded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let image = |value: u8| [&b"P5 2 1 255\n"[..], &[value; 2]].concat();
+        for name in ["left.pgm", "right.pgm"] {
+            assert!(Command::new("mkfifo").arg(path(name)).status().unwrap().success());
+            let pipe = path(name);
+            thread::spawn(move || {
+                for value in 1..4 {
+                    fs::write(&pipe, image(value)).unwrap();
+                    // Otherwise the next image would follow the first one to the same reader.
+                    thread::sleep(Duration::from_millis(300));
+                }
+            });
+        }
+        let pair = Pair { name: "name".into(), left: path("left.pgm"), right: path("right.pgm") };
+        let Images { pair, states } = Images::read(&pair, Room::new(1, None));
+        assert_eq!(pair.unwrap().left().pixels(), [[1; 3]; 2]);
+        let expected = hex(&Sha256::digest(image(1)));
+        assert!(states.len() == 2 && states.iter().all(|state| state.sha256 == expected));
     }
 }

@@ -29,6 +29,8 @@ pub struct Summary {
     pub skipped: usize,
     /// Pairs that failed in this run.
     pub failures: Vec<Failed>,
+    /// Folders that could not be searched for pairs, and why.
+    pub unread: Vec<String>,
     /// The distinct settings of the pairs, in order of first appearance, without the rows of single pairs.
     pub settings: Vec<description::Settings>,
     /// The distinct tilings of the pairs that were not matched as a whole.
@@ -87,6 +89,7 @@ impl Summary {
             done: done.len(),
             skipped,
             failures,
+            unread: Vec::new(),
             settings: distinct(done.iter().map(|done| description::Settings { rows: None, ..done.settings.clone() })),
             tiles: distinct(done.iter().filter_map(|done| done.tiles.clone())),
             devices: distinct(done.iter().map(|done| done.device.clone())),

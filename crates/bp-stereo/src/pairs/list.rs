@@ -8,6 +8,9 @@ use crate::Error;
 /// The format of a line, for messages.
 const LINE: &str = "a line holds left, right and, where wanted, a name, with tabs between them if a path has spaces";
 
+/// Most pairs of a list, so that a long file does not fill the memory.
+const MOST_PAIRS: usize = 1_000_000;
+
 /// Parses a list of pairs. Messages call it `source`. Empty lines, lines that start with # and the heading
 /// "left,right,name" are skipped.
 ///
@@ -24,6 +27,9 @@ pub fn parse(bytes: &[u8], source: &str) -> Result<Vec<Pair>, Error> {
         }
         let fields = fields(line).map_err(|error| at_line(&error.to_string()))?;
         if !(index == 0 && is_heading(&fields)) {
+            if pairs.len() == MOST_PAIRS {
+                return Err(at_line(&format!("more than {MOST_PAIRS} pairs; split the list")));
+            }
             pairs.push(pair(&fields).map_err(|what| at_line(&what))?);
         }
     }

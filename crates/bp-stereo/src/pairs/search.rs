@@ -1,14 +1,16 @@
 //! Finds the pairs below a folder with a known layout.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::{BTreeMap, BTreeSet, HashSet},
     ffi::OsStr,
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
-use walkdir::WalkDir;
+use walkdir::{DirEntry, WalkDir};
 
 use super::{Found, Pair, natural};
+use crate::{Error, Watch};
 
 /// The names of the two images of a folder, the most reliable first: a folder of nine views has im0 and im1 too, but
 /// its pair is im2 and im6.
@@ -32,10 +34,13 @@ fn named<'a>(images: &'a Images, name: &str) -> Option<&'a String> {
     images.get(name).or_else(|| images.iter().find(|image| image.eq_ignore_ascii_case(name)))
 }
 
+/// The most files and folders that are looked at. A link may lead to a whole system.
+const MOST_ENTRIES: usize = 1_000_000;
+
 /// The pairs below `root`, but not in `output`, in the natural order of their names.
-pub(super) fn search(root: &Path, output: &Path) -> Found {
+pub(super) fn search(root: &Path, output: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
     let mut found = Found::default();
-    let folders = images(root, output, &mut found.notes);
+    let folders = images(root, output, &mut found, watch)?;
     for (folder, images) in &folders {
         in_one_folder(folder, images, &mut found);
         in_two_folders(folder, &folders, &mut found);
@@ -44,36 +49,66 @@ pub(super) fn search(root: &Path, output: &Path) -> Found {
     found.pairs.sort_by(|a, b| natural::compare(&text(a), &text(b)));
     let below = |pair: &mut Pair| (pair.left, pair.right) = (root.join(&pair.left), root.join(&pair.right));
     found.pairs.iter_mut().for_each(below);
-    found
+    Ok(found)
 }
 
-/// All images below a folder. Entries that cannot be read become notes.
-fn images(root: &Path, output: &Path, notes: &mut Vec<String>) -> Folders {
+/// All images below a folder. Links are followed, but every folder is searched once only.
+fn images(root: &Path, output: &Path, found: &mut Found, watch: &Watch<'_>) -> Result<Folders, Error> {
     let output = output.canonicalize().ok();
     let is_output = |path: &Path| output.is_some() && path.canonicalize().ok() == output;
-    let mut folders = Folders::new();
     let entries = WalkDir::new(root).min_depth(1).follow_links(true).sort_by_file_name().into_iter();
-    for entry in entries.filter_entry(|entry| !(entry.file_type().is_dir() && is_output(entry.path()))) {
-        let entry = match entry {
-            Ok(entry) => entry,
-            Err(error) => {
-                notes.push(format!("passed over: {error}"));
-                continue;
+    let mut entries = entries.filter_entry(|entry| !(entry.file_type().is_dir() && is_output(entry.path())));
+    let (mut folders, mut searched) = (Folders::new(), HashSet::new());
+    for _ in 0..=MOST_ENTRIES {
+        watch.check()?;
+        match entries.next() {
+            None => return Ok(folders),
+            Some(Err(error)) if is_unread(&error) => found.unread.push(format!("not searched: {error}")),
+            Some(Err(error)) => found.notes.push(format!("passed over: {error}")),
+            Some(Ok(entry)) if entry.file_type().is_dir() => {
+                if !searched.insert(place(&entry)) {
+                    entries.skip_current_dir();
+                    let what = "was searched under another name";
+                    found.notes.push(format!("passed over: {} {what}", entry.path().display()));
+                }
             }
-        };
-        let below = entry.path().strip_prefix(root).unwrap_or(entry.path());
-        if !entry.file_type().is_file() || !below.extension().is_some_and(is_ending) {
-            continue;
+            Some(Ok(entry)) => add_image(root, &entry, &mut folders, &mut found.notes),
         }
-        let (Some(folder), Some(name), Some(_)) =
-            (below.parent(), below.file_name().and_then(OsStr::to_str), below.to_str())
-        else {
-            notes.push(format!("passed over: {} is no name in UTF-8, as records hold it", entry.path().display()));
-            continue;
-        };
-        folders.entry(folder.to_owned()).or_default().insert(name.to_owned());
     }
-    folders
+    let what = format!("more than {MOST_ENTRIES} files and folders; name a smaller folder, or give a list of pairs");
+    Err(Error::Input(format!("{}: {what}", root.display())))
+}
+
+/// Adds a file to those of its folder, if it is an image.
+fn add_image(root: &Path, entry: &DirEntry, folders: &mut Folders, notes: &mut Vec<String>) {
+    let below = entry.path().strip_prefix(root).unwrap_or(entry.path());
+    if !entry.file_type().is_file() || !below.extension().is_some_and(is_ending) {
+        return;
+    }
+    match (below.parent(), below.file_name().and_then(OsStr::to_str), below.to_str()) {
+        (Some(folder), Some(name), Some(_)) => {
+            folders.entry(folder.to_owned()).or_default().insert(name.to_owned());
+        }
+        _ => notes.push(format!("passed over: {} is no name in UTF-8, as records hold it", entry.path().display())),
+    }
+}
+
+/// Whether something may hold pairs but cannot be read. A link to nothing holds none, and one to a folder above it the same.
+fn is_unread(error: &walkdir::Error) -> bool {
+    error.io_error().is_some_and(|error| error.kind() != ErrorKind::NotFound)
+}
+
+/// What two paths of one folder have in common: its place on the disk.
+#[cfg(unix)]
+fn place(entry: &DirEntry) -> PathBuf {
+    use std::os::unix::fs::MetadataExt;
+    let named = |about: std::fs::Metadata| format!("{}:{}", about.dev(), about.ino()).into();
+    entry.metadata().map_or_else(|_| entry.path().to_owned(), named)
+}
+
+#[cfg(not(unix))]
+fn place(entry: &DirEntry) -> PathBuf {
+    entry.path().canonicalize().unwrap_or_else(|_| entry.path().to_owned())
 }
 
 fn is_ending(ending: &OsStr) -> bool {

@@ -1,7 +1,8 @@
 //! Baseline files: JSON with a version, written whole.
 
-use std::{fs, io::ErrorKind, path::Path};
+use std::path::Path;
 
+use bp_io::read_text;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
@@ -27,11 +28,10 @@ struct Version {
 
 /// Reads a file; `None` if it does not exist.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Failure> {
-    let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(|error| Failure::reading(path, &error))?,
-    };
-    parse(path, &text).map(Some)
+    if !path.exists() {
+        return Ok(None);
+    }
+    parse(path, &read_text(path)?).map(Some)
 }
 
 /// Parses the text of a baseline file.

@@ -128,7 +128,7 @@ fn planned_cells(scene: &Scene, devices: &[Asked], run: &record::Run) -> Result<
 fn settings(planned: &Planned, plan: &Plan, device: &dyn Device) -> Result<Settings, Error> {
     let settings = Settings::new(plan, Some(device), planned.algorithm);
     let Some(parting) = planned.parting() else { return Ok(settings) };
-    Ok(Settings { planned_bytes: PartDriver::planned_bytes(device, plan, parting)?, ..settings })
+    Ok(Settings { planned_bytes: Some(PartDriver::planned_bytes(device, plan, parting)?), ..settings })
 }
 
 /// A cell that takes turns. Each turn prepares the plan again, and each sample is saved at once.
@@ -212,7 +212,7 @@ impl InCell<'_> {
         let storage = self.storage.borrow();
         let cells = &storage.record().cells;
         let cell = &cells[self.index];
-        let unarranged = |cell: &Cell| Settings { planned_bytes: 0, ..cell.settings.clone() };
+        let unarranged = |cell: &Cell| Settings { planned_bytes: None, ..cell.settings.clone() };
         let same = |other: &&Cell| other.scene == cell.scene && unarranged(other) == unarranged(cell);
         let differs = |other: &&Cell| other.measured().is_some_and(|measured| measured.labels_sha256 != labels_sha256);
         let Some(other) = cells.iter().filter(same).find(differs) else { return Ok(()) };

@@ -47,6 +47,14 @@ impl Windows {
         })
     }
 
+    /// The bytes that they take for rows of this width.
+    pub(super) fn bytes(width: usize) -> u64 {
+        let of = |len: usize, bytes: usize| len as u64 * bytes as u64;
+        let (columns, steps) = (TRIED * (width + 2 * REACH), STEPS * width);
+        let (greys, first, sums) = (of(2 * width, 1), of(width, 4), of(2 * columns, 4));
+        greys + first + sums + of(steps + SIDE * columns, 2) + of(TRIED * width, 4)
+    }
+
     fn columns(&self) -> usize {
         TRIED * (self.width + 2 * REACH)
     }

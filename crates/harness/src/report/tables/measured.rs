@@ -69,7 +69,7 @@ pub(super) fn memory(results: &Results<'_>, number: &str, plans: &[Named]) -> Ta
         let allocated = row.measured(plan.plan).map(|measured| measured.allocated_bytes);
         vec![
             NOT_PRINTED.to_owned(),
-            or(row.cell(plan.plan).map(|cell| mib(cell.settings.planned_bytes)), ""),
+            or(row.cell(plan.plan).and_then(|cell| cell.settings.planned_bytes).map(mib), ""),
             or(allocated.map(mib), row.missing(plan.plan)),
         ]
     })

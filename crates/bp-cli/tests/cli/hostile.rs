@@ -1,0 +1,195 @@
+//! Inputs without end, pipes that nobody writes to, disks that are full, names that terminals obey.
+#![cfg(unix)]
+
+use std::{
+    fs,
+    os::unix::fs::{MetadataExt, PermissionsExt, chown, symlink},
+    path::Path,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    folder::{Folder, MATCH, text},
+    many::{TINY, names, place},
+};
+
+fn pipe(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+/// Sends a signal, such as `-INT`, to a program after it had some time to begin, and returns its exit code, soon.
+fn code_after(signal: &str, mut child: Child) -> Option<i32> {
+    thread::sleep(Duration::from_millis(700));
+    assert!(child.try_wait().unwrap().is_none(), "it waits");
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(20) {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    panic!("still running");
+}
+
+#[test]
+fn texts_without_end_are_refused() {
+    let folder = Folder::new();
+    folder.fails("match --pairs /dev/zero --output out", 3, &["/dev/zero", "more than 64 MiB"]);
+    folder.fails("convert left.png --depth d.pfm --calib /dev/zero", 3, &["/dev/zero", "more than 1 MiB"]);
+    folder.fails("report /dev/zero", 3, &["/dev/zero"]);
+    let zero = || Stdio::from(fs::File::open("/dev/zero").unwrap());
+    folder.command_fails(folder.command("match --pairs - --output out").stdin(zero()), 3, &["standard input"]);
+}
+
+#[test]
+fn a_sidecar_that_is_a_pipe_or_endless_is_not_read() {
+    let folder = Folder::new();
+    assert!(folder.run(&format!("{MATCH} m.pfm --no-sidecar")).status.success());
+    pipe(&folder.path("m.pfm.json"));
+    assert!(folder.run("convert m.pfm --picture p.png").status.success());
+    fs::remove_file(folder.path("m.pfm.json")).unwrap();
+    symlink("/dev/zero", folder.path("m.pfm.json")).unwrap();
+    assert!(folder.run("convert m.pfm --picture p.png").status.success());
+}
+
+#[test]
+fn a_record_that_is_a_pipe_stops_no_other_pair() {
+    let folder = Folder::new();
+    fs::write(folder.path("list"), "left.png right.png a\nleft.png right.png b\n").unwrap();
+    fs::create_dir_all(folder.path("out/records")).unwrap();
+    pipe(&folder.path("out/records/a.json"));
+    let output = folder.run(&format!("match --pairs list --output out {TINY}"));
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
+    assert_eq!(names(&folder.path("out")), ["b"]);
+}
+
+#[test]
+fn one_signal_ends_a_batch_that_waits_for_a_pipe() {
+    let folder = Folder::new();
+    pipe(&folder.path("pipe.png"));
+    fs::write(folder.path("list"), "pipe.png right.png a\n").unwrap();
+    for (pairs, signal) in [("list", "-TERM"), ("pipe.png", "-INT")] {
+        let mut command = folder.command(&format!("match --pairs {pairs} --output out {TINY}"));
+        assert_eq!(code_after(signal, command.stderr(Stdio::null()).spawn().unwrap()), Some(130), "{pairs}");
+    }
+    // What reads before it writes anything is ended by the system.
+    let waiting = folder.command("convert pipe.png --picture p.png").stderr(Stdio::null()).spawn().unwrap();
+    assert_eq!(code_after("-TERM", waiting), None);
+}
+
+#[test]
+fn one_signal_ends_the_conformance_suite() {
+    let folder = Folder::new();
+    let mut command = folder.command("conform --backend rayon");
+    let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    assert_eq!(code_after("-INT", child), Some(130));
+}
+
+/// The system refuses to write more than 512 bytes to a file, which is as good as a full disk.
+#[test]
+fn a_full_disk_changes_neither_the_map_nor_its_sidecar() {
+    let folder = Folder::new();
+    assert!(folder.run(&format!("{MATCH} m.pfm --picture p.png")).status.success());
+    let kept = ["m.pfm", "m.pfm.json", "p.png", "p.png.json"];
+    let before = kept.map(|name| fs::read(folder.path(name)).unwrap());
+    let limited = format!("ulimit -f 1; exec {} {MATCH} m.pfm --picture p.png --labels 9", env!("CARGO_BIN_EXE_bp"));
+    let limited = limited.replacen("--labels 12 ", "", 1);
+    let mut command = Command::new("sh");
+    command.args(["-c", &limited]).current_dir(folder.path(""));
+    folder.command_fails(&mut command, 1, &["cannot write", "m.pfm"]);
+    assert_eq!(kept.map(|name| fs::read(folder.path(name)).unwrap()), before);
+}
+
+#[test]
+fn a_replaced_output_keeps_its_permissions_and_owner() {
+    let folder = Folder::new();
+    let run = || assert!(folder.run(&format!("{MATCH} m.pfm")).status.success());
+    run();
+    let path = folder.path("m.pfm");
+    let about = |path: &Path| {
+        let about = path.metadata().unwrap();
+        (about.mode() & 0o7777, about.uid(), about.gid())
+    };
+    let (mode, owner, group) = about(&path);
+    assert_eq!(mode & 0o600, 0o600, "a new file can be read and written");
+    // Only the administrator may give files away.
+    let (owner, group) =
+        if chown(&path, Some(12_345), Some(12_346)).is_ok() { (12_345, 12_346) } else { (owner, group) };
+    for mode in [0o640, 0o604, 0o400] {
+        fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+        run();
+        assert_eq!(about(&path), (mode, owner, group));
+    }
+}
+
+#[test]
+fn names_that_terminals_obey_are_printed_as_escapes() {
+    let folder = Folder::new();
+    let name = "\u{1b}]0;title\u{7}.png";
+    fs::copy(folder.path("left.png"), folder.path(name)).unwrap();
+    fs::write(folder.path("list"), format!("left.png\tmissing{name}\ta\nleft.png\tright.png\tb{name}\n")).unwrap();
+    let output = folder.run(&format!("match --pairs list --output out {TINY}"));
+    let mut single = folder.command(&format!("match left.png right.png --labels 12 -o m{name}"));
+    for output in [output, single.output().unwrap()] {
+        let told = text(&output.stderr) + &text(&output.stdout);
+        assert!(!told.contains('\u{1b}') && !told.contains('\u{7}'), "{told:?}");
+        assert!(told.contains("\\u{1b}]0;title"), "{told:?}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_is_bounded_in_the_environment_too() {
+    let folder = Folder::new();
+    let run =
+        |threads: &str| folder.command(&format!("{MATCH} m.pfm")).env("RAYON_NUM_THREADS", threads).output().unwrap();
+    assert_eq!(run("100000").status.code(), Some(2));
+    assert!(text(&run("100000").stderr).contains("RAYON_NUM_THREADS=100000: at most 1024"));
+    assert!(run("3").status.success() && run("many").status.success());
+}
+
+#[test]
+fn sidecars_are_the_same_on_any_number_of_threads() {
+    let folder = Folder::new();
+    let sidecar = |threads: u32| {
+        assert!(folder.run(&format!("{MATCH} m.pfm --threads {threads}")).status.success());
+        fs::read_to_string(folder.path("m.pfm.json")).unwrap()
+    };
+    assert_eq!(sidecar(1), sidecar(3));
+}
+
+/// One link leads up, one to a folder that is searched anyway, one to itself.
+#[test]
+fn links_in_a_searched_folder_lead_to_every_folder_once() {
+    let folder = Folder::new();
+    place(&folder, &["in/a/view1.png", "in/a/view5.png"]);
+    symlink(folder.path("in"), folder.path("in/a/up")).unwrap();
+    symlink(folder.path("in/a"), folder.path("in/b")).unwrap();
+    let run = || folder.run(&format!("match --pairs in --output out {TINY}"));
+    let output = run();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("in/b was searched under another name"), "{}", text(&output.stderr));
+    assert_eq!(names(&folder.path("out")), ["a/view1"]);
+    symlink("itself", folder.path("in/itself")).unwrap();
+    let output = run();
+    assert_eq!(output.status.code(), Some(3), "what cannot be searched may hold pairs: {}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("1 folders could not be read"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_folder_that_may_not_be_read_is_named_and_the_others_are_matched() {
+    let folder = Folder::new();
+    place(&folder, &["in/a/view1.png", "in/a/view5.png", "in/secret/view1.png", "in/secret/view5.png"]);
+    let secret = folder.path("in/secret");
+    fs::set_permissions(&secret, fs::Permissions::from_mode(0o000)).unwrap();
+    // The administrator reads it all the same.
+    let is_closed = fs::read_dir(&secret).is_err();
+    let output = folder.run(&format!("match --pairs in --output out {TINY}"));
+    fs::set_permissions(&secret, fs::Permissions::from_mode(0o700)).unwrap();
+    assert_eq!(output.status.code(), Some(if is_closed { 3 } else { 0 }), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr).contains("in/secret"), is_closed, "{}", text(&output.stderr));
+    assert!(names(&folder.path("out")).contains(&"a/view1".to_owned()));
+}

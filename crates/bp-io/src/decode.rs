@@ -1,0 +1,130 @@
+//! Decodes images in memory, after their headers were compared with the limits.
+
+use std::{fmt::Display, io::Cursor, path::Path};
+
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader,
+    codecs::{pnm::PnmDecoder, tiff::TiffDecoder},
+};
+
+use crate::{Error, Limits, caught::caught, png};
+
+/// Calls a decoder. Some panic on broken files: the crate `png` 0.18.1 does if a palette ends within a colour.
+pub(crate) fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let broken = |words| Err(Error::reading(path, &format!("{ENDS_EARLY} (the decoder: {words})")));
+    caught(decode).unwrap_or_else(broken)
+}
+
+/// Decodes a file in one of [`FORMATS`].
+pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<DynamicImage, Error> {
+    let failed = |error: &dyn Display| Error::reading(path, error);
+    match image::guess_format(bytes).ok().filter(|format| FORMATS.contains(format)) {
+        Some(ImageFormat::Png) => png::decode(path, bytes, limit),
+        Some(ImageFormat::Jpeg) if !has_jpeg_end(bytes) => Err(failed(&ENDS_EARLY)),
+        Some(format) => decode_as(format, path, bytes, limit),
+        None => Err(failed(&"not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM)")),
+    }
+}
+
+fn decode_as(format: ImageFormat, path: &Path, bytes: &[u8], limit: Limits) -> Result<DynamicImage, Error> {
+    let undecoded = |error| undecoded(path, format, error);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(image::Limits::no_limits());
+    let mut decoder = reader.into_decoder().map_err(undecoded)?;
+    let (width, height) = decoder.dimensions();
+    limit.check_size(path, width.into(), height.into())?;
+    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
+        return Err(Error::reading(path, &OTHER_TIFF));
+    }
+    let (pixels, total, file) = (u64::from(width) * u64::from(height), decoder.total_bytes(), bytes.len() as u64);
+    // What the decoder holds beside the image: a strip or tile and lists of strips, coefficients and a copy of the file.
+    let meanwhile = match format {
+        ImageFormat::Tiff => total + TILE + LISTED * file.min(2 << 20),
+        ImageFormat::Jpeg => 8 * pixels + file,
+        _ => 0,
+    };
+    let color = decoder.color_type();
+    let value_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
+    check_memory(path, limit, file, &Decoded { pixels, total, value_bytes }, meanwhile)?;
+    let mut decoding = image::Limits::no_limits();
+    decoding.max_alloc = Some(2 * total + TILE);
+    decoder.set_limits(decoding).map_err(undecoded)?;
+    DynamicImage::from_decoder(decoder).map_err(undecoded)
+}
+
+/// A decoded image: its pixels, its bytes, and those of one value.
+pub(crate) struct Decoded {
+    pub(crate) pixels: u64,
+    pub(crate) total: u64,
+    pub(crate) value_bytes: u64,
+}
+
+/// Refuses an image whose file, decoding and conversion to 8-bit colours exceed the memory. The decoder holds `meanwhile`
+/// bytes besides the image.
+pub(crate) fn check_memory(
+    path: &Path,
+    limit: Limits,
+    file: u64,
+    image: &Decoded,
+    meanwhile: u64,
+) -> Result<(), Error> {
+    let &Decoded { pixels, total, value_bytes } = image;
+    // First a copy in colours of as many bits, then their 8-bit values.
+    let colours = 3 * pixels * value_bytes;
+    let conversion = colours + total.max(3 * pixels);
+    limit.check_memory(path, file.saturating_add(conversion.max(total.saturating_add(meanwhile))))
+}
+
+/// Refuses files whose stored values cannot be recovered: JPEG is lossy, and decoders stretch values of other bit
+/// depths to 8 or 16 bits.
+pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let failed = |error: &dyn Display| Error::reading(path, error);
+    let is_stretched = match image::guess_format(bytes) {
+        Ok(ImageFormat::Pnm) => {
+            let decoder = PnmDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
+            !matches!(decoder.header().maximal_sample(), 255 | 65535)
+        }
+        Ok(ImageFormat::Png) => png::is_stretched(path, bytes)?,
+        Ok(ImageFormat::Tiff) => {
+            let decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
+            decoder.original_color_type() == ExtendedColorType::L1
+        }
+        Ok(ImageFormat::Jpeg) => return Err(failed(&"a JPEG keeps about what was stored, and a map needs all of it")),
+        _ => false,
+    };
+    if is_stretched {
+        Err(failed(&"a map needs 8 or 16 bits a value, used in full (maximum 255 or 65535)"))
+    } else {
+        Ok(())
+    }
+}
+
+/// The formats of images, besides PFM.
+const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
+
+/// Bytes for a strip or tile of a TIFF that is larger than its image.
+const TILE: u64 = 4 << 20;
+
+/// Bytes that a TIFF's lists of offsets and lengths take in memory for each of theirs in the file; the decoder reads 1 MiB of each.
+const LISTED: u64 = 20;
+
+pub(crate) const ENDS_EARLY: &str = "the file ends too early or is broken";
+
+const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; save others so, or floats as PFM";
+
+/// Why a file could not be decoded.
+fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Error {
+    match error {
+        ImageError::Limits(_) => Error::reading(path, &"its strips or tiles are larger than the image; save it anew"),
+        ImageError::IoError(error) => Error::reading(path, &format!("{ENDS_EARLY} ({error})")),
+        ImageError::Unsupported(_) if format == ImageFormat::Tiff => Error::reading(path, &OTHER_TIFF),
+        error => Error::reading(path, &error),
+    }
+}
+
+/// Whether the end marker comes after the last start of scan. The decoder would invent the pixels that a cut file
+/// lacks.
+fn has_jpeg_end(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    last([0xff, 0xd9]) > last([0xff, 0xda])
+}

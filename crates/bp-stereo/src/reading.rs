@@ -1,0 +1,100 @@
+//! Reads the images of pairs, within the memory that is free or allowed.
+
+use std::path::Path;
+
+use bp_core::{DeviceKind, Image, StereoPair};
+use bp_io::{Limits, read_image};
+
+use crate::{Error, Memory, memory::PROGRAM};
+
+/// Bytes per pixel of an image in memory.
+const IMAGE: u64 = 3;
+
+/// Bytes that may be read in any case: the threads and outputs that [`PROGRAM`] counts are not there yet. So small images
+/// are refused when their plan is known, with advice that suits it.
+const SMALL: u64 = 4 << 20;
+
+/// The limits for a file that a program reads besides `taken` bytes in memory: those of its pixels, and the memory that is free
+/// or, if `max_memory` is given, allowed.
+#[must_use]
+pub fn reading_limits(max_megapixels: u32, max_memory: Option<u64>, taken: u64) -> Limits {
+    Room::new(max_megapixels, max_memory).without(taken).limits
+}
+
+/// Reads the two images of a pair. The program stays within `max_memory` bytes, if they are given.
+///
+/// # Errors
+/// [`Error::File`], [`Error::OutOfMemory`], [`Error::Core`] if the sizes differ.
+pub fn read_pair(images: [&Path; 2], max_megapixels: u32, max_memory: Option<u64>) -> Result<StereoPair, Error> {
+    Room::new(max_megapixels, max_memory).pair(images, |room, path| room.explained(read_image(path, room.limits)))
+}
+
+/// How many pixels and bytes an image may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Room {
+    pub(crate) limits: Limits,
+    /// The limit that the caller can raise, if there is one and it is lower than the free memory.
+    allowed: Option<u64>,
+}
+
+impl Room {
+    pub(crate) fn new(max_megapixels: u32, max_memory: Option<u64>) -> Self {
+        let free = Memory::available_to(DeviceKind::Processor);
+        let left = |allowed: u64| allowed.saturating_sub(PROGRAM).max(SMALL);
+        let allowed = max_memory.filter(|&allowed| free.is_none_or(|free| left(allowed) <= free));
+        Self { limits: Limits::megapixels(max_megapixels).within(allowed.map(left).or(free)), allowed }
+    }
+
+    /// What is left of it besides `taken` bytes.
+    pub(crate) fn without(self, taken: u64) -> Self {
+        Self { limits: self.limits.without(taken), ..self }
+    }
+
+    /// A pair of images, each from one call of `read`.
+    pub(crate) fn pair(
+        self,
+        images: [&Path; 2],
+        mut read: impl FnMut(Self, &Path) -> Result<Image, Error>,
+    ) -> Result<StereoPair, Error> {
+        let [left, right] = images;
+        let one = read(self, left)?;
+        let other = read(self.without(IMAGE * one.size().pixels() as u64), right)?;
+        let named = |error| Error::from(error).of(format!("{} and {}", left.display(), right.display()));
+        StereoPair::new(one, other).map_err(named)
+    }
+
+    /// The outcome of reading a file, with advice if the limit can be raised.
+    pub(crate) fn explained<T>(self, read: Result<T, bp_io::Error>) -> Result<T, Error> {
+        read.map_err(|error| match (error, self.allowed, self.limits.memory) {
+            (bp_io::Error::OutOfMemory { path, needed, .. }, Some(available), Some(left)) => {
+                let needed = needed.saturating_add(available.saturating_sub(left).max(PROGRAM));
+                let (reason, advice) = ("allowed by `max_memory`", "raise it, or use smaller images".to_owned());
+                Error::OutOfMemory { needed, available, reason, advice }.of(format!("reading {}", path.display()))
+            }
+            (error, ..) => error.into(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::Cause;
+
+    #[test]
+    fn images_beyond_the_allowed_memory_are_refused_with_the_least_that_would_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image.pgm");
+        fs::write(&path, [&b"P5 1000 1000 255\n"[..], &[7; 1_000_000]].concat()).unwrap();
+        let read = |max_memory| read_pair([&path, &path], 1, max_memory);
+        assert!(read(None).is_ok());
+        let refused = read(Some(PROGRAM)).unwrap_err();
+        let Error::Of { source, .. } = refused else { panic!("{refused}") };
+        assert_eq!(source.cause(), Cause::Memory);
+        let Error::OutOfMemory { needed, .. } = *source else { panic!("{source}") };
+        // The second image comes on top.
+        assert!(read(Some(needed)).is_err() && read(Some(needed + IMAGE * 1_000_000)).is_ok());
+    }
+}
