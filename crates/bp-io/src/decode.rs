@@ -7,7 +7,12 @@ use image::{
     codecs::{pnm::PnmDecoder, tiff::TiffDecoder},
 };
 
-use crate::{Error, Limits, caught::caught, png};
+use crate::{
+    Error, Limits,
+    caught::caught,
+    headers::{check_pam, jpeg_metadata, tiff_lists},
+    png,
+};
 
 /// Calls a decoder. Some panic on broken files: the crate `png` 0.18.1 does if a palette ends within a colour.
 pub(crate) fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
@@ -27,7 +32,14 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
 }
 
 fn decode_as(format: ImageFormat, path: &Path, bytes: &[u8], limit: Limits) -> Result<DynamicImage, Error> {
-    let undecoded = |error| undecoded(path, format, error);
+    let (undecoded, file) = (|error| undecoded(path, format, error), bytes.len() as u64);
+    // What the decoder holds before it tells the size: lists of strips; or a copy of the file, and of its metadata two.
+    let before = match format {
+        ImageFormat::Tiff => tiff_lists(path, bytes)?,
+        ImageFormat::Jpeg => file + 2 * jpeg_metadata(path, bytes)?,
+        _ => check_pam(path, bytes).map(|()| 0)?,
+    };
+    limit.check_memory(path, file + before)?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(image::Limits::no_limits());
     let mut decoder = reader.into_decoder().map_err(undecoded)?;
@@ -36,13 +48,15 @@ fn decode_as(format: ImageFormat, path: &Path, bytes: &[u8], limit: Limits) -> R
     if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
         return Err(Error::reading(path, &OTHER_TIFF));
     }
-    let (pixels, total, file) = (u64::from(width) * u64::from(height), decoder.total_bytes(), bytes.len() as u64);
-    // What the decoder holds beside the image: a strip or tile and lists of strips, coefficients and a copy of the file.
-    let meanwhile = match format {
-        ImageFormat::Tiff => total + TILE + LISTED * file.min(2 << 20),
-        ImageFormat::Jpeg => 8 * pixels + file,
-        _ => 0,
-    };
+    let (pixels, total) = (u64::from(width) * u64::from(height), decoder.total_bytes());
+    // What the decoder holds beside the image: a strip or tile, and the image in four colours; or coefficients of whole blocks.
+    let blocks = u64::from(width.next_multiple_of(16)) * u64::from(height.next_multiple_of(16));
+    let meanwhile = before
+        + match format {
+            ImageFormat::Tiff => 2 * total + TILE,
+            ImageFormat::Jpeg => 8 * blocks,
+            _ => 0,
+        };
     let color = decoder.color_type();
     let value_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
     check_memory(path, limit, file, &Decoded { pixels, total, value_bytes }, meanwhile)?;
@@ -86,6 +100,7 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         }
         Ok(ImageFormat::Png) => png::is_stretched(path, bytes)?,
         Ok(ImageFormat::Tiff) => {
+            tiff_lists(path, bytes)?;
             let decoder = TiffDecoder::new(Cursor::new(bytes)).map_err(|e| failed(&e))?;
             decoder.original_color_type() == ExtendedColorType::L1
         }
@@ -102,11 +117,8 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
 
-/// Bytes for a strip or tile of a TIFF that is larger than its image.
-const TILE: u64 = 4 << 20;
-
-/// Bytes that a TIFF's lists of offsets and lengths take in memory for each of theirs in the file; the decoder reads 1 MiB of each.
-const LISTED: u64 = 20;
+/// Bytes by which a strip or tile of a TIFF may be larger than its image.
+pub(crate) const TILE: u64 = 4 << 20;
 
 pub(crate) const ENDS_EARLY: &str = "the file ends too early or is broken";
 

@@ -24,6 +24,7 @@ mod colours;
 mod decode;
 mod error;
 mod format;
+mod headers;
 mod images;
 mod limits;
 mod maps;

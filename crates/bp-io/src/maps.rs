@@ -22,7 +22,7 @@ use crate::{
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
 pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<DisparityMap, Error> {
-    if let Some(quantity) = told_quantity(path).filter(|told| told != Quantity::Disparity.name()) {
+    if let Some(quantity) = told_quantity(path)?.filter(|told| told != Quantity::Disparity.name()) {
         let sidecar = sidecar_of(path);
         let what = format!("it holds {quantity}, as {} tells, and disparities are needed", sidecar.display());
         return Err(Error::reading(path, &what));

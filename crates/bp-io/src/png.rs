@@ -22,6 +22,8 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
     let mut decoder = decoder(bytes);
     let (width, height) = decoder.read_header_info().map_err(undecoded)?.size();
     limit.check_size(path, width.into(), height.into())?;
+    // One row for the transformation, of at most 8 bytes a pixel, comes on top.
+    decoder.set_limits(Reserve { bytes: METADATA as usize + 8 * width as usize });
     let reader = decoder.read_info().map_err(undecoded)?;
     let file = bytes.len() as u64;
     let image = Decoded {
@@ -30,7 +32,7 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
         value_bytes: if reader.output_color_type().1 == BitDepth::Sixteen { 2 } else { 1 },
     };
     let row = image.total.div_ceil(u64::from(height.max(1)));
-    let meanwhile = ROWS.saturating_mul(row).saturating_add(file.min(METADATA));
+    let meanwhile = ROWS.saturating_mul(row).saturating_add(2 * file.min(METADATA));
     check_memory(path, limit, file, &image, meanwhile)?;
     image_of(reader, [width, height], image.total).map_err(undecoded)?.ok_or_else(|| Error::reading(path, &ENDS_EARLY))
 }

@@ -1,7 +1,7 @@
 //! Sidecars: JSON files beside maps, with the information that the map's format cannot hold.
 
 use std::{
-    fs,
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
@@ -9,9 +9,7 @@ use bp_core::Calibration;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{
-    Colours, Contents, Error, Files, MapFormat, Raster, Staged, read::MOST_DESCRIPTION, write::sync_folder_of,
-};
+use crate::{Colours, Contents, Error, Files, MapFormat, Raster, Staged, read::MOST_DESCRIPTION, write::Hidden};
 
 /// Version of the sidecar's format. Every change of meaning raises it.
 const SCHEMA_VERSION: u32 = 1;
@@ -27,34 +25,36 @@ pub fn sidecar_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// The quantity that a map's sidecar names; `None` if there is no sidecar of this program.
-pub(crate) fn told_quantity(path: &Path) -> Option<String> {
-    let bytes = Contents::of_regular(&sidecar_of(path), MOST_DESCRIPTION).ok()?.bytes;
-    let sidecar: Value = serde_json::from_slice(&bytes).ok()?;
-    let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
-    Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
+/// The quantity that a map's sidecar names; `None` if there is no sidecar of this program. Fails if one cannot be read.
+pub(crate) fn told_quantity(path: &Path) -> Result<Option<String>, Error> {
+    let path = sidecar_of(path);
+    match path.metadata() {
+        Ok(about) if about.is_file() && about.len() <= MOST_DESCRIPTION => {}
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::reading(&path, &error)),
+        _ => return Ok(None),
+    }
+    let bytes = Contents::of(&path, MOST_DESCRIPTION)?.bytes;
+    let told = || -> Option<String> {
+        let sidecar: Value = serde_json::from_slice(&bytes).ok()?;
+        let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
+        Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
+    };
+    Ok(told())
 }
 
 /// Puts a map or picture at its place, `path`, and its sidecar, if it gets one. At every moment the map is whole, the old one or
-/// the new one, and a sidecar, if there is one, is that of the map. If something fails before the map is replaced, for
-/// example because the disk is full, both stay as they were.
+/// the new one, and a sidecar, if there is one, is that of the map. If the map cannot be put there, both stay as they were.
 ///
 /// # Errors
 /// [`Error::Write`].
-pub fn put_described(path: &Path, map: Staged, sidecar: Option<Staged>) -> Result<(), Error> {
-    remove_sidecar(path)?;
-    map.put()?;
-    sidecar.map_or(Ok(()), Staged::put)
-}
-
-/// Removes the sidecar of a map, but not another program's file of that name.
-fn remove_sidecar(path: &Path) -> Result<(), Error> {
-    if told_quantity(path).is_none() {
-        return Ok(());
+pub fn put_described(files: &Files, path: &Path, map: Staged, sidecar: Option<Staged>) -> Result<(), Error> {
+    // Not another program's file of that name. Where the sidecar is a link, the link stays.
+    let old = told_quantity(path)?.map(|_| files.hide(&sidecar_of(path))).transpose()?;
+    if let Err(error) = map.put() {
+        old.into_iter().for_each(Hidden::restore);
+        return Err(error);
     }
-    let sidecar = sidecar_of(path);
-    fs::remove_file(&sidecar).map_err(|error| Error::writing(&sidecar, &error))?;
-    sync_folder_of(&sidecar)
+    sidecar.map_or(Ok(()), Staged::put)
 }
 
 /// The origin of a map.

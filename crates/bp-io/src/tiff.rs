@@ -12,7 +12,7 @@ use tiff::{
     encoder::{TiffEncoder, colortype::Gray32Float},
 };
 
-use crate::{Error, Limits};
+use crate::{Error, Limits, headers::tiff_lists};
 
 /// Encodes values `[height][width]` as 32-bit floats.
 pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
@@ -29,6 +29,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
         }
         error => Error::reading(path, &error),
     };
+    let lists = tiff_lists(path, bytes)?;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(failed)?;
     let ColorType::Gray(bits @ (32 | 64)) = decoder.colortype().map_err(failed)? else { return Ok(None) };
     let (width, height) = decoder.dimensions().map_err(failed)?;
@@ -36,7 +37,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
     let size = Size::new(width as usize, height as usize).map_err(|error| Error::reading(path, &error))?;
     // The values, and as many bytes of a strip or of the floats that doubles are converted to.
     let needed = 2 * u64::from(bits / 8) * size.pixels() as u64;
-    limit.check_memory(path, needed.saturating_add(bytes.len() as u64))?;
+    limit.check_memory(path, needed.saturating_add(lists + bytes.len() as u64))?;
     let mut limits = tiff::decoder::Limits::default();
     limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;

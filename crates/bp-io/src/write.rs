@@ -8,7 +8,7 @@ use std::{
 };
 
 use serde::Serialize;
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 use crate::Error;
 
@@ -99,10 +99,14 @@ impl Files {
             stream(path, write)?;
             return Ok(Staged { file: None, path: path.to_owned() });
         }
-        // A symbolic link stays, and its target is replaced; but not one that came since the check above.
-        let path =
-            if self.owned.is_some() { None } else { path.canonicalize().ok() }.unwrap_or_else(|| path.to_owned());
+        let path = self.target(path);
         Ok(Staged { file: Some(self.filled_beside(&path, write)?), path })
+    }
+
+    /// Where a file is replaced: a symbolic link stays, but below [`Files::owning`] none is followed that came since the check.
+    fn target(&self, path: &Path) -> PathBuf {
+        let is_own = self.owned.as_ref().is_some_and(|folder| path.starts_with(folder));
+        if is_own { path.to_owned() } else { path.canonicalize().unwrap_or_else(|_| path.to_owned()) }
     }
 
     /// Writes a text.
@@ -158,6 +162,16 @@ impl Files {
         self.temporary_beside(path).map(drop)
     }
 
+    /// Takes a file out of sight.
+    pub(crate) fn hide(&self, path: &Path) -> Result<Hidden, Error> {
+        self.check_own(path)?;
+        let path = self.target(path);
+        let temporary = self.temporary_beside(&path)?.into_temp_path();
+        fs::rename(&path, &temporary).map_err(|error| Error::writing(&path, &error))?;
+        sync_folder_of(&path)?;
+        Ok(Hidden { temporary, path })
+    }
+
     /// A temporary file in the folder of `path`, filled and synced to disk. It is deleted unless it is persisted.
     fn filled_beside<E: Display>(
         &self,
@@ -184,7 +198,7 @@ impl Files {
         let mut builder = tempfile::Builder::new();
         // Temporary files are private by default. A new output follows the user's umask instead.
         #[cfg(unix)]
-        builder.permissions(replaced::permissions(path));
+        builder.permissions(replaced::at_first(path));
         // The full message of the error would name the temporary file.
         let failed = |error: std::io::Error| Error::writing(path, &error.kind());
         builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
@@ -209,6 +223,20 @@ impl Staged {
         let Some(file) = self.file else { return Ok(()) };
         file.persist(&self.path).map_err(|failed| Error::writing(&self.path, &failed.error))?;
         sync_folder_of(&self.path)
+    }
+}
+
+/// A file under a temporary name, which is removed when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Hidden {
+    temporary: TempPath,
+    path: PathBuf,
+}
+
+impl Hidden {
+    /// Puts the file back, if that is possible.
+    pub(crate) fn restore(self) {
+        drop(fs::rename(&self.temporary, &self.path));
     }
 }
 
@@ -244,20 +272,24 @@ mod replaced {
         path.symlink_metadata().ok().filter(Metadata::is_file)
     }
 
-    /// Those of the file at `path`, or else those that the user's umask restricts. Never more than the file had, not even
-    /// while the new one is written.
-    pub(super) fn permissions(path: &Path) -> Permissions {
-        Permissions::from_mode(about(path).map_or(0o666, |old| old.mode() & 0o777))
+    /// The permissions while a file is written: those of its owner alone if it replaces another, which may be secret.
+    pub(super) fn at_first(path: &Path) -> Permissions {
+        Permissions::from_mode(about(path).map_or(0o666, |old| old.mode() & 0o700))
     }
 
-    /// Gives `file` the permissions of the file at `path` and, if the system allows it, its owner.
+    /// Gives `file` the permissions of the file at `path` and, if the system allows it, its owner and group. Without the group,
+    /// the new one may do no more than everybody.
     pub(super) fn inherit(file: &File, path: &Path) -> io::Result<()> {
-        let (Some(old), new) = (about(path), file.metadata()?) else { return Ok(()) };
-        if (old.uid(), old.gid()) != (new.uid(), new.gid()) {
+        let Some(old) = about(path) else { return Ok(()) };
+        let owners = |about: &Metadata| (about.uid(), about.gid());
+        if owners(&file.metadata()?) != owners(&old) {
             // Only the administrator may give files away, but members of a group may leave them to it.
             let _ = fchown(file, Some(old.uid()), Some(old.gid())).or_else(|_| fchown(file, None, Some(old.gid())));
         }
-        file.set_permissions(permissions(path))
+        let now = file.metadata()?;
+        let mode = old.mode() & 0o777;
+        let mode = if now.gid() == old.gid() { mode } else { mode & (0o707 | (mode & 0o007) << 3) };
+        if now.mode() & 0o777 == mode { Ok(()) } else { file.set_permissions(Permissions::from_mode(mode)) }
     }
 }
 

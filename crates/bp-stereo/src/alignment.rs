@@ -14,13 +14,14 @@ const PAIRS: usize = 10;
 /// [`Align::Off`] if there is none among the first ten pairs; `watch` then receives a warning about the file.
 ///
 /// # Errors
-/// Only the file's: pairs with an error are passed over.
+/// [`Error::File`] for the file, and [`Error::Stopped`]. Pairs with an error are passed over.
 pub fn align_camera(
     pairs: impl Iterator<Item = Result<StereoPair, Error>>,
     file: Option<(&Files, &Path)>,
     watch: &Watch<'_>,
 ) -> Result<Align, Error> {
     let found = pairs.take(PAIRS).flatten().find_map(|pair| Alignment::find(&pair, &Survey::of(&pair).ok()?));
+    watch.check()?;
     match (found, file) {
         (Some(alignment), Some((files, path))) => files.json(path, &alignment)?,
         (None, Some((_, path))) => {

@@ -111,11 +111,22 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     job::clear_leftovers(options, &jobs, &making.files)?;
     let options = &with_alignment(options, &found.pairs, &making.files, watch)?;
     let settings_sha256 = record::settings_sha256(options, making)?;
-    let is_complete = |chain: &&[Job]| !options.force && job::are_complete(chain, &settings_sha256);
-    let chains = jobs.chunk_by(|a, b| a.chain == b.chain);
-    let due: Vec<&Job> = chains.filter(|chain| !is_complete(chain)).flatten().collect();
+    let mut due = Vec::new();
+    for chain in jobs.chunk_by(|a, b| a.chain == b.chain) {
+        watch.check()?;
+        if options.force || !job::are_complete(chain, &settings_sha256) {
+            due.extend(chain);
+        }
+    }
     let (due, mut failures) = writable(due, making, watch)?;
-    let run = Run { options, making, settings_sha256: &settings_sha256, watch, warned: Warned::default() };
+    let run = Run {
+        options,
+        making,
+        listed: found.pairs.len(),
+        settings_sha256: &settings_sha256,
+        watch,
+        warned: Warned::default(),
+    };
     failures.extend(match_due(&run, &due)?);
     let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
     let summary = Summary { unread: found.unread, ..summary };
@@ -128,6 +139,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
 fn writable<'a>(due: Vec<&'a Job>, making: &Making, watch: &Watch<'_>) -> Result<(Vec<&'a Job>, Vec<Failed>), Error> {
     let (mut writable, mut failures) = (Vec::new(), Vec::new());
     for job in due {
+        watch.check()?;
         match job.check(making) {
             Ok(()) => writable.push(job),
             Err(error) if error.cause() != Cause::Options => failures.push(Failed::told(&job.pair, &error, watch)),
@@ -149,7 +161,11 @@ fn with_alignment(
         return Ok(options.clone());
     }
     let file = options.alignment.as_deref().map(|path| (files, path));
-    let read = |pair: &Pair| read_pair([&pair.left, &pair.right], options.max_megapixels, options.matching.max_memory);
+    let (pixels, memory) = (options.max_megapixels, options.matching.max_memory);
+    let read = |pair: &Pair| {
+        let pair = pair.clone();
+        watch.unless_stopped(move || read_pair([&pair.left, &pair.right], pixels, memory))?
+    };
     let align = align_camera(pairs.iter().map(read), file, watch)?;
     if let Align::Known(known) = align
         && !known.is_negligible()

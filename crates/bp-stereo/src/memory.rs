@@ -7,6 +7,9 @@ use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory, 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
 pub(crate) const PROGRAM: u64 = 22 << 20;
 
+/// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
+pub(crate) const LISTED: u64 = 3 << 10;
+
 /// Bytes per pixel of both images.
 const PAIR: u64 = 6;
 
@@ -55,6 +58,8 @@ pub struct Beside {
     pub depth: bool,
     /// Whether the next pair is read and the previous one written at the same time.
     pub batch: bool,
+    /// How many pairs a batch lists.
+    pub pairs: usize,
     /// The option that needs all messages at once, if any. The image then cannot be tiled.
     pub whole: Option<&'static str>,
 }
@@ -138,7 +143,7 @@ impl Bytes {
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + a_pixel(PAIR + aligned + truth),
+            held: PROGRAM + LISTED * beside.pairs as u64 + a_pixel(PAIR + aligned + truth),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }

@@ -184,7 +184,7 @@ impl Writer<'_> {
         let has_sidecar = self.making.has_sidecar(path);
         let sidecar =
             has_sidecar.then(|| staged_sidecar(files, path, raster, &self.origin(calibration))).transpose()?;
-        Ok(put_described(path, map, sidecar)?)
+        Ok(put_described(files, path, map, sidecar)?)
     }
 
     fn picture(&self, path: &Path) -> Result<(), Error> {
@@ -193,7 +193,7 @@ impl Writer<'_> {
         let raster = Raster::disparities(self.content.map);
         let described = || staged_picture_sidecar(files, path, &raster, picture.colours, &self.origin(None));
         let sidecar = self.making.has_sidecar(path).then(described).transpose()?;
-        Ok(put_described(path, staged, sidecar)?)
+        Ok(put_described(files, path, staged, sidecar)?)
     }
 
     fn depth(&self, path: &Path, calibration: &Calibration) -> Result<(), Error> {

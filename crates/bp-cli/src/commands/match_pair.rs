@@ -77,7 +77,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
         options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
     }
     let whole = args.messages_hash.then_some("messages_hash");
-    let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, whole };
+    let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, pairs: 0, whole };
     let mut matcher = Matcher::new(&options)?.beside(beside);
     let job = Job { args, files, pair, truth, outputs, making };
     let report = job.run(&mut matcher)?;

@@ -19,10 +19,26 @@ fn pipe(path: &Path) {
     assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
 }
 
-/// Sends a signal, such as `-INT`, to a program after it had some time to begin, and returns its exit code, soon.
-fn code_after(signal: &str, mut child: Child) -> Option<i32> {
-    thread::sleep(Duration::from_millis(700));
+/// Waits until a program handles signals, or for a second if it never does.
+fn wait_for_handler(child: &mut Child) {
+    let status = format!("/proc/{}/status", child.id());
+    let start = Instant::now();
+    let handles = || {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap_or("0").trim();
+        // SIGINT is signal 2.
+        u64::from_str_radix(caught, 16).is_ok_and(|caught| caught & 2 != 0)
+    };
+    while start.elapsed() < Duration::from_secs(1) && !handles() {
+        thread::sleep(Duration::from_millis(20));
+    }
+    thread::sleep(Duration::from_millis(300));
     assert!(child.try_wait().unwrap().is_none(), "it waits");
+}
+
+/// Sends a signal, such as `-INT`, to a program that waits, and returns its exit code, soon.
+fn code_after(signal: &str, mut child: Child) -> Option<i32> {
+    wait_for_handler(&mut child);
     assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(20) {
@@ -89,19 +105,30 @@ fn one_signal_ends_the_conformance_suite() {
     assert_eq!(code_after("-INT", child), Some(130));
 }
 
-/// The system refuses to write more than 512 bytes to a file, which is as good as a full disk.
+/// The system refuses to write more than so many bytes to a file, which is as good as a full disk: first none fits, then the map
+/// without its sidecar, then both.
 #[test]
 fn a_full_disk_changes_neither_the_map_nor_its_sidecar() {
     let folder = Folder::new();
-    assert!(folder.run(&format!("{MATCH} m.pfm --picture p.png")).status.success());
-    let kept = ["m.pfm", "m.pfm.json", "p.png", "p.png.json"];
-    let before = kept.map(|name| fs::read(folder.path(name)).unwrap());
-    let limited = format!("ulimit -f 1; exec {} {MATCH} m.pfm --picture p.png --labels 9", env!("CARGO_BIN_EXE_bp"));
-    let limited = limited.replacen("--labels 12 ", "", 1);
-    let mut command = Command::new("sh");
-    command.args(["-c", &limited]).current_dir(folder.path(""));
-    folder.command_fails(&mut command, 1, &["cannot write", "m.pfm"]);
-    assert_eq!(kept.map(|name| fs::read(folder.path(name)).unwrap()), before);
+    assert!(folder.run(&format!("{MATCH} m.png")).status.success());
+    let kept = ["m.png", "m.png.json"];
+    let contents = || kept.map(|name| fs::read(folder.path(name)).unwrap());
+    let before = contents();
+    assert!(before[0].len() < before[1].len(), "the map fits before its sidecar does");
+    for blocks in 0.. {
+        let run = format!(
+            "ulimit -f {blocks}; exec {} match left.png right.png -o m.png --labels 5",
+            env!("CARGO_BIN_EXE_bp")
+        );
+        let mut command = Command::new("sh");
+        command.args(["-c", &run]).current_dir(folder.path(""));
+        if command.output().unwrap().status.success() {
+            assert!(blocks > 1 && contents()[0] != before[0], "{blocks} blocks");
+            return;
+        }
+        folder.command_fails(&mut command, 1, &["cannot write", "m.png"]);
+        assert!(contents() == before, "{blocks} blocks");
+    }
 }
 
 #[test]
@@ -163,7 +190,7 @@ fn sidecars_are_the_same_on_any_number_of_threads() {
 
 /// One link leads up, one to a folder that is searched anyway, one to itself.
 #[test]
-fn links_in_a_searched_folder_lead_to_every_folder_once() {
+fn links_in_a_searched_folder_are_followed_and_those_that_lead_nowhere_are_told() {
     let folder = Folder::new();
     place(&folder, &["in/a/view1.png", "in/a/view5.png"]);
     symlink(folder.path("in"), folder.path("in/a/up")).unwrap();
@@ -171,12 +198,48 @@ fn links_in_a_searched_folder_lead_to_every_folder_once() {
     let run = || folder.run(&format!("match --pairs in --output out {TINY}"));
     let output = run();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("in/b was searched under another name"), "{}", text(&output.stderr));
-    assert_eq!(names(&folder.path("out")), ["a/view1"]);
+    assert_eq!(names(&folder.path("out")), ["a/view1", "b/view1"]);
     symlink("itself", folder.path("in/itself")).unwrap();
     let output = run();
     assert_eq!(output.status.code(), Some(3), "what cannot be searched may hold pairs: {}", text(&output.stderr));
     assert!(text(&output.stderr).contains("1 folders could not be read"), "{}", text(&output.stderr));
+}
+
+/// A device without end, a pipe with something else than an image, and a file that is too long to be one.
+#[test]
+fn images_that_are_none_stop_no_other_pair() {
+    let folder = Folder::new();
+    pipe(&folder.path("pipe.png"));
+    fs::File::create(folder.path("long.png")).unwrap().set_len(1 << 38).unwrap();
+    let bad = ["/dev/zero right.png a", "left.png pipe.png b", "long.png right.png c", "left.png right.png d"];
+    fs::write(folder.path("list"), bad.join("\n")).unwrap();
+    let writer = folder.path("pipe.png");
+    thread::spawn(move || fs::write(writer, "no image"));
+    for options in ["", "--max-memory 100MB"] {
+        if !options.is_empty() {
+            fs::write(folder.path("list"), [bad[0], bad[2], bad[3]].join("\n")).unwrap();
+        }
+        let output = folder.run(&format!("match --pairs list --output out --force {TINY} {options}"));
+        assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
+        assert_eq!(names(&folder.path("out")), ["d"]);
+    }
+}
+
+/// The link stays, and so does what it leads to if the map cannot be replaced.
+#[test]
+fn a_sidecar_that_is_a_link_stays_one() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("store")).unwrap();
+    let run =
+        |labels: u32| folder.run(&format!("match left.png right.png --labels {labels} -o m.pfm")).status.success();
+    assert!(run(12));
+    fs::rename(folder.path("m.pfm.json"), folder.path("store/m.json")).unwrap();
+    symlink(folder.path("store/m.json"), folder.path("m.pfm.json")).unwrap();
+    let before = fs::read(folder.path("store/m.json")).unwrap();
+    assert!(run(9));
+    assert!(folder.path("m.pfm.json").is_symlink());
+    let after = fs::read(folder.path("m.pfm.json")).unwrap();
+    assert!(after != before && fs::read(folder.path("store/m.json")).unwrap() == after);
 }
 
 #[test]

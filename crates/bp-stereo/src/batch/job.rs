@@ -88,10 +88,13 @@ impl Job {
 
     /// Removes files that an earlier run wrote and this run did not. Beside the new map they would seem to belong to
     /// it.
-    pub(super) fn remove_others(&self) {
-        let Some(earlier) = PairRecord::read(&self.record) else { return };
+    pub(super) fn remove_others(&self) -> Result<(), Error> {
+        let Some(earlier) = PairRecord::known(&self.record)? else { return Ok(()) };
         let written: HashSet<OsString> = self.paths.iter().map(|path| key(path)).collect();
-        self.earlier_outputs(&earlier).filter(|path| !written.contains(&key(path))).for_each(remove);
+        Ok(self
+            .earlier_outputs(&earlier)
+            .filter(|path| !written.contains(&key(path)))
+            .try_for_each(|path| remove(&path))?)
     }
 
     /// Removes the outputs of an earlier run from other images, after these images failed. Otherwise those outputs
@@ -99,7 +102,8 @@ impl Job {
     pub(super) fn remove_stale(&self, images: &[FileState]) {
         let Some(earlier) = PairRecord::read(&self.record) else { return };
         if !images.is_empty() && !earlier.is_of_contents(images) {
-            self.earlier_outputs(&earlier).chain([self.record.clone()]).for_each(remove);
+            // If one cannot be removed, the next write to it reports why.
+            self.earlier_outputs(&earlier).chain([self.record.clone()]).for_each(|path| drop(remove(&path)));
         }
     }
 
@@ -128,9 +132,12 @@ impl Job {
     }
 }
 
-/// Ignores errors: a missing file needs no removal, and if a file cannot be removed, the next write to it reports why.
-fn remove(path: PathBuf) {
-    drop(fs::remove_file(path));
+/// Removes a file, if it is there.
+fn remove(path: &Path) -> Result<(), bp_io::Error> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(bp_io::Error::writing(path, &error)),
+        _ => Ok(()),
+    }
 }
 
 /// Whether all pairs of a chain, given in order, are complete.

@@ -98,9 +98,17 @@ pub(super) fn history(follows: Option<&str>, images: &[FileState]) -> String {
 }
 
 impl PairRecord {
-    /// Reads a record. Returns `None` if it is missing or broken.
+    /// Reads a record. Returns `None` if it is missing or broken, or cannot be read.
     pub(super) fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&Contents::of_regular(path, MOST_DESCRIPTION).ok()?.bytes).ok()
+        Self::known(path).ok()?
+    }
+
+    /// Reads a record. Returns `None` if it is missing or broken.
+    pub(super) fn known(path: &Path) -> Result<Option<Self>, bp_io::Error> {
+        if !path.exists() {
+            return Ok(None);
+        }
+        Ok(serde_json::from_slice(&Contents::of_regular(path, MOST_DESCRIPTION)?.bytes).ok())
     }
 
     /// Writes the record, whole or not at all.

@@ -3,6 +3,7 @@
 
 use std::{
     collections::BTreeMap,
+    path::Path,
     sync::{
         Mutex, PoisonError,
         mpsc::{Receiver, SyncSender, sync_channel},
@@ -22,7 +23,7 @@ use super::{
 };
 use crate::{
     Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Start, Stopped, Warning, Watch, description,
-    pairs::Pair, reading::Room,
+    memory::LISTED, pairs::Pair, reading::Room,
 };
 
 /// A pair in memory.
@@ -57,6 +58,9 @@ struct Answer {
     pair: StereoPair,
 }
 
+/// Files of images that failed are compared with those of an earlier run up to this length.
+const MOST_BYTES: u64 = 1 << 30;
+
 impl Images {
     /// Reads the files once: what is hashed is what is decoded, even if somebody replaces a file meanwhile.
     fn read(pair: &Pair, room: Room) -> Self {
@@ -68,7 +72,11 @@ impl Images {
             room.explained(parse_image(path, &contents.bytes, room.limits))
         });
         if states.len() < paths.len() {
-            states = paths.into_iter().map(FileState::of).collect::<Result<_, _>>().unwrap_or_default();
+            // The pair failed. Its files are only read again if that ends.
+            let is_image =
+                |path: &&Path| path.metadata().is_ok_and(|about| about.is_file() && about.len() <= MOST_BYTES);
+            let known = paths.iter().all(is_image).then(|| paths.into_iter().map(FileState::of).collect());
+            states = known.and_then(Result::ok).unwrap_or_default();
         }
         Self { pair, states }
     }
@@ -78,6 +86,8 @@ impl Images {
 pub(super) struct Run<'a> {
     pub(super) options: &'a BatchOptions,
     pub(super) making: &'a Making,
+    /// The number of all pairs.
+    pub(super) listed: usize,
     pub(super) settings_sha256: &'a str,
     pub(super) watch: &'a Watch<'a>,
     pub(super) warned: Warned,
@@ -120,10 +130,12 @@ impl Run<'_> {
         for job in jobs {
             self.watch.check()?;
             let room = Room::new(self.options.max_megapixels, self.options.matching.max_memory);
+            let room = room.without(LISTED * self.listed as u64);
             let beside = self.read(job, room.without(solver.matcher.allocated_bytes()))?;
             let is_short = beside.images.pair.as_ref().is_err_and(|error| error.cause() == Cause::Memory);
-            // A warm start needs what the matcher holds.
-            let is_freed = is_short && self.options.warm_start.is_none() && solver.matcher.free();
+            // A warm start needs what the matcher holds, and a pipe is empty now.
+            let again = self.options.warm_start.is_none() && job.images().into_iter().all(Path::is_file);
+            let is_freed = is_short && again && solver.matcher.free();
             writer.write(solver.solve(if is_freed { self.read(job, room)? } else { beside })?);
         }
         Ok(writer.failed)
@@ -178,7 +190,13 @@ impl Run<'_> {
         let depth = self.options.also.contains(&super::Also::Depth);
         let whole = self.options.warm_start.map(|_| "warm_start");
         let batch = self.options.matching.max_memory.is_none();
-        Ok(Matcher::new(&self.options.matching)?.beside(Beside { truth: false, depth, batch, whole }))
+        Ok(Matcher::new(&self.options.matching)?.beside(Beside {
+            truth: false,
+            depth,
+            batch,
+            pairs: self.listed,
+            whole,
+        }))
     }
 
     fn match_one(
@@ -216,11 +234,12 @@ struct PairSolver<'a> {
     matcher: Matcher,
     /// The chain of the pair before, if it has an answer, and its history.
     before: Option<(usize, String)>,
+    has_answered: bool,
 }
 
 impl<'r> PairSolver<'r> {
     fn new(run: &'r Run<'r>) -> Result<Self, Error> {
-        Ok(Self { run, matcher: run.matcher()?, before: None })
+        Ok(Self { run, matcher: run.matcher()?, before: None, has_answered: false })
     }
 
     /// Matches a pair. What would fail for all pairs ends the batch: a stop, a lost device that cannot be opened again, or a warm
@@ -233,10 +252,13 @@ impl<'r> PairSolver<'r> {
         let answer = pair.and_then(|pair| self.run.match_one(&mut self.matcher, job, pair, start, read_ms));
         let history = if answer.is_ok() { Some(history(follows.as_deref(), &inputs)) } else { follows.clone() };
         self.before = history.map(|history| (job.chain, history));
+        self.has_answered |= answer.is_ok();
         match answer.as_ref().err().map(|error| (error.cause(), error)) {
             Some((Cause::Stopped, _)) => return Err(Error::Stopped),
             // The other frames of the video have the same plan.
-            Some((Cause::Unsupported, error)) if self.run.options.warm_start.is_some() => return Err(error.clone()),
+            Some((Cause::Unsupported, error)) if self.run.options.warm_start.is_some() && !self.has_answered => {
+                return Err(error.clone());
+            }
             Some((Cause::DeviceLost, _)) => self.matcher = self.run.matcher()?,
             _ => {}
         }
@@ -291,7 +313,7 @@ impl Writer<'_> {
     /// Writes the outputs of an answer, then its record.
     fn finish(&mut self, job: &Job, origin: &PairOrigin, answer: Result<Answer, Error>) -> Result<(), Error> {
         let done = self.outputs(job, answer?)?;
-        job.remove_others();
+        job.remove_others()?;
         self.record(job, origin, done)
     }
 

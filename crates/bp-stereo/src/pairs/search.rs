@@ -1,7 +1,7 @@
 //! Finds the pairs below a folder with a known layout.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashSet},
+    collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
     io::ErrorKind,
     path::{Path, PathBuf},
@@ -52,26 +52,19 @@ pub(super) fn search(root: &Path, output: &Path, watch: &Watch<'_>) -> Result<Fo
     Ok(found)
 }
 
-/// All images below a folder. Links are followed, but every folder is searched once only.
+/// All images below a folder. Links are followed, but not to a folder above them.
 fn images(root: &Path, output: &Path, found: &mut Found, watch: &Watch<'_>) -> Result<Folders, Error> {
     let output = output.canonicalize().ok();
     let is_output = |path: &Path| output.is_some() && path.canonicalize().ok() == output;
     let entries = WalkDir::new(root).min_depth(1).follow_links(true).sort_by_file_name().into_iter();
     let mut entries = entries.filter_entry(|entry| !(entry.file_type().is_dir() && is_output(entry.path())));
-    let (mut folders, mut searched) = (Folders::new(), HashSet::new());
+    let mut folders = Folders::new();
     for _ in 0..=MOST_ENTRIES {
         watch.check()?;
         match entries.next() {
             None => return Ok(folders),
             Some(Err(error)) if is_unread(&error) => found.unread.push(format!("not searched: {error}")),
             Some(Err(error)) => found.notes.push(format!("passed over: {error}")),
-            Some(Ok(entry)) if entry.file_type().is_dir() => {
-                if !searched.insert(place(&entry)) {
-                    entries.skip_current_dir();
-                    let what = "was searched under another name";
-                    found.notes.push(format!("passed over: {} {what}", entry.path().display()));
-                }
-            }
             Some(Ok(entry)) => add_image(root, &entry, &mut folders, &mut found.notes),
         }
     }
@@ -96,19 +89,6 @@ fn add_image(root: &Path, entry: &DirEntry, folders: &mut Folders, notes: &mut V
 /// Whether something may hold pairs but cannot be read. A link to nothing holds none, and one to a folder above it the same.
 fn is_unread(error: &walkdir::Error) -> bool {
     error.io_error().is_some_and(|error| error.kind() != ErrorKind::NotFound)
-}
-
-/// What two paths of one folder have in common: its place on the disk.
-#[cfg(unix)]
-fn place(entry: &DirEntry) -> PathBuf {
-    use std::os::unix::fs::MetadataExt;
-    let named = |about: std::fs::Metadata| format!("{}:{}", about.dev(), about.ino()).into();
-    entry.metadata().map_or_else(|_| entry.path().to_owned(), named)
-}
-
-#[cfg(not(unix))]
-fn place(entry: &DirEntry) -> PathBuf {
-    entry.path().canonicalize().unwrap_or_else(|_| entry.path().to_owned())
 }
 
 fn is_ending(ending: &OsStr) -> bool {

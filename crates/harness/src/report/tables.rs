@@ -5,6 +5,7 @@ mod compared;
 pub(super) mod means;
 mod measured;
 pub(super) mod ours;
+pub(super) mod pixels;
 pub(super) mod readings;
 mod setting;
 
@@ -144,6 +145,7 @@ pub(super) fn all(results: &Results<'_>) -> Vec<Table> {
     tables.extend(ours::energies(results));
     tables.push(claims::table(results));
     tables.extend(readings::table(results));
+    tables.push(pixels::table(results));
     tables
 }
 
