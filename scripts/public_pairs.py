@@ -59,7 +59,7 @@ def enter_venv(folder, *more):
         if not python.exists():
             subprocess.run([sys.executable, "-m", "venv", folder], check=True)
         os.execv(python, [python, *sys.argv])
-    packages = {"cv2": "opencv-python-headless", "numpy": "numpy"} | {name: name for name in more}
+    packages = {"cv2": "opencv-python-headless", "numpy": "numpy"} | {name: {"PIL": "pillow"}.get(name, name) for name in more}
     missing = [package for module, package in packages.items() if not importlib.util.find_spec(module)]
     if missing:
         subprocess.run([python, "-m", "pip", "install", "--quiet", *missing], check=True)

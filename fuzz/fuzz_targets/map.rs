@@ -1,5 +1,5 @@
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    harness::fuzzing::map(bytes);
+    bp_fuzz::run(harness::fuzzing::map, bytes);
 });

@@ -1,5 +1,5 @@
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    harness::fuzzing::mask(bytes);
+    bp_fuzz::run(harness::fuzzing::mask, bytes);
 });

@@ -1,0 +1,20 @@
+//! What all targets share: a limit of memory for every input.
+
+use std::alloc::System;
+
+use cap::Cap;
+
+/// Bytes that any input may take, and those for each of its own. Readers may hold 65,536 pixels (`harness::fuzzing`).
+const FIXED: usize = 32 << 20;
+const A_BYTE: usize = 64;
+
+#[global_allocator]
+static HELD: Cap<System> = Cap::new(System, usize::MAX);
+
+/// Calls a target. An allocation beyond the limit fails, which ends the process unless the code expects it.
+pub fn run(target: harness::fuzzing::Target, bytes: &[u8]) {
+    let most = HELD.allocated() + FIXED + A_BYTE * bytes.len();
+    HELD.set_limit(most).expect("more is allowed than allocated");
+    target(bytes);
+    HELD.set_limit(usize::MAX).expect("everything is allowed");
+}
