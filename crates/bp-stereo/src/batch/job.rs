@@ -91,10 +91,13 @@ impl Job {
     pub(super) fn remove_others(&self) -> Result<(), Error> {
         let Some(earlier) = PairRecord::known(&self.record)? else { return Ok(()) };
         let written: HashSet<OsString> = self.paths.iter().map(|path| key(path)).collect();
-        Ok(self
-            .earlier_outputs(&earlier)
-            .filter(|path| !written.contains(&key(path)))
-            .try_for_each(|path| remove(&path))?)
+        for path in self.earlier_outputs(&earlier) {
+            let path = path?;
+            if !written.contains(&key(&path)) {
+                remove(&path)?;
+            }
+        }
+        Ok(())
     }
 
     /// Removes the outputs of an earlier run from other images, after these images failed. Otherwise those outputs
@@ -103,17 +106,18 @@ impl Job {
         let Some(earlier) = PairRecord::read(&self.record) else { return };
         if !images.is_empty() && !earlier.is_of_contents(images) {
             // If one cannot be removed, the next write to it reports why.
-            self.earlier_outputs(&earlier).chain([self.record.clone()]).for_each(|path| drop(remove(&path)));
+            let outputs = self.earlier_outputs(&earlier).flatten();
+            outputs.chain([self.record.clone()]).for_each(|path| drop(remove(&path)));
         }
     }
 
     /// The outputs that a record lists and that are unchanged, at their current paths. All outputs of a pair are in one
     /// folder, which may have been moved. A changed file of the same name may belong to another pair or to the user.
-    fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = PathBuf> {
+    fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = Result<PathBuf, bp_io::Error>> {
         earlier.done.outputs.iter().filter_map(|state| {
             let name = state.path.file_name().filter(|name| self.is_own(name))?;
             let here = self.paths.first()?.with_file_name(name);
-            state.is_still(&here).then_some(here)
+            state.compare(&here).map(|is_still| is_still.then_some(here)).transpose()
         })
     }
 

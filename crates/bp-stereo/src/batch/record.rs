@@ -157,15 +157,25 @@ impl FileState {
         Ok(Self { path, bytes, modified_ns, changed_ns, sha256 })
     }
 
-    /// Whether `path` has the same contents. Reads the file only if its path or times changed.
+    /// Whether `path` is known to have the same contents.
     pub(super) fn is_still(&self, path: &Path) -> bool {
-        let Ok(metadata) = fs::metadata(path) else { return false };
+        self.compare(path).unwrap_or(false)
+    }
+
+    /// Whether `path` has the same contents. Reads the file only if its path or times changed.
+    pub(super) fn compare(&self, path: &Path) -> Result<bool, bp_io::Error> {
+        let metadata = match fs::metadata(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            metadata => metadata.map_err(|error| bp_io::Error::reading(path, &error))?,
+        };
         let (bytes, modified_ns, changed_ns) = Self::stamp(&metadata);
         let same_file = std::path::absolute(path).is_ok_and(|path| path == self.path);
         let same_times = (modified_ns, changed_ns) == (self.modified_ns, self.changed_ns);
         let untouched = same_file && modified_ns.is_some() && same_times;
-        let same_contents = || Self::of(path).is_ok_and(|now| now.sha256 == self.sha256);
-        metadata.is_file() && bytes == self.bytes && (untouched || same_contents())
+        if !metadata.is_file() || bytes != self.bytes {
+            return Ok(false);
+        }
+        Ok(untouched || Self::of(path)?.sha256 == self.sha256)
     }
 
     /// Length and times of a file.

@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
@@ -81,7 +82,11 @@ impl<'a> Pattern<'a> {
             let name = entry.file_name();
             let Some(frame) = name.to_str().and_then(|name| self.frame(name)) else { continue };
             let path = if self.below.is_empty() { entry.path() } else { entry.path().join(self.below) };
-            if path.is_file() {
+            let is_file = match path.metadata() {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(error)),
+                about => about.is_ok_and(|about| about.is_file()),
+            };
+            if is_file {
                 files.insert(frame.to_owned(), path.strip_prefix("./").unwrap_or(&path).to_owned());
             }
         }
