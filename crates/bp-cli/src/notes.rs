@@ -10,6 +10,8 @@ use std::{
     },
 };
 
+use harness::escape::is_shown;
+
 use crate::bar;
 
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -58,12 +60,10 @@ pub(crate) fn tell(line: &str) {
     bar::beside_bar(|| drop(writeln!(io::stderr(), "{}", printable(line))));
 }
 
-/// A text in which terminals find nothing to obey. Names of files and texts in them may hold control characters, and marks that
-/// reverse the order in which text is read; these become escapes such as `\u{1b}`.
+/// A text in which terminals find nothing to obey. Names of files and texts in them may hold characters that are not only
+/// displayed; except for tabs and line breaks, these become escapes such as `\u{1b}`.
 pub(crate) fn printable(text: &str) -> Cow<'_, str> {
-    let is_obeyed = |c: char| {
-        c.is_control() && !matches!(c, '\n' | '\t') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
+    let is_obeyed = |c: char| !is_shown(c) && !matches!(c, '\n' | '\t');
     if !text.contains(is_obeyed) {
         return Cow::Borrowed(text);
     }

@@ -47,16 +47,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Writes a map as a coloured PNG over its own range. A map without known pixels gets no bar, nor does one so narrow or low
-    /// that most of the picture would be the bar and white.
-    ///
-    /// # Errors
-    /// [`Error::Write`].
-    pub fn write(self, files: &Files, path: &Path, map: &DisparityMap) -> Result<(), Error> {
-        self.staged(files, path, map)?.put()
-    }
-
-    /// [`Picture::write`] up to its last step, see [`Files::staged`].
+    /// Writes a map as a coloured PNG over its own range, see [`Files::staged`]. A map without known pixels gets no bar, nor does
+    /// one so narrow or low that most of the picture would be the bar and white.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -130,7 +122,8 @@ mod tests {
         let path = folder.path().join("picture.png");
         let written = |width: usize, height: usize| {
             let map = DisparityMap::new(Size { width, height }, vec![3.0; width * height]).unwrap();
-            Picture { bar: Some(bar), ..Picture::default() }.write(&Files::default(), &path, &map).unwrap();
+            let picture = Picture { bar: Some(bar), ..Picture::default() };
+            picture.staged(&Files::default(), &path, &map).and_then(Staged::put).unwrap();
             image::image_dimensions(&path).unwrap()
         };
         assert_eq!([written(1, 300_000), written(300_000, 1)], [(1, 300_000), (300_000, 1)]);

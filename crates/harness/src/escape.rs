@@ -7,7 +7,8 @@ pub(crate) fn printable(text: &str) -> String {
 
 /// Whether a character is only displayed: it is not a control character or a line separator, and it does not change the
 /// writing direction.
-fn is_shown(c: char) -> bool {
+#[must_use]
+pub fn is_shown(c: char) -> bool {
     let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     !c.is_control() && !turns && !matches!(c, '\u{2028}' | '\u{2029}')
 }

@@ -7,7 +7,7 @@
 mod backends;
 pub mod bench;
 pub mod compare;
-mod escape;
+pub mod escape;
 pub mod export;
 mod failure;
 mod files;
