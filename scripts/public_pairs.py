@@ -62,7 +62,8 @@ def enter_venv(folder, *more):
     packages = {"cv2": "opencv-python-headless", "numpy": "numpy"} | {name: {"PIL": "pillow"}.get(name, name) for name in more}
     missing = [package for module, package in packages.items() if not importlib.util.find_spec(module)]
     if missing:
-        subprocess.run([python, "-m", "pip", "install", "--quiet", *missing], check=True)
+        versions = ROOT / "scripts" / "python-versions.txt"
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "--constraint", versions, *missing], check=True)
 
 
 def build():

@@ -11,7 +11,7 @@ use std::{
 use serde_json::Value;
 
 /// Every crate, with the crates of the workspace that it may depend on. These come earlier in the list.
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 15] = [
     ("bp-shaders", &[]),
     ("bp-core", &[]),
     ("bp-testkit", &["bp-core"]),
@@ -22,6 +22,8 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("bp-wgpu", &["bp-core", "bp-gpu"]),
     ("bp-io", &["bp-core"]),
     ("bp-stereo", &["bp-core", "bp-cpu-scalar", "bp-cpu-rayon", "bp-vulkan", "bp-wgpu", "bp-io"]),
+    ("bp-python", &["bp-core", "bp-stereo"]),
+    ("bp-capi", &["bp-core", "bp-stereo"]),
     ("bp-charts", &[]),
     ("harness", &["bp-core", "bp-testkit", "bp-cpu-scalar", "bp-cpu-rayon", "bp-io", "bp-stereo", "bp-charts"]),
     ("bp-cli", &["bp-core", "bp-testkit", "bp-gpu", "bp-io", "bp-stereo", "bp-charts", "harness"]),

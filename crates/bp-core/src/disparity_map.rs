@@ -75,6 +75,12 @@ impl DisparityMap {
         &self.values
     }
 
+    /// All values, `[height][width]`, without a copy.
+    #[must_use]
+    pub fn into_values(self) -> Vec<f32> {
+        self.values
+    }
+
     /// The disparity at column `x`, row `y`; `None` if it is unknown.
     ///
     /// # Panics

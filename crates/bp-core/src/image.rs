@@ -171,6 +171,32 @@ pub fn narrow(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
 }
 
+/// A value that no image of floats has.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("an image's values go from 0 to 1 or from 0 to 255, this has {0}")]
+pub struct NotAShade(pub f32);
+
+/// The factor by which [`scaled`] makes 8-bit values of an image's floats: 255 if none is above 1, else 1.
+///
+/// # Errors
+/// The first value below 0, above 255, or not a number.
+pub fn factor_to_8_bits(values: impl IntoIterator<Item = f32>) -> Result<f32, NotAShade> {
+    let mut brightest = 0.0_f32;
+    for value in values {
+        if !(0.0..=255.0).contains(&value) {
+            return Err(NotAShade(value));
+        }
+        brightest = brightest.max(value);
+    }
+    Ok(if brightest <= 1.0 { 255.0 } else { 1.0 })
+}
+
+/// The 8-bit value of a float, see [`factor_to_8_bits`].
+#[must_use]
+pub fn scaled(value: f32, factor: f32) -> u8 {
+    (value * factor).round() as u8
+}
+
 /// A rectified pair: left pixel (x, y) with disparity d and right pixel (x - d, y) show the same point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StereoPair {

@@ -153,3 +153,15 @@ fn borders_of_the_right_image_are_exact() {
         }
     }
 }
+
+/// For Miri, which is too slow for the other tests (scripts/miri).
+#[test]
+fn tiny_pairs_equal_the_reference() {
+    let tiny = (0..).map(random_case).filter(|case| case.plan.message_updates() < 2000).take(12);
+    for (index, case) in tiny.enumerate() {
+        let expected = solve(&Scalar, &case).unwrap();
+        for device in 0..Rayon.devices().len() {
+            assert!(solve_on(device, 1, &case) == expected, "{index} on {device}: {:?}", case.plan);
+        }
+    }
+}

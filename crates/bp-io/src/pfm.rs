@@ -2,7 +2,10 @@
 
 use std::{io::Write, path::Path};
 
-use bp_core::{DisparityMap, Size};
+use bp_core::{
+    DisparityMap, Size,
+    image::{factor_to_8_bits, scaled},
+};
 
 use crate::{Error, Limits};
 
@@ -89,16 +92,12 @@ impl Pfm {
     /// The pixels of an image with values from 0 to 1 or from 0 to 255. If no value is above 1, all are multiplied by
     /// 255.
     pub(crate) fn into_pixels(self, path: &Path) -> Result<Vec<[u8; 3]>, Error> {
-        let failed = |what: String| Error::reading(path, &what);
-        let brightest = self.values.iter().copied().fold(0.0, f32::max);
-        if let Some(value) = self.values.iter().find(|value| !(0.0..=255.0).contains(*value)) {
-            let is_map = if *value == DisparityMap::UNKNOWN { "; is it a disparity map?" } else { "" };
-            return Err(failed(format!("an image's values go from 0 to 1 or from 0 to 255, this has {value}{is_map}")));
-        }
-        let factor = if brightest <= 1.0 { 255.0 } else { 1.0 };
-        let stored = |value: f32| (value * factor).round() as u8;
+        let factor = factor_to_8_bits(self.values.iter().copied()).map_err(|wrong| {
+            let is_map = if wrong.0 == DisparityMap::UNKNOWN { "; is it a disparity map?" } else { "" };
+            Error::reading(path, &format!("{wrong}{is_map}"))
+        })?;
         let grey = self.channels == 1;
-        let pixel = |values: &[f32]| std::array::from_fn(|i| stored(values[if grey { 0 } else { i }]));
+        let pixel = |values: &[f32]| std::array::from_fn(|i| scaled(values[if grey { 0 } else { i }], factor));
         Ok(self.values.chunks_exact(self.channels).map(pixel).collect())
     }
 }

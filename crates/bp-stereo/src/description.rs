@@ -198,6 +198,32 @@ pub struct Energy {
     pub smoothness: u64,
 }
 
+/// An answer, without its map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Wall-clock times.
+    pub times: Seconds,
+    /// The energy of the labels.
+    pub energy: Energy,
+    /// The settings that were run.
+    pub settings: Settings,
+    /// Possible problems with the pair or its labels, as sentences.
+    pub warnings: Vec<String>,
+}
+
+/// The times of an answer, in seconds; see [`crate::AnswerTimes`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seconds {
+    /// Surveying the pair, aligning its rows and making its plan.
+    pub planning: f64,
+    /// Matching the left image, and the right one if needed.
+    pub matching: f64,
+    /// Everything else.
+    pub finishing: f64,
+    /// The sum.
+    pub total: f64,
+}
+
 /// Errors over a set of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -228,6 +254,24 @@ impl Stages {
     pub fn in_order(&self) -> [f64; 5] {
         let Self { match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms } = *self;
         [match_cost_ms, coarsen_ms, refine_ms, update_messages_ms, select_labels_ms]
+    }
+}
+
+impl From<&crate::Disparity> for Answer {
+    fn from(answer: &crate::Disparity) -> Self {
+        let seconds = |time: Duration| time.as_secs_f64();
+        let crate::AnswerTimes { planning, matching, finishing } = answer.times;
+        Self {
+            times: Seconds {
+                planning: seconds(planning),
+                matching: seconds(matching.total),
+                finishing: seconds(finishing),
+                total: seconds(answer.times.total()),
+            },
+            energy: answer.energy.into(),
+            settings: answer.settings.clone(),
+            warnings: answer.warnings.iter().map(ToString::to_string).collect(),
+        }
     }
 }
 

@@ -1,0 +1,91 @@
+"""A plug-in for Pandora, the stereo framework of CNES and the matcher of CARS: the disparity step "bpstereo".
+
+In a pipeline it takes the place of "wta". It matches the images themselves. The cost volume says which disparities each
+pixel may have.
+
+    "disparity": {"disparity_method": "bpstereo", "invalid_disparity": "NaN", "options": {"quality": "best"}}
+
+Leave the refinement step out: these disparities have fractions already.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy
+import xarray
+from pandora.disparity import disparity
+
+from ._bpstereo import Matcher
+
+#: Darker and brighter values than those of this share of all pixels, in percent, become black and white.
+CLIPPED = 0.5
+
+
+@disparity.AbstractDisparity.register_subclass("bpstereo")
+class BeliefPropagation(disparity.AbstractDisparity):
+    """The disparity step "bpstereo"."""
+
+    def __init__(self, **cfg: Any) -> None:
+        full = self.cfg = self.check_conf(**cfg)
+        self._options = full["options"]
+        invalid = numpy.nan if full["invalid_disparity"] == "NaN" else full["invalid_disparity"]
+        self._pandoras_own = disparity.WinnerTakesAll(disparity_method="wta", invalid_disparity=invalid)
+
+    def check_conf(self, **cfg: Any) -> dict[str, Any]:
+        """The configuration with defaults. Fails at keys that do not exist."""
+        full: dict[str, Any] = {"invalid_disparity": -9999, "options": {}} | cfg
+        unknown = set(full) - {"disparity_method", "invalid_disparity", "options"}
+        if unknown:
+            raise ValueError(f"bpstereo: unknown in the configuration: {', '.join(sorted(unknown))}")
+        Matcher(**full["options"])
+        return full
+
+    def desc(self) -> None:
+        """Describes the method."""
+        print("Belief propagation on the images (bpstereo)")
+
+    def to_disp(
+        self, cv: xarray.Dataset, img_left: xarray.Dataset | None = None, img_right: xarray.Dataset | None = None
+    ) -> xarray.Dataset:
+        """The map of the left image. `cv` gets the whole disparities nearest to it, for the steps that follow."""
+        if img_left is None or img_right is None:
+            raise ValueError("bpstereo needs the images, which this version of Pandora does not pass on")
+        steps, allowed = cv.coords["disp"].data, ~numpy.isnan(cv["cost_volume"].data)
+        # Masks, intervals, confidences and invalid pixels are Pandora's.
+        answer = self._pandoras_own.to_disp(cv, img_left, img_right)
+        known = allowed.any(axis=2)
+        found = _within(_matched(img_left, img_right, steps, self._options), steps, allowed)
+        answer["disparity_map"].data[known] = found[known]
+        cv["disp_indices"].data[known] = _nearest(found, steps)[known]
+        return answer
+
+
+def _matched(left: xarray.Dataset, right: xarray.Dataset, steps: numpy.ndarray[Any, Any], options: dict[str, Any]) -> Any:
+    """Our map with Pandora's sign: there, the right column is the left one plus the disparity."""
+    first, last = int(numpy.floor(steps[0])), int(numpy.ceil(steps[-1]))
+    matcher = Matcher(**({"align": "off"} | options | {"labels": last - first + 1, "min_disparity": -last}))
+    return -matcher.compute(*_as_images(left, right))
+
+
+def _within(found: Any, steps: numpy.ndarray[Any, Any], allowed: numpy.ndarray[Any, Any]) -> Any:
+    """The map within the disparities that each pixel may have; unknown pixels get the middle of them."""
+    low, high = steps[allowed.argmax(axis=2)], steps[allowed.shape[2] - 1 - allowed[..., ::-1].argmax(axis=2)]
+    return numpy.clip(numpy.where(numpy.isnan(found), (low + high) / 2, found), low, high)
+
+
+def _nearest(found: Any, steps: numpy.ndarray[Any, Any]) -> Any:
+    """For each disparity the nearest of the steps, which ascend."""
+    above = numpy.searchsorted(steps, found).clip(1, max(1, len(steps) - 1))
+    low, high = steps[above - 1], steps[numpy.minimum(above, len(steps) - 1)]
+    return numpy.where(found - low < high - found, low, high)
+
+
+def _as_images(*datasets: xarray.Dataset) -> list[numpy.ndarray[Any, Any]]:
+    """Values of any range as float32 from 0 to 1, by the same scale for both images; black where there is no data."""
+    images = [numpy.asarray(dataset["im"].data, numpy.float32) for dataset in datasets]
+    # Bands come first: red, green and blue, or of fewer bands the first.
+    images = [image if image.ndim == 2 else numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0] for image in images]
+    low, high = numpy.nanpercentile(numpy.concatenate([image.ravel() for image in images]), [CLIPPED, 100 - CLIPPED])
+    scale = 1 / max(high - low, numpy.finfo(numpy.float32).tiny)
+    return [numpy.nan_to_num(numpy.clip((image - low) * scale, 0, 1)).astype(numpy.float32) for image in images]

@@ -1,0 +1,183 @@
+//! NumPy arrays as images and maps, and maps as arrays.
+
+use bp_core::{
+    DisparityMap, Image, Size, StereoPair,
+    image::{factor_to_8_bits, narrow, scaled},
+};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
+    ndarray::{ArrayViewD, Axis, Ix3},
+};
+use pyo3::{
+    exceptions::{PyMemoryError, PyTypeError, PyValueError},
+    prelude::*,
+};
+
+use crate::errors::raised;
+
+/// A pair of images from arrays `[height][width]`, `[height][width][1]` or `[height][width][3]` (red, green, blue) of uint8,
+/// uint16 or float32 with any strides. Values are read where NumPy keeps them, without another array between. Floats of
+/// both images have one scale.
+pub(crate) fn pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<StereoPair> {
+    let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
+    let factor = match (left.factor()?, right.factor()?) {
+        (Some(one), Some(other)) => one.min(other),
+        (one, other) => one.or(other).unwrap_or(1.0),
+    };
+    StereoPair::new(left.image(factor)?, right.image(factor)?).map_err(raised)
+}
+
+/// One image from such an array. `name` is the argument, for messages.
+pub(crate) fn image(name: &'static str, object: &Bound<'_, PyAny>) -> PyResult<Image> {
+    let pixels = Pixels::of(name, object)?;
+    let factor = pixels.factor()?.unwrap_or(1.0);
+    pixels.image(factor)
+}
+
+/// An array that holds an image.
+struct Pixels<'py> {
+    name: &'static str,
+    size: Size,
+    values: Values<'py>,
+}
+
+enum Values<'py> {
+    Bytes(Bound<'py, PyArrayDyn<u8>>),
+    Words(Bound<'py, PyArrayDyn<u16>>),
+    Floats(Bound<'py, PyArrayDyn<f32>>),
+}
+
+const NEEDED: &str = "an array of uint8, uint16 or float32 is needed";
+
+impl<'py> Pixels<'py> {
+    fn of(name: &'static str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = array(name, object)?;
+        let [height, width] = match *array.shape() {
+            [height, width] | [height, width, 1 | 3] => [height, width],
+            _ => {
+                let what = "an image is [height][width] or [height][width][3]";
+                return Err(PyValueError::new_err(format!("{name} has the shape {:?}; {what}", array.shape())));
+            }
+        };
+        let size = Size::new(width, height).map_err(|error| raised(bp_stereo::Error::from(error).of(name)))?;
+        let values = if let Ok(array) = array.cast() {
+            Values::Bytes(array.clone())
+        } else if let Ok(array) = array.cast() {
+            Values::Words(array.clone())
+        } else if let Ok(array) = array.cast() {
+            Values::Floats(array.clone())
+        } else {
+            return Err(PyTypeError::new_err(format!("{name} holds {}; {NEEDED}", array.dtype())));
+        };
+        Ok(Self { name, size, values })
+    }
+
+    /// The factor that makes 8-bit values of floats. Fails at values that no image has.
+    fn factor(&self) -> PyResult<Option<f32>> {
+        let Values::Floats(array) = &self.values else { return Ok(None) };
+        let array = array.try_readonly()?;
+        let factor = factor_to_8_bits(array.as_array().iter().copied());
+        factor.map(Some).map_err(|wrong| PyValueError::new_err(format!("{}: {wrong}", self.name)))
+    }
+
+    fn image(&self, factor: f32) -> PyResult<Image> {
+        let mut pixels = Vec::new();
+        let no_room = |_| PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size));
+        pixels.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
+        match &self.values {
+            Values::Bytes(array) => colours(array, &mut pixels, |value| value),
+            Values::Words(array) => colours(array, &mut pixels, narrow),
+            Values::Floats(array) => colours(array, &mut pixels, |value| scaled(value, factor)),
+        }?;
+        let image = Image::from_rgb(self.size.width, self.size.height, pixels);
+        image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
+    }
+}
+
+/// The object as an array: itself, or what it turns into, as images of other libraries do. Values that lie at odd
+/// addresses are copied.
+fn array<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    if let Ok(array) = object.cast::<PyUntypedArray>() {
+        let is_aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
+        return if is_aligned { Ok(array.clone()) } else { Ok(array.call_method0("copy")?.cast_into()?) };
+    }
+    if !object.hasattr("__array__")? && !object.hasattr("__array_interface__")? {
+        return Err(PyTypeError::new_err(format!("{name} is of type {}; {NEEDED}", object.get_type().name()?)));
+    }
+    let array = object.py().import("numpy")?.call_method1("require", (object, object.py().None(), "A"))?;
+    Ok(array.cast_into()?)
+}
+
+/// Adds the colours of all pixels, row by row.
+fn colours<T: Element + Copy>(
+    array: &Bound<'_, PyArrayDyn<T>>,
+    pixels: &mut Vec<[u8; 3]>,
+    stored: impl Fn(T) -> u8,
+) -> PyResult<()> {
+    let array = array.try_readonly()?;
+    let view = array.as_array();
+    match (view.as_slice(), view.shape()) {
+        (Some(values), [_, _, 3]) => {
+            pixels.extend(values.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored)))
+        }
+        (Some(values), _) => pixels.extend(values.iter().map(|&value| [stored(value); 3])),
+        (None, _) => strided(view, pixels, stored),
+    }
+    Ok(())
+}
+
+/// Adds the colours of an array whose values do not lie one after another.
+fn strided<T: Copy>(array: ArrayViewD<'_, T>, pixels: &mut Vec<[u8; 3]>, stored: impl Fn(T) -> u8) {
+    let array = if array.ndim() == 2 { array.insert_axis(Axis(2)) } else { array };
+    let Ok(array) = array.into_dimensionality::<Ix3>() else { return };
+    let last = array.dim().2 - 1;
+    for row in array.outer_iter() {
+        pixels.extend(row.outer_iter().map(|pixel| [0, 1, 2].map(|channel| stored(pixel[last.min(channel)]))));
+    }
+}
+
+/// The map in an array `[height][width]` of float32, where values that are not finite are unknown.
+pub(crate) fn map(name: &str, object: &Bound<'_, PyAny>) -> PyResult<DisparityMap> {
+    let array = array(name, object)?;
+    let Ok(array) = array.cast::<PyArray2<f32>>() else {
+        let what = "a map is [height][width] of float32";
+        return Err(PyTypeError::new_err(format!("{name} is {:?} of {}; {what}", array.shape(), array.dtype())));
+    };
+    let array = array.try_readonly()?;
+    let (height, width) = array.as_array().dim();
+    let size = Size::new(width, height).map_err(raised)?;
+    DisparityMap::new(size, array.as_array().iter().copied().collect()).map_err(raised)
+}
+
+/// A new array `[height][width]`, with NaN where the value is not finite.
+pub(crate) fn plane(py: Python<'_>, size: Size, mut values: Vec<f32>) -> PyResult<Bound<'_, PyArray2<f32>>> {
+    for value in values.iter_mut().filter(|value| !value.is_finite()) {
+        *value = f32::NAN;
+    }
+    PyArray1::from_vec(py, values).reshape([size.height, size.width])
+}
+
+/// The array that the caller gave for a map of this size.
+pub(crate) fn target<'py>(object: &Bound<'py, PyAny>, size: Size) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let needed = || format!("`out` must be a float32 array of the shape {:?}", [size.height, size.width]);
+    let array = object.cast::<PyArray2<f32>>().map_err(|_| PyTypeError::new_err(needed()))?;
+    if *array.shape() != [size.height, size.width] {
+        return Err(PyValueError::new_err(format!("{}, not {:?}", needed(), array.shape())));
+    }
+    let flags = array.getattr("flags")?;
+    for flag in ["writeable", "aligned"] {
+        if !flags.getattr(flag)?.extract::<bool>()? {
+            return Err(PyValueError::new_err(format!("`out` must be {flag}")));
+        }
+    }
+    Ok(array.clone())
+}
+
+/// Writes a map into an array of its size, with NaN where it is unknown.
+pub(crate) fn fill(array: &Bound<'_, PyArray2<f32>>, map: &DisparityMap) -> PyResult<()> {
+    let mut array = array.try_readwrite()?;
+    for (to, &value) in array.as_array_mut().iter_mut().zip(map.values()) {
+        *to = if value.is_finite() { value } else { f32::NAN };
+    }
+    Ok(())
+}

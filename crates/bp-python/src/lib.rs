@@ -1,0 +1,55 @@
+//! The Python package `bpstereo`: [`bp_stereo`] with NumPy arrays in place of images and maps.
+//!
+//! Options, defaults, messages and file formats are those of the library. This crate converts arguments and results, lets
+//! other Python threads run meanwhile, and passes Ctrl-C on.
+
+mod arrays;
+mod attended;
+mod calibration;
+mod errors;
+mod files;
+mod matcher;
+mod options;
+
+use bp_stereo::{description::Device, devices::ALL, thread_pool};
+use pyo3::{prelude::*, types::PyList};
+
+/// The native part of `bpstereo`.
+#[pymodule(gil_used = false)]
+mod _bpstereo {
+    #[pymodule_export]
+    use super::{
+        calibration::Calibration,
+        devices,
+        errors::{BackendUnavailable, DeviceError, PairWarning},
+        files::{read_image, read_map, write_map, write_picture, write_points},
+        matcher::{Matcher, match_pair},
+    };
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name that Python uses")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}
+
+/// The devices of all backends, with the names that the option `backend` takes.
+///
+/// The first device of the backend "rayon", which is the default, has the widest instructions of this processor.
+///
+/// >>> bpstereo.devices()[0]["backend"]
+/// 'scalar'
+#[pyfunction]
+fn devices(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let list = PyList::empty(py);
+    // In a pool that ends again; Rayon's own would stay.
+    let pool = thread_pool(None).map_err(errors::raised)?;
+    let all = || ALL.iter().map(|backend| (*backend, backend.devices())).collect::<Vec<_>>();
+    let found = py.detach(|| pool.install(all));
+    for (backend, devices) in found {
+        for (index, device) in devices.iter().enumerate() {
+            let described = pythonize::pythonize(py, &Device::from(device))?;
+            described.set_item("backend", bp_stereo::devices::device_name(backend, index))?;
+            list.append(described)?;
+        }
+    }
+    Ok(list)
+}

@@ -1,0 +1,165 @@
+"""Threads, signals, forks and memory: a guest that behaves in Python's house."""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import bpstereo
+import numpy
+import pytest
+
+from conftest import shifted
+
+#: A match of many seconds, in short steps.
+SLOW = {"algorithm": {"name": "bp", "loops": {"on_each_grid": {"loops": 20000, "schedule": "sync"}}}, "labels": 64}
+
+
+def test_several_matchers_work_in_threads():
+    pairs = [shifted(60, 80, shift) for shift in range(1, 7)]
+    expected = [bpstereo.match(*pair, labels=16) for pair in pairs]
+    found = [None] * len(pairs)
+
+    def work(index):
+        matcher = bpstereo.Matcher(labels=16)
+        for _ in range(5):
+            found[index] = matcher.compute(*pairs[index])
+
+    threads = [threading.Thread(target=work, args=(index,)) for index in range(len(pairs))]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert all(numpy.array_equal(one, other, equal_nan=True) for one, other in zip(found, expected))
+
+
+def test_other_threads_run_meanwhile_and_must_not_share_the_matcher():
+    matcher, refused, ticks = bpstereo.Matcher(**SLOW), [], [0]
+    done = threading.Event()
+
+    def watch():
+        while not done.is_set():
+            ticks[0] += 1
+            try:
+                matcher.times
+            except RuntimeError as error:
+                refused.append(str(error))
+            time.sleep(0.01)
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    begin = time.monotonic()
+    with pytest.raises(TimeoutError):
+        matcher.compute(*shifted(400, 500, 4), progress=lambda done, total: stop_after(begin, 0.5))
+    done.set()
+    watcher.join()
+    assert ticks[0] > 10 and any("at work" in text for text in refused)
+    assert matcher.times is None
+
+
+def stop_after(begin, seconds):
+    if time.monotonic() - begin > seconds:
+        raise TimeoutError
+
+
+def test_progress_is_told_and_its_errors_stop_the_match():
+    told = []
+    bpstereo.match(*shifted(100, 120, 4), labels=16, progress=lambda done, total: told.append((done, total)))
+    assert told and told[-1][0] == told[-1][1] and told == sorted(told)
+    begin = time.monotonic()
+    with pytest.raises(ZeroDivisionError):
+        bpstereo.match(*shifted(400, 500, 4), progress=lambda done, total: 1 // 0, **SLOW)
+    assert time.monotonic() - begin < 2
+
+
+def test_a_slow_callback_does_not_delay_the_answer():
+    begin = time.monotonic()
+    loops = {"on_each_grid": {"loops": 200, "schedule": "sync"}}
+    bpstereo.match(*shifted(60, 80, 4), labels=16, algorithm={"name": "bp", "loops": loops}, progress=lambda *_: time.sleep(0.2))
+    assert time.monotonic() - begin < 3
+
+
+def test_a_callback_may_not_use_its_own_matcher(pair):
+    matcher = bpstereo.Matcher(labels=16)
+    with pytest.raises(RuntimeError, match="callback"):
+        matcher.compute(*pair, progress=lambda *_: matcher.compute(*pair))
+    assert matcher.compute(*pair).shape == pair[0].shape
+
+
+@pytest.mark.parametrize("options", [SLOW, {"algorithm": {"name": "sweep", "loops": 400}, "labels": 64}])
+def test_ctrl_c_stops_a_match(options):
+    code = f"""
+import sys; sys.path.insert(0, {os.path.dirname(__file__)!r})
+import bpstereo
+from conftest import shifted
+print("go", flush=True)
+bpstereo.match(*shifted(480, 640, 4), **{options!r})
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    time.sleep(1)
+    begin = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert time.monotonic() - begin < 2 and "KeyboardInterrupt" in told, told
+    assert process.returncode in (1, 130, -signal.SIGINT)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_matcher_works_after_a_fork(pair):
+    matcher = bpstereo.Matcher(labels=16)
+    expected = matcher.compute(*pair)
+    child = os.fork()
+    if child == 0:
+        try:
+            same = numpy.array_equal(matcher.compute(*pair), expected, equal_nan=True)
+            os._exit(0 if same else 1)
+        finally:
+            os._exit(2)
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            break
+        time.sleep(0.05)
+    else:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        pytest.fail("the child hangs")
+    assert os.waitstatus_to_exitcode(status) == 0
+    assert numpy.array_equal(matcher.compute(*pair), expected, equal_nan=True)
+
+
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="there is no /proc")
+def test_a_thousand_matches_leak_nothing():
+    left, right = shifted(48, 64, 3)
+    matcher = bpstereo.Matcher(labels=8, confidence=True, threads=1)
+    held = []
+    for index in range(1, 1001):
+        matcher.compute(left, right)
+        if index % 250 == 0:
+            held.append(resident())
+    # A map of these is 12 kB: one lost by each match would be 3 MB.
+    assert max(held[1:]) - held[0] < 1 << 20, held
+    held = []
+    for index in range(1, 91):
+        bpstereo.match(left, right, labels=8, threads=1)
+        if index % 30 == 0:
+            held.append(resident())
+    assert max(held[1:]) - held[0] < 1 << 19, held
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads in /proc")
+def test_matchers_end_their_threads(pair):
+    begin = len(os.listdir("/proc/self/task"))
+    for _ in range(5):
+        bpstereo.match(*pair, labels=8, threads=4)
+    deadline = time.monotonic() + 5
+    while len(os.listdir("/proc/self/task")) > begin and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert len(os.listdir("/proc/self/task")) <= begin

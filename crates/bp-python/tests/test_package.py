@@ -1,0 +1,69 @@
+"""The package itself: its stubs, its examples, and the instructions that it chooses."""
+import doctest
+import inspect
+import platform
+import subprocess
+import sys
+import typing
+
+import bpstereo
+import numpy
+import pytest
+
+from conftest import shifted
+
+
+def documented():
+    yield "bpstereo", bpstereo
+    for name in bpstereo.__all__:
+        value = getattr(bpstereo, name)
+        yield name, value
+        if inspect.isclass(value):
+            yield from ((f"{name}.{member}", part) for member, part in vars(value).items() if not member.startswith("_"))
+
+
+@pytest.mark.parametrize(("name", "value"), [pair for pair in documented() if pair[0] != "__version__"])
+def test_everything_has_a_docstring_whose_examples_run(name, value, doctest_namespace):
+    text = inspect.getdoc(value)
+    assert text and len(text) > 20, name
+    test = doctest.DocTestParser().get_doctest(text, dict(doctest_namespace), name, name, 0)
+    assert not doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test).failed
+
+
+def test_the_stubs_agree_with_the_module():
+    pytest.importorskip("mypy")
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "bpstereo"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_every_option_is_named():
+    names = list(bpstereo.Matcher().options)
+    assert list(bpstereo.Options.__annotations__) == names
+    assert all(f"`{name}`" in bpstereo.Matcher.__doc__ for name in names)
+
+
+def test_mypy_accepts_right_calls_and_refuses_wrong_ones(tmp_path):
+    pytest.importorskip("mypy")
+    begin = "import bpstereo, numpy\nimage = numpy.zeros((9, 9), numpy.uint8)\n"
+    for call, accepted in [
+        ("bpstereo.match(image, image, labels=16, quality='best').mean()", True),
+        ("bpstereo.match(image, image, labls=16)", False),
+        ("bpstereo.Matcher(quality='good')", False),
+        ("bpstereo.Matcher().compute(image)", False),
+        ("bpstereo.StereoBP.create(0, 16).compute(image, image)", True),
+    ]:
+        (tmp_path / "script.py").write_text(begin + call)
+        done = subprocess.run([sys.executable, "-m", "mypy", "--strict", "script.py"], cwd=tmp_path, capture_output=True, text=True)
+        assert (done.returncode == 0) == accepted, f"{call}: {done.stdout}"
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or not sys.platform.startswith("linux"), reason="reads x86's flags in /proc")
+def test_one_wheel_has_the_code_for_every_instruction_set():
+    names = {device["backend"]: device["name"] for device in bpstereo.devices() if device["backend"].startswith("rayon")}
+    with open("/proc/cpuinfo") as file:
+        flags = next(line for line in file if line.startswith(("flags", "Features"))).split()
+    expected = [name for flag, name in [("avx512_vbmi2", "AVX-512"), ("avx2", "AVX2"), ("sse4_2", "SSE4.2"), ("sse2", "SSE2")] if flag in flags]
+    assert [name for name in expected if any(name in told for told in names.values())] == expected
+    assert expected[0] in bpstereo.Matcher().device["name"]
+    maps = [bpstereo.match(*shifted(60, 90, 4), labels=16, backend=backend) for backend in names]
+    assert all(numpy.array_equal(one, maps[0], equal_nan=True) for one in maps)
