@@ -9,7 +9,11 @@ use bp_core::Calibration;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{Colours, Contents, Error, Files, MapFormat, Raster, Staged, read::MOST_DESCRIPTION, write::Hidden};
+use crate::{
+    Colours, Contents, Error, Files, MapFormat, Raster, Staged,
+    read::MOST_DESCRIPTION,
+    write::{Hidden, sync_folder_of},
+};
 
 /// Version of the sidecar's format. Every change of meaning raises it.
 const SCHEMA_VERSION: u32 = 1;
@@ -50,10 +54,16 @@ pub(crate) fn told_quantity(path: &Path) -> Result<Option<String>, Error> {
 pub fn put_described(files: &Files, path: &Path, map: Staged, sidecar: Option<Staged>) -> Result<(), Error> {
     // Not another program's file of that name. Where the sidecar is a link, the link stays.
     let old = told_quantity(path)?.map(|_| files.hide(&sidecar_of(path))).transpose()?;
-    if let Err(error) = map.put() {
-        old.into_iter().for_each(Hidden::restore);
-        return Err(error);
-    }
+    let place = match map.moved() {
+        Ok(place) => place,
+        Err(error) => {
+            old.into_iter().for_each(Hidden::restore);
+            return Err(error);
+        }
+    };
+    // From here on the old sidecar would be that of another map, also if the disk fails.
+    drop(old);
+    place.map_or(Ok(()), |place| sync_folder_of(&place))?;
     sidecar.map_or(Ok(()), Staged::put)
 }
 

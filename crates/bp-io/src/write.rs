@@ -168,8 +168,14 @@ impl Files {
         let path = self.target(path);
         let temporary = self.temporary_beside(&path)?.into_temp_path();
         fs::rename(&path, &temporary).map_err(|error| Error::writing(&path, &error))?;
-        sync_folder_of(&path)?;
-        Ok(Hidden { temporary, path })
+        let hidden = Hidden { temporary, path };
+        match sync_folder_of(&hidden.path) {
+            Ok(()) => Ok(hidden),
+            Err(error) => {
+                hidden.restore();
+                Err(error)
+            }
+        }
     }
 
     /// A temporary file in the folder of `path`, filled and synced to disk. It is deleted unless it is persisted.
@@ -220,9 +226,17 @@ impl Staged {
     /// # Errors
     /// [`Error::Write`].
     pub fn put(self) -> Result<(), Error> {
-        let Some(file) = self.file else { return Ok(()) };
+        match self.moved()? {
+            Some(path) => sync_folder_of(&path),
+            None => Ok(()),
+        }
+    }
+
+    /// Moves the file to its place, and returns that; `None` for a pipe or a device. A loss of power may still undo it.
+    pub(crate) fn moved(self) -> Result<Option<PathBuf>, Error> {
+        let Some(file) = self.file else { return Ok(None) };
         file.persist(&self.path).map_err(|failed| Error::writing(&self.path, &failed.error))?;
-        sync_folder_of(&self.path)
+        Ok(Some(self.path))
     }
 }
 

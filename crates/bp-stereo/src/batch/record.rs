@@ -105,7 +105,7 @@ impl PairRecord {
 
     /// Reads a record. Returns `None` if it is missing or broken.
     pub(super) fn known(path: &Path) -> Result<Option<Self>, bp_io::Error> {
-        if !path.exists() {
+        if !path.try_exists().map_err(|error| bp_io::Error::reading(path, &error))? {
             return Ok(None);
         }
         Ok(serde_json::from_slice(&Contents::of_regular(path, MOST_DESCRIPTION)?.bytes).ok())
