@@ -10,7 +10,7 @@ import bpstereo
 import numpy
 import pytest
 
-from conftest import shifted
+from conftest import ROOT, shifted
 
 
 def documented():
@@ -67,3 +67,22 @@ def test_one_wheel_has_the_code_for_every_instruction_set():
     assert expected[0] in bpstereo.Matcher().device["name"]
     maps = [bpstereo.match(*shifted(60, 90, 4), labels=16, backend=backend) for backend in names]
     assert all(numpy.array_equal(one, maps[0], equal_nan=True) for one in maps)
+
+
+def test_the_tour_makes_its_page(tmp_path):
+    sample = ROOT / "bench-data" / "sample"
+    script = ROOT / "crates" / "bp-python" / "examples" / "tour.py"
+    images = [sample / name for name in ("left.png", "right.png", "calib.txt")]
+    subprocess.run([sys.executable, script, *images, tmp_path], check=True)
+    page = (tmp_path / "tour.md").read_text()
+    shown = [name for name in ("map.png", "confidence.png", "sure.png") if f"({name})" in page and (tmp_path / name).exists()]
+    assert len(shown) == 3 and "labels from" in page and (tmp_path / "cloud.ply").stat().st_size > 10_000
+
+
+def test_the_viewers_recording_is_written(tmp_path):
+    pytest.importorskip("rerun")
+    sample = ROOT / "bench-data" / "sample"
+    script = ROOT / "crates" / "bp-python" / "examples" / "rerun_viewer.py"
+    images = [sample / name for name in ("left.png", "right.png", "calib.txt")]
+    subprocess.run([sys.executable, script, *images, tmp_path / "pair.rrd"], check=True)
+    assert (tmp_path / "pair.rrd").stat().st_size > 100_000
