@@ -87,7 +87,8 @@ def test_a_callback_may_not_use_its_own_matcher(pair):
 
 def test_ctrl_c_stops_a_match_of_short_steps():
     code = f"""
-import sys; sys.path.insert(0, {os.path.dirname(__file__)!r})
+import signal, sys; sys.path.insert(0, {os.path.dirname(__file__)!r})
+signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored where the tests run in the background
 import bpstereo
 from conftest import shifted
 print("go", flush=True)
