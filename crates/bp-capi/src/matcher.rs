@@ -8,8 +8,8 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError, TryLockError},
 };
 
-use bp_core::{DisparityMap, StereoPair};
-use bp_stereo::{Disparity, Error, Event, Matcher, Options, Start, Stop, Watch, description};
+use bp_core::{DisparityMap, StereoPair, image::common_factor};
+use bp_stereo::{Event, Matcher, Options, Start, Stop, Watch, description};
 
 use crate::{
     BpstereoImage, BpstereoStatus,
@@ -48,15 +48,6 @@ impl BpstereoMatcher {
 
     fn stop(&self) -> MutexGuard<'_, Stop> {
         self.stop.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Work {
-    fn solved(&mut self, pair: &StereoPair, stop: &Stop) -> Result<Disparity, Error> {
-        let watch = Watch::new(&|_: Event<'_>| (), stop);
-        watch.check()?;
-        let planned = self.matcher.plan(pair)?;
-        self.matcher.run(pair, planned, Start::Cold, &watch)
     }
 }
 
@@ -132,7 +123,8 @@ pub unsafe extern "C" fn bpstereo_compute(
             ));
         };
         let stop = matcher.stop().clone();
-        let solved = work.solved(&pair, &stop);
+        let watch = Watch::new(&|_: Event<'_>| (), &stop);
+        let solved = work.matcher.compute_watched(&pair, Start::Cold, &watch);
         // A stop ends one match.
         mem::take(&mut *matcher.stop());
         let answer = solved?;
@@ -156,10 +148,7 @@ pub unsafe extern "C" fn bpstereo_compute(
 unsafe fn pair(left: &BpstereoImage, right: &BpstereoImage) -> Result<StereoPair, Failure> {
     // SAFETY: the caller's promise.
     unsafe {
-        let factor = match (left.factor("left")?, right.factor("right")?) {
-            (Some(one), Some(other)) => one.min(other),
-            (one, other) => one.or(other).unwrap_or(1.0),
-        };
+        let factor = common_factor([left.factor("left")?, right.factor("right")?]);
         Ok(StereoPair::new(left.copied("left", factor)?, right.copied("right", factor)?)?)
     }
 }

@@ -191,6 +191,12 @@ pub fn factor_to_8_bits(values: impl IntoIterator<Item = f32>) -> Result<f32, No
     Ok(if brightest <= 1.0 { 255.0 } else { 1.0 })
 }
 
+/// One factor for images that belong together, from those of [`factor_to_8_bits`]; `None` stands for an image of integers.
+#[must_use]
+pub fn common_factor<const N: usize>(factors: [Option<f32>; N]) -> f32 {
+    factors.into_iter().flatten().reduce(f32::min).unwrap_or(1.0)
+}
+
 /// The 8-bit value of a float, see [`factor_to_8_bits`].
 #[must_use]
 pub fn scaled(value: f32, factor: f32) -> u8 {

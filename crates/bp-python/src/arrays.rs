@@ -2,7 +2,7 @@
 
 use bp_core::{
     DisparityMap, Image, Size, StereoPair,
-    image::{factor_to_8_bits, narrow, scaled},
+    image::{common_factor, factor_to_8_bits, narrow, scaled},
 };
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
@@ -20,18 +20,14 @@ use crate::errors::raised;
 /// both images have one scale.
 pub(crate) fn pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<StereoPair> {
     let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
-    let factor = match (left.factor()?, right.factor()?) {
-        (Some(one), Some(other)) => one.min(other),
-        (one, other) => one.or(other).unwrap_or(1.0),
-    };
+    let factor = common_factor([left.factor()?, right.factor()?]);
     StereoPair::new(left.image(factor)?, right.image(factor)?).map_err(raised)
 }
 
 /// One image from such an array. `name` is the argument, for messages.
 pub(crate) fn image(name: &'static str, object: &Bound<'_, PyAny>) -> PyResult<Image> {
     let pixels = Pixels::of(name, object)?;
-    let factor = pixels.factor()?.unwrap_or(1.0);
-    pixels.image(factor)
+    pixels.image(common_factor([pixels.factor()?]))
 }
 
 /// An array that holds an image.

@@ -15,7 +15,7 @@ use pyo3::{exceptions::PyOSError, prelude::*};
 
 use crate::errors::raised;
 
-/// How often Ctrl-C is looked for and progress is told.
+/// The time between two checks for Ctrl-C, and between two calls of `progress`.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Does `work` on a thread of its own, so that this one can call `progress(done, total)` and notice Ctrl-C. If either
@@ -26,7 +26,7 @@ pub(crate) fn attended<T: Send>(
     work: impl FnOnce(&Watch<'_>) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
     let (ending, mut end) = channel::<()>();
-    // Only the newest counts are told: a slow callback does not delay the answer.
+    // Keeps only the newest counts, so that a slow callback does not delay the answer.
     let (stop, counts) = (Stop::default(), Mutex::new(None));
     let tell = |event: Event<'_>| {
         if let Event::Progress { done, total } = event {

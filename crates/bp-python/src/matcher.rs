@@ -6,8 +6,7 @@ use std::{
     sync::{Mutex, MutexGuard, TryLockError},
 };
 
-use bp_core::StereoPair;
-use bp_stereo::{Disparity, Error, Start, Watch, description};
+use bp_stereo::{Disparity, Start, description};
 use numpy::PyArray2;
 use pyo3::{exceptions::PyRuntimeError, prelude::*, types::PyDict};
 use pythonize::pythonize;
@@ -53,10 +52,10 @@ pub(crate) fn match_pair<'py>(
 /// of the same size.
 ///
 /// Options, all with a default: `algorithm` ("sweep", or one of the thesis, such as "cfbp"), `quality` ("fast",
-/// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels` ("auto", "quarter_of_width" or a
-/// number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`, `confidence`, `backend` ("rayon",
-/// "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes). The library's documentation describes them;
-/// `options` shows their values.
+/// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels`
+/// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`,
+/// `confidence`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes). The
+/// library's documentation describes them; `options` shows their values.
 ///
 /// >>> matcher = bpstereo.Matcher(labels=16, confidence=True)
 /// >>> disparity = matcher.compute(left, right)
@@ -112,7 +111,7 @@ impl Matcher {
         out.map_or(Ok(()), |out| target(out, pair.size()).map(drop))?;
         state.reopen_after_fork(py)?;
         let (matcher, start) = (&mut state.matcher, if warm { Start::Warm } else { Start::Cold });
-        let solved = attended(py, progress, |watch| solved(matcher, &pair, start, watch))?;
+        let solved = attended(py, progress, |watch| matcher.compute_watched(&pair, start, watch))?;
         let described = description::Answer::from(&solved);
         let Disparity { map, confidence, .. } = solved;
         let confidence = confidence.map(|values| plane(py, pair.size(), values)).transpose()?.map(Bound::unbind);
@@ -214,15 +213,4 @@ impl Drop for State {
             unsafe { ManuallyDrop::drop(&mut self.matcher) };
         }
     }
-}
-
-fn solved(
-    matcher: &mut bp_stereo::Matcher,
-    pair: &StereoPair,
-    start: Start,
-    watch: &Watch<'_>,
-) -> Result<Disparity, Error> {
-    watch.check()?;
-    let planned = matcher.plan(pair)?;
-    matcher.run(pair, planned, start, watch)
 }

@@ -130,8 +130,17 @@ impl Matcher {
     /// [`Error::Core`] if the images differ in size, [`Error::OutOfMemory`], and those of the device.
     pub fn compute(&mut self, left: &Image, right: &Image) -> Result<Disparity, Error> {
         let pair = StereoPair::new(left.clone(), right.clone())?;
-        let planned = self.plan(&pair)?;
-        self.run(&pair, planned, Start::Cold, &Watch::default())
+        self.compute_watched(&pair, Start::Cold, &Watch::default())
+    }
+
+    /// Matches a pair. Progress goes to `watch`, in message entries.
+    ///
+    /// # Errors
+    /// Those of [`Self::plan`] and [`Self::run`].
+    pub fn compute_watched(&mut self, pair: &StereoPair, start: Start, watch: &Watch<'_>) -> Result<Disparity, Error> {
+        watch.check()?;
+        let planned = self.plan(pair)?;
+        self.run(pair, planned, start, watch)
     }
 
     /// Plans a pair. A quick survey of it finds possible problems, how rows differ, and the labels if they are

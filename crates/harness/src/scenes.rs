@@ -34,7 +34,7 @@ pub struct Set {
 const HALF_SIZE: Set = Set {
     name: "middlebury2006",
     labels: 112,
-    described: "the thesis's six Middlebury scenes at half size, the thesis's own sizes",
+    described: "the thesis's six Middlebury scenes at half size, as in the thesis",
     short: "Middlebury 2005/2006, half size",
 };
 const THIRD_SIZE: Set = Set {
