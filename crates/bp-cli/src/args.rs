@@ -8,6 +8,7 @@ mod meaning;
 mod measuring;
 mod outputs;
 mod records;
+mod rectifying;
 
 use std::path::PathBuf;
 
@@ -22,6 +23,7 @@ pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};
 pub(crate) use outputs::{ConvertArgs, OutputArgs};
 pub(crate) use records::{CompareArgs, ExportArgs, ReportArgs};
+pub(crate) use rectifying::RectifyArgs;
 
 use crate::failure::Failure;
 
@@ -43,6 +45,9 @@ pub(crate) enum Command {
     /// Compute the disparity map of a rectified pair.
     #[command(after_help = examples::MATCH)]
     Match(Box<MatchArgs>),
+    /// Turn a pair of raw images into a rectified pair, with a calibration of the cameras.
+    #[command(after_help = examples::RECTIFY)]
+    Rectify(RectifyArgs),
     /// Convert a disparity map to depth, points, a picture or another format.
     #[command(after_help = examples::CONVERT)]
     Convert(Box<ConvertArgs>),

@@ -40,6 +40,7 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Match(args) => commands::match_pair(args),
+        Command::Rectify(args) => commands::rectify(args),
         Command::Convert(args) => commands::convert(args),
         Command::Evaluate(args) => commands::evaluate(args),
         Command::Reproduce(args) => commands::reproduce(args),

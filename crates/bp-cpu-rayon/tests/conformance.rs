@@ -154,14 +154,22 @@ fn borders_of_the_right_image_are_exact() {
     }
 }
 
-/// For Miri, which is too slow for the other tests (scripts/miri).
+/// For Miri, which is too slow for the other tests (scripts/miri): every algorithm, every profile, label sets, odd and single columns.
 #[test]
 fn tiny_pairs_equal_the_reference() {
-    let tiny = (0..).map(random_case).filter(|case| case.plan.message_updates() < 2000).take(12);
-    for (index, case) in tiny.enumerate() {
+    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    for (index, profile) in Profile::ALL.into_iter().enumerate() {
+        let pair = noise_pair([9, 1, 17][index % 3], 3 + index % 2, index as u64);
+        let algorithm = Algorithm::ALL[(index + 5) % Algorithm::ALL.len()];
+        let schedule = if algorithm == Algorithm::Sweep { Schedule::Sweep } else { Schedule::ALL[index % 2] };
+        let mut settings = algorithm.settings(pair.size(), 4, 2, schedule);
+        settings.label_sets = algorithm == Algorithm::Sweep;
+        let case = Case::new(pair, Model::new(profile, 5).unwrap(), settings).unwrap();
         let expected = solve(&Scalar, &case).unwrap();
         for device in 0..Rayon.devices().len() {
-            assert!(solve_on(device, 1, &case) == expected, "{index} on {device}: {:?}", case.plan);
+            let opened = Rayon.open(device).unwrap();
+            let found = pool.install(|| solve(opened.as_ref(), &case)).unwrap();
+            assert!(found == expected, "{profile:?} on {device}");
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Reading images.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 use bp_core::{Image, Size, image::narrow};
-use image::DynamicImage;
+use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Contents, Error, Limits,
+    Contents, Error, Files, Limits,
     decode::{check_unscaled, decode, decoded},
     pfm,
 };
@@ -18,6 +18,20 @@ use crate::{
 /// [`Error::Read`] and [`Error::OutOfMemory`].
 pub fn read_image(path: &Path, limit: Limits) -> Result<Image, Error> {
     parse_image(path, &Contents::of_pixels(path, limit)?.bytes, limit)
+}
+
+/// Writes an image as a PNG of 8 bits, in grey if it has no colours.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn write_image(files: &Files, path: &Path, image: &Image) -> Result<(), Error> {
+    let Size { width, height } = image.size();
+    let (bytes, kind) = if image.is_grey() {
+        (Cow::from(image.pixels().iter().map(|&[grey, ..]| grey).collect::<Vec<_>>()), ExtendedColorType::L8)
+    } else {
+        (Cow::from(image.pixels().as_flattened()), ExtendedColorType::Rgb8)
+    };
+    files.whole(path, |file| PngEncoder::new(file).write_image(&bytes, width as u32, height as u32, kind))
 }
 
 /// Parses an image in memory; messages call it `path`.

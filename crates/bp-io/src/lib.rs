@@ -40,12 +40,12 @@ mod tiff;
 mod write;
 
 pub use alignment::read_alignment;
-pub use calibration::{CalibrationFile, Geometry};
+pub use calibration::{CalibrationFile, Cameras, Geometry};
 pub use caught::is_caught;
 pub use colours::Colours;
 pub use error::Error;
 pub use format::{MapFormat, Quantity, check_ending, check_range};
-pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey};
+pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey, write_image};
 pub use limits::Limits;
 pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};
 pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};

@@ -33,11 +33,13 @@ impl Calibration {
         Ok(Self(geometry))
     }
 
-    /// Reads a calib.txt in the format of Middlebury and ETH3D. Its baseline is in millimetres.
+    /// Reads the calibration of a rectified pair, by Middlebury, OpenCV, ROS (two files) or KITTI. Its baseline is in
+    /// millimetres; lengths in OpenCV's files are taken as that.
     #[staticmethod]
-    fn read(path: PathBuf) -> PyResult<Self> {
-        there(&path)?;
-        Geometry::read(&path).map(Self).map_err(raised)
+    #[pyo3(signature = (*paths))]
+    fn read(paths: Vec<PathBuf>) -> PyResult<Self> {
+        paths.iter().try_for_each(|path| there(path))?;
+        Geometry::read(&paths).map(Self).map_err(raised)
     }
 
     /// The depths of a map: float32 [height][width] in the unit of the baseline, NaN where unknown.

@@ -10,6 +10,7 @@ mod errors;
 mod files;
 mod matcher;
 mod options;
+mod rectifier;
 
 use bp_stereo::{description::Device, devices::ALL, thread_pool};
 use pyo3::{prelude::*, types::PyList};
@@ -24,6 +25,7 @@ mod _bpstereo {
         errors::{BackendUnavailable, DeviceError, PairWarning},
         files::{read_image, read_map, write_map, write_picture, write_points},
         matcher::{Matcher, match_pair},
+        rectifier::Rectifier,
     };
 
     #[pymodule_export]

@@ -2,7 +2,7 @@
 
 use bp_core::{Plan, Schedule, Size, Tiling, finish};
 
-use crate::{Error, Options, Watch, devices::Opened, error::iec, system::Memory, tiles::ANSWER};
+use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
 pub(crate) const PROGRAM: u64 = 22 << 20;
@@ -56,6 +56,8 @@ pub struct Beside {
     pub truth: bool,
     /// Whether depths are made from the map.
     pub depth: bool,
+    /// Whether a [`Rectifying`](crate::Rectifying) is kept for further pairs.
+    pub rectified: bool,
     /// Whether the next pair is read and the previous one written at the same time.
     pub batch: bool,
     /// How many pairs a batch lists.
@@ -138,12 +140,12 @@ impl Bytes {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let if_so = |is_so: bool, bytes: u64| if is_so { bytes } else { 0 };
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
-        let aligned = if_so(is_aligned, ALIGNED);
+        let (aligned, positions) = (if_so(is_aligned, ALIGNED), if_so(beside.rectified, POSITIONS));
         let (right, trust) = (if_so(options.needs_right(), RIGHT), if_so(options.confidence, TRUST));
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + LISTED * beside.pairs as u64 + a_pixel(PAIR + aligned + truth),
+            held: PROGRAM + LISTED * beside.pairs as u64 + a_pixel(PAIR + aligned + positions + truth),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }

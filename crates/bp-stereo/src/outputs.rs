@@ -1,6 +1,9 @@
 //! The files that are made from a map.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bp_core::{Calibration, DisparityMap, Image, Plan, Size, depth_map, points};
 use bp_io::{
@@ -8,7 +11,7 @@ use bp_io::{
     is_stream, put_described, sidecar_of, staged_picture_sidecar, staged_sidecar, write_points,
 };
 
-use crate::{Error, Watch, description};
+use crate::{Error, Rectifying, Watch, description};
 
 /// The paths of the files that are made from one map.
 #[derive(Clone, Debug, Default)]
@@ -34,8 +37,10 @@ pub struct Making {
     pub no_sidecar: bool,
     /// Whether the formats TIFF and NPY hold NaN for unknown, and not plus infinity.
     pub nan: bool,
-    /// The geometry of the cameras, which depth and points need.
+    /// The geometry of rectified pairs, which depth and points need.
     pub geometry: Option<Geometry>,
+    /// Rectifies pairs before they are matched. Depth and points are then those of its view.
+    pub rectifying: Option<Arc<Rectifying>>,
     /// How files are written.
     pub files: Files,
 }
@@ -56,6 +61,16 @@ pub struct Content<'a> {
 }
 
 impl Making {
+    /// The files of the calibration.
+    #[must_use]
+    pub fn calibration_files(&self) -> Vec<&Path> {
+        match (&self.rectifying, &self.geometry) {
+            (Some(rectifying), _) => rectifying.files().iter().map(PathBuf::as_path).collect(),
+            (None, Some(Geometry { file: Some(file), .. })) => vec![&file.path],
+            _ => Vec::new(),
+        }
+    }
+
     /// Whether a sidecar is written beside this file.
     fn has_sidecar(&self, path: &Path) -> bool {
         !self.no_sidecar && !is_stream(path)
@@ -63,6 +78,9 @@ impl Making {
 
     /// The calibration of images of this size, if a geometry is given.
     fn calibration(&self, size: Size) -> Result<Option<Calibration>, Error> {
+        if let Some(rectifying) = &self.rectifying {
+            return Ok(rectifying.calibration(size));
+        }
         Ok(self.geometry.as_ref().map(|geometry| geometry.of(size)).transpose()?)
     }
 }
@@ -84,7 +102,8 @@ impl Outputs {
         self.maps().try_for_each(|map| MapFormat::of(map).map(drop))?;
         self.picture.as_deref().map_or(Ok(()), |picture| check_ending(picture, "a picture", "png"))?;
         self.points.as_deref().map_or(Ok(()), |points| check_ending(points, "a point cloud", "ply"))?;
-        if (self.depth.is_some() || self.points.is_some()) && making.geometry.is_none() {
+        let has_geometry = making.geometry.is_some() || making.rectifying.is_some();
+        if (self.depth.is_some() || self.points.is_some()) && !has_geometry {
             return Err(Error::Options("depth and points need `calib`, or `focal` and `baseline`".to_owned()));
         }
         Ok(())

@@ -5,7 +5,7 @@ use std::path::Path;
 use bp_core::{DeviceKind, Image, StereoPair};
 use bp_io::{Limits, read_image};
 
-use crate::{Error, Memory, memory::PROGRAM};
+use crate::{Error, Memory, Rectifying, memory::PROGRAM};
 
 /// Bytes per pixel of an image in memory.
 const IMAGE: u64 = 3;
@@ -26,7 +26,21 @@ pub fn reading_limits(max_megapixels: u32, max_memory: Option<u64>, taken: u64) 
 /// # Errors
 /// [`Error::File`], [`Error::OutOfMemory`], [`Error::Core`] if the sizes differ.
 pub fn read_pair(images: [&Path; 2], max_megapixels: u32, max_memory: Option<u64>) -> Result<StereoPair, Error> {
-    Room::new(max_megapixels, max_memory).pair(images, |room, path| room.explained(read_image(path, room.limits)))
+    Room::new(max_megapixels, max_memory).pair(images, None, |room, path| room.explained(read_image(path, room.limits)))
+}
+
+/// As [`read_pair`], for raw images, which are then rectified.
+///
+/// # Errors
+/// Those of [`read_pair`] and of [`Rectifying::rectified`].
+pub fn read_raw_pair(
+    images: [&Path; 2],
+    rectifying: &Rectifying,
+    max_megapixels: u32,
+    max_memory: Option<u64>,
+) -> Result<StereoPair, Error> {
+    let read = |room: Room, path: &Path| room.explained(read_image(path, room.limits));
+    Room::new(max_megapixels, max_memory).pair(images, Some(rectifying), read)
 }
 
 /// How many pixels and bytes an image may take.
@@ -50,26 +64,50 @@ impl Room {
         Self { limits: self.limits.without(taken), ..self }
     }
 
-    /// A pair of images, each from one call of `read`.
+    /// A pair of images, each from one call of `read`, rectified if asked for.
     pub(crate) fn pair(
         self,
         images: [&Path; 2],
+        rectifying: Option<&Rectifying>,
         mut read: impl FnMut(Self, &Path) -> Result<Image, Error>,
     ) -> Result<StereoPair, Error> {
         let [left, right] = images;
         let one = read(self, left)?;
         let other = read(self.without(IMAGE * one.size().pixels() as u64), right)?;
         let named = |error| Error::from(error).of(format!("{} and {}", left.display(), right.display()));
-        StereoPair::new(one, other).map_err(named)
+        let pair = StereoPair::new(one, other).map_err(named)?;
+        match rectifying {
+            Some(rectifying) => {
+                rectifying.rectified_within(&pair, self.without(2 * IMAGE * pair.size().pixels() as u64))
+            }
+            None => Ok(pair),
+        }
+    }
+
+    /// Fails if so many bytes for each pixel of a pair are not left for this step.
+    pub(crate) fn check(self, pair: &StereoPair, a_pixel: u64, step: &str) -> Result<(), Error> {
+        let needed = a_pixel * pair.size().pixels() as u64;
+        let Some(left) = self.limits.memory.filter(|&left| left < needed) else { return Ok(()) };
+        let what = format!("{step} {}", pair.size());
+        Err(self.refused(needed, left).of(what))
+    }
+
+    /// Why `needed` bytes where `left` are left are too much.
+    fn refused(self, needed: u64, left: u64) -> Error {
+        let (reason, advice) = match self.allowed {
+            Some(_) => ("allowed by `max_memory`", "raise it, or use smaller images".to_owned()),
+            None => ("free", "use smaller images".to_owned()),
+        };
+        let beside = self.allowed.map_or(0, |available| available.saturating_sub(left).max(PROGRAM));
+        let (needed, available) = (needed.saturating_add(beside), self.allowed.unwrap_or(left));
+        Error::OutOfMemory { needed, available, reason, advice }
     }
 
     /// The outcome of reading a file, with advice if the limit can be raised.
     pub(crate) fn explained<T>(self, read: Result<T, bp_io::Error>) -> Result<T, Error> {
         read.map_err(|error| match (error, self.allowed, self.limits.memory) {
-            (bp_io::Error::OutOfMemory { path, needed, .. }, Some(available), Some(left)) => {
-                let needed = needed.saturating_add(available.saturating_sub(left).max(PROGRAM));
-                let (reason, advice) = ("allowed by `max_memory`", "raise it, or use smaller images".to_owned());
-                Error::OutOfMemory { needed, available, reason, advice }.of(format!("reading {}", path.display()))
+            (bp_io::Error::OutOfMemory { path, needed, .. }, Some(_), Some(left)) => {
+                self.refused(needed, left).of(format!("reading {}", path.display()))
             }
             (error, ..) => error.into(),
         })

@@ -7,8 +7,8 @@ mod tiny;
 
 use std::path::{Component, Path};
 
-use bp_core::depth_map;
-use bp_io::{Geometry, Limits, MapFormat, Mask, Raster, parse_image, parse_map, parse_mask};
+use bp_core::{Size, depth_map};
+use bp_io::{Cameras, Limits, MapFormat, Mask, Raster, parse_image, parse_map, parse_mask};
 use bp_stereo::pairs;
 
 use crate::{
@@ -77,12 +77,19 @@ pub fn mask(bytes: &[u8]) -> bool {
     true
 }
 
-/// Reads a calibration, and uses it to convert a map to depths.
+/// Reads a calibration, and uses it to convert a map to depths, and to rectify an image.
 ///
 /// # Panics
-/// If a depth is negative or not a number.
+/// If a depth is negative or not a number, or if a position lies outside of the image.
 pub fn calibration(bytes: &[u8]) -> bool {
-    let Ok(geometry) = Geometry::parse(Path::new(NAME), bytes) else { return false };
+    let Ok(cameras) = Cameras::parse(&[(NAME.into(), bytes.to_vec())]) else { return false };
+    if let Ok(rectifier) = cameras.rectifier(tiny::MAP) {
+        let Size { width, height } = rectifier.rectification().size;
+        let sources = (0..2 * width * height).filter_map(|i| rectifier.source(i % 2, i / 2 % width, i / 2 / width));
+        let sides = [tiny::MAP.width as f64, tiny::MAP.height as f64];
+        sources.for_each(|source| assert!((0..2).all(|i| (0.0..sides[i]).contains(&source[i])), "{source:?}"));
+    }
+    let Some(geometry) = cameras.geometry() else { return true };
     let size = geometry.file.as_ref().and_then(|file| file.size);
     if let Ok(calibration) = geometry.of(size.unwrap_or(tiny::MAP)) {
         let depths = depth_map(&tiny::map(), &calibration);

@@ -36,6 +36,12 @@ Examples:
   bp convert map.pfm --picture map.png
   bp convert map.pfm --image left.png --points cloud.ply --calib calib.txt";
 
+pub(super) const RECTIFY: &str = "\
+Examples:
+  bp rectify raw-left.png raw-right.png --calib stereo.yml --output rectified
+  bp match rectified/left.png rectified/right.png --calib rectified/calib.txt --depth depth.tif --output map.pfm
+  bp match raw-left.png raw-right.png --calib stereo.yml --rectify --points cloud.ply --output map.pfm  # in one step";
+
 pub(super) const EVALUATE: &str = "\
 Examples:
   bp evaluate map.pfm truth.png --scale 2

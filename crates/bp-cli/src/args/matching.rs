@@ -36,6 +36,9 @@ pub(crate) struct MatchArgs {
     /// Print the report to standard output as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// The images are raw: rectify them with --calib before matching. The map is that of the rectified left image.
+    #[arg(long, requires = "calib", hide_short_help = true)]
+    pub(crate) rectify: bool,
     /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
     #[arg(long, conflicts_with = "many", hide_short_help = true)]
     pub(crate) messages_hash: bool,

@@ -4,12 +4,13 @@
 use std::{
     io::Read as _,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
 use bp_io::{Geometry, MOST_TEXT, Picture, read_alignment};
 use bp_stereo::{
-    Algorithm, Align, Hierarchy, Labels, Loops, Making, Options, Outputs, Quality,
+    Algorithm, Align, Hierarchy, Labels, Loops, Making, Options, Outputs, Quality, Rectifying,
     batch::{Also, BatchOptions},
     pairs::{self, Source},
 };
@@ -86,7 +87,8 @@ impl MatchArgs {
     /// How files are made.
     pub(crate) fn making(&self) -> Result<Making, Failure> {
         let also = |what| self.many.also.contains(&what);
-        self.outputs.making(also(Also::Picture), also(Also::Depth) || also(Also::Points))
+        let has_depth = also(Also::Depth) || also(Also::Points);
+        self.outputs.making(also(Also::Picture), has_depth, self.rectify)
     }
 }
 
@@ -139,15 +141,16 @@ impl OutputArgs {
     }
 
     /// How files are made. `also_picture` and `also_depth` say whether other arguments ask for a picture, or for depth
-    /// or points.
-    pub(crate) fn making(&self, also_picture: bool, also_depth: bool) -> Result<Making, Failure> {
+    /// or points, and `rectify` whether the images are raw.
+    pub(crate) fn making(&self, also_picture: bool, also_depth: bool, rectify: bool) -> Result<Making, Failure> {
         let args = &self.making;
         if self.picture.is_none() && !also_picture && (args.colours.is_some() || args.no_colour_bar) {
             let what = "--colours and --no-colour-bar are for a picture";
             return Err(Failure::usage(format!("{what}: give --picture too (for many pairs, --also picture)")));
         }
         let has_depth = self.depth.is_some() || self.points.is_some() || also_depth;
-        if !has_depth && (args.calib.is_some() || args.focal.is_some()) {
+        let has_calib = !args.calib.is_empty();
+        if !has_depth && !rectify && (has_calib || args.focal.is_some()) {
             let what = "--calib and --focal are for depth and points";
             return Err(Failure::usage(format!(
                 "{what}: give --depth or --points too (for many pairs, --also depth,points)"
@@ -160,7 +163,8 @@ impl OutputArgs {
             principal_point: args.principal_point,
             file: None,
         });
-        let read = args.calib.as_deref().map(Geometry::read).transpose()?;
+        let read = (has_calib && !rectify).then(|| Geometry::read(&args.calib)).transpose()?;
+        let rectifying = rectify.then(|| Rectifying::read(&args.calib)).transpose()?;
         let bar = (!args.no_colour_bar).then_some(colour_bar::draw as bp_io::DrawBar);
         let picture = Picture { colours: args.colours.unwrap_or_default(), bar };
         Ok(Making {
@@ -168,13 +172,14 @@ impl OutputArgs {
             no_sidecar: args.no_sidecar,
             nan: args.unknown == Some(true),
             geometry: read.or(given),
+            rectifying: rectifying.map(Arc::new),
             ..Making::default()
         })
     }
 
-    /// The calibration file.
-    pub(crate) fn calibration(&self) -> Option<&PathBuf> {
-        self.making.calib.as_ref()
+    /// The calibration's files.
+    pub(crate) fn calibration(&self) -> &[PathBuf] {
+        &self.making.calib
     }
 }
 

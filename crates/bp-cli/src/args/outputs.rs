@@ -46,11 +46,12 @@ pub(crate) struct MakingArgs {
     /// Do not write the sidecar MAP.json, which describes scale, unit, range, plan and inputs of a map or picture.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_sidecar: bool,
-    /// Calibration of the pair in Middlebury's format (calib.txt).
+    /// Calibration of the cameras, by Middlebury, OpenCV, ROS, Kalibr or KITTI; give it twice for two files.
     ///
-    /// It contains cam0, doffs and baseline and, optionally, width and height of the images.
+    /// Two files are those of the left and the right camera (ROS), or intrinsic and extrinsic parameters (OpenCV). Lengths in OpenCV's
+    /// files are taken as millimetres.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["focal", "baseline", "doffs", "principal_point"])]
-    pub(crate) calib: Option<PathBuf>,
+    pub(crate) calib: Vec<PathBuf>,
     /// Instead of --calib: focal length in pixels of these images.
     #[arg(long, value_name = "PX", requires = "baseline", allow_negative_numbers = true, value_parser = positive_double,
         hide_short_help = true)]

@@ -10,7 +10,7 @@ use crate::{args::ConvertArgs, failure::Failure, interrupt, terminal};
 
 /// Runs the command.
 pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
-    let making = args.outputs.making(false, false)?;
+    let making = args.outputs.making(false, false, false)?;
     let outputs = args.outputs.outputs(args.output.as_deref());
     if outputs.paths(&making).is_empty() {
         return Err(Failure::usage("nothing to write: give --output, --picture, --depth or --points"));
@@ -21,9 +21,8 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     if outputs.points.is_none() && args.image.is_some() {
         return Err(Failure::usage("--image is for --points: give --points too"));
     }
-    let calib = args.outputs.calibration();
-    let inputs: Vec<&Path> =
-        [Some(&args.map), args.image.as_ref(), calib].into_iter().flatten().map(PathBuf::as_path).collect();
+    let images = [Some(&args.map), args.image.as_ref()].into_iter().flatten();
+    let inputs: Vec<&Path> = images.chain(args.outputs.calibration()).map(PathBuf::as_path).collect();
     outputs.check(&making, &inputs)?;
     let limit = reading_limits(args.max_megapixels, None, 0);
     let map = read_map(&args.map, args.map_scale, limit)?;

@@ -10,7 +10,7 @@ use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
 use bp_io::{MapFormat, Raster};
 use bp_stereo::{
     Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, Start,
-    align_camera, batch, read_pair, reading_limits,
+    align_camera, batch, read_pair, read_raw_pair, reading_limits,
 };
 
 use super::{
@@ -70,14 +70,21 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
-    let pair = read_pair(files.map(PathBuf::as_path), args.max_megapixels, options.max_memory)?;
+    let pair = read(args, files.map(PathBuf::as_path), &making)?;
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), &options)).transpose()?;
     interrupt::listen()?;
     if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {
         options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
     }
     let whole = args.messages_hash.then_some("messages_hash");
-    let beside = Beside { truth: truth.is_some(), depth: args.outputs.depth.is_some(), batch: false, pairs: 0, whole };
+    let beside = Beside {
+        truth: truth.is_some(),
+        depth: args.outputs.depth.is_some(),
+        rectified: args.rectify,
+        batch: false,
+        pairs: 0,
+        whole,
+    };
     let mut matcher = Matcher::new(&options)?.beside(beside);
     let job = Job { args, files, pair, truth, outputs, making };
     let report = job.run(&mut matcher)?;
@@ -151,6 +158,15 @@ impl Job<'_> {
     fn name(&self) -> String {
         let [left, right] = self.files;
         format!("{} and {}", left.display(), right.display())
+    }
+}
+
+/// Reads the pair, and rectifies it if asked for.
+fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<StereoPair, Error> {
+    let (megapixels, max_memory) = (args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()));
+    match &making.rectifying {
+        Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory),
+        None => read_pair(files, megapixels, max_memory),
     }
 }
 

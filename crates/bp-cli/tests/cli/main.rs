@@ -10,6 +10,7 @@ mod many;
 mod outputs;
 mod quality;
 mod recorded;
+mod rectify;
 mod resumed;
 mod running;
 mod speed;

@@ -3,7 +3,7 @@
 >>> disparity = bpstereo.match(left, right)
 
 `match` matches one pair and `Matcher` many. `StereoBP` has the interface of OpenCV's StereoSGBM. `Calibration` turns
-disparities into depth and points. `read_map`, `write_map` and others read and write the program's file formats.
+disparities into depth and points, and `Rectifier` raw images into rectified ones. `read_map`, `write_map` and others read and write the program's file formats.
 """
 
 from ._bpstereo import (
@@ -12,6 +12,7 @@ from ._bpstereo import (
     DeviceError,
     Matcher,
     PairWarning,
+    Rectifier,
     __version__,
     devices,
     match,
@@ -31,6 +32,7 @@ __all__ = [
     "Matcher",
     "Options",
     "PairWarning",
+    "Rectifier",
     "StereoBP",
     "__version__",
     "devices",

@@ -27,7 +27,7 @@ const ABANDONED: Duration = Duration::from_hours(1);
 /// A pair, the paths of its outputs and the path of its record.
 pub(super) struct Job {
     pub(super) pair: Pair,
-    pub(super) calibration: Option<PathBuf>,
+    pub(super) calibration: Vec<PathBuf>,
     pub(super) outputs: Outputs,
     /// The paths of the outputs, in the order in which their states are recorded.
     pub(super) paths: Vec<PathBuf>,
@@ -61,7 +61,7 @@ impl Job {
         };
         let record = options.output.join(RECORDS).join(&pair.name).with_added_extension("json");
         let paths = outputs.paths(making);
-        let calibration = making.geometry.as_ref().and_then(|geometry| Some(geometry.file.as_ref()?.path.clone()));
+        let calibration = making.calibration_files().into_iter().map(Path::to_owned).collect();
         let chain = index / options.chain();
         Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
     }
@@ -73,7 +73,7 @@ impl Job {
 
     /// The files that the outputs are made from: the images, then the calibration.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        self.images().into_iter().chain(self.calibration.as_deref()).collect()
+        self.images().into_iter().chain(self.calibration.iter().map(PathBuf::as_path)).collect()
     }
 
     /// Creates the folders of its files; fails if one of them cannot be written.

@@ -15,7 +15,7 @@ use bp_core::Size;
 use bp_io::{CalibrationFile, Colours, Contents, Files, Geometry, MOST_DESCRIPTION, hex};
 
 use super::{Also, BatchOptions};
-use crate::{Error, Making, Options, Tiles, description};
+use crate::{Error, Making, Options, Rectifying, Tiles, description};
 
 /// The state of a file when its pair was done.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -206,6 +206,9 @@ struct OutputSettings<'a> {
     sidecar: bool,
     nan: bool,
     geometry: Option<GeometrySettings>,
+    /// SHA-256 of the calibration, if pairs are rectified with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rectified: Option<&'a str>,
 }
 
 /// The values of a geometry, since its file may change later.
@@ -242,6 +245,7 @@ pub(super) fn settings_sha256(options: &BatchOptions, making: &Making) -> Result
         sidecar: !making.no_sidecar,
         nan: making.nan,
         geometry: making.geometry.as_ref().map(Into::into),
+        rectified: making.rectifying.as_deref().map(Rectifying::sha256),
     };
     let text = serde_json::to_vec(&settings).map_err(|error| Error::System(format!("settings: {error}")))?;
     Ok(hex(&Sha256::digest(text)))

@@ -22,8 +22,8 @@ use super::{
     summary::Failed,
 };
 use crate::{
-    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Start, Stopped, Warning, Watch, description,
-    memory::LISTED, pairs::Pair, reading::Room,
+    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Rectifying, Start, Stopped, Warning, Watch,
+    description, memory::LISTED, pairs::Pair, reading::Room,
 };
 
 /// A pair in memory.
@@ -63,10 +63,10 @@ const MOST_BYTES: u64 = 1 << 30;
 
 impl Images {
     /// Reads the files once: what is hashed is what is decoded, even if somebody replaces a file meanwhile.
-    fn read(pair: &Pair, room: Room) -> Self {
+    fn read(pair: &Pair, room: Room, rectifying: Option<&Rectifying>) -> Self {
         let paths = [pair.left.as_path(), pair.right.as_path()];
         let mut states = Vec::new();
-        let pair = room.pair(paths, |room, path| {
+        let pair = room.pair(paths, rectifying, |room, path| {
             let contents = room.explained(Contents::of_pixels(path, room.limits))?;
             states.push(FileState::read(path, &contents)?);
             room.explained(parse_image(path, &contents.bytes, room.limits))
@@ -170,8 +170,8 @@ impl Run<'_> {
     }
 
     fn read<'a>(&self, job: &'a Job, room: Room) -> Result<Read<'a>, Stopped> {
-        let (start, pair) = (Instant::now(), job.pair.clone());
-        let images = self.watch.unless_stopped(move || Images::read(&pair, room))?;
+        let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
+        let images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
         Ok(Read { job, images, read_ms: milliseconds_since(start) })
     }
 
@@ -193,6 +193,7 @@ impl Run<'_> {
         Ok(Matcher::new(&self.options.matching)?.beside(Beside {
             truth: false,
             depth,
+            rectified: self.making.rectifying.is_some(),
             batch,
             pairs: self.listed,
             whole,
@@ -375,7 +376,7 @@ mod tests {
             });
         }
         let pair = Pair { name: "name".into(), left: path("left.pgm"), right: path("right.pgm") };
-        let Images { pair, states } = Images::read(&pair, Room::new(1, None));
+        let Images { pair, states } = Images::read(&pair, Room::new(1, None), None);
         assert_eq!(pair.unwrap().left().pixels(), [[1; 3]; 2]);
         let expected = hex(&Sha256::digest(image(1)));
         assert!(states.len() == 2 && states.iter().all(|state| state.sha256 == expected));

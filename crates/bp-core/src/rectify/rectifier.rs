@@ -1,0 +1,119 @@
+//! Resamples the images of two cameras.
+
+use rayon::prelude::*;
+
+use super::{camera::Rig, view::Rectification};
+use crate::{Calibration, Error, Image, Size, StereoPair, memory};
+
+/// Positions are kept in parts of a pixel.
+const PARTS: f64 = 256.0;
+
+/// The position of a pixel that no camera shows.
+const NOWHERE: [u32; 2] = [u32::MAX; 2];
+
+/// Turns pairs of raw images into rectified pairs. It is prepared once for a rig.
+#[derive(Clone, Debug)]
+pub struct Rectifier {
+    rectification: Rectification,
+    calibration: Calibration,
+    /// The size of the raw images.
+    raw: Size,
+    /// For each image, where its pixels come from: column and row in 1 / `PARTS` of a pixel, `[height][width]`.
+    positions: [Vec<[u32; 2]>; 2],
+}
+
+impl Rectifier {
+    /// Prepares a rectification of a rig, for example [`Rectification::of`].
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] if the rectified images are no pair, [`Error::TooLarge`] and [`Error::Empty`] for their size,
+    /// [`Error::OutOfMemory`].
+    pub fn new(rig: &Rig, rectification: Rectification) -> Result<Self, Error> {
+        let calibration = rectification.calibration()?;
+        let positions = [positions(rig, &rectification, 0)?, positions(rig, &rectification, 1)?];
+        Ok(Self { rectification, calibration, raw: rig.cameras[0].size, positions })
+    }
+
+    /// The bytes that it holds, for rectified images of so many pixels.
+    #[must_use]
+    pub fn bytes(pixels: usize) -> u64 {
+        2 * (size_of::<[u32; 2]>() * pixels) as u64
+    }
+
+    /// The rotations and the view.
+    #[must_use]
+    pub fn rectification(&self) -> &Rectification {
+        &self.rectification
+    }
+
+    /// The geometry of the rectified pairs.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Rectifies a pair, by linear interpolation. Pixels that a camera does not show are black.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] if an image has not the size that the calibration is for, [`Error::OutOfMemory`].
+    pub fn rectified(&self, left: &Image, right: &Image) -> Result<StereoPair, Error> {
+        for (what, image) in [("the left image", left), ("the right image", right)] {
+            if image.size() != self.raw {
+                return Err(Error::WrongSize { what, found: image.size(), expected: self.raw });
+            }
+        }
+        StereoPair::new(self.resampled(0, left)?, self.resampled(1, right)?)
+    }
+
+    /// Where a pixel of the left (0) or right (1) rectified image comes from: column and row of the raw image. `None` if the
+    /// camera does not show it.
+    #[must_use]
+    pub fn source(&self, index: usize, x: usize, y: usize) -> Option<[f64; 2]> {
+        let position = *self.positions.get(index)?.get(y * self.rectification.size.width + x)?;
+        (position != NOWHERE).then(|| position.map(|side| f64::from(side) / PARTS))
+    }
+
+    fn resampled(&self, index: usize, image: &Image) -> Result<Image, Error> {
+        let size = self.rectification.size;
+        let mut pixels = memory::filled("a rectified image", size.pixels(), [0; 3])?;
+        let rows = pixels.par_chunks_exact_mut(size.width).zip(self.positions[index].par_chunks_exact(size.width));
+        rows.for_each(|(row, positions)| {
+            for (pixel, &position) in row.iter_mut().zip(positions).filter(|(_, position)| **position != NOWHERE) {
+                *pixel = mixed(image, position);
+            }
+        });
+        Image::from_rgb(size.width, size.height, pixels)
+    }
+}
+
+/// Where the pixels of one rectified image come from.
+fn positions(rig: &Rig, rectification: &Rectification, index: usize) -> Result<Vec<[u32; 2]>, Error> {
+    let size = Size::new(rectification.size.width, rectification.size.height)?;
+    let (camera, ray) = (rig.cameras[index], rectification.ray(index));
+    let position = |pixel: [f64; 2]| {
+        let [column, row] = camera.pixel(ray(pixel))?.map(|side| libm::floor(side * PARTS + 0.5));
+        let [right, bottom] = [camera.size.width, camera.size.height].map(|side| (side - 1) as f64 * PARTS);
+        ((0.0..=right).contains(&column) && (0.0..=bottom).contains(&row)).then_some([column as u32, row as u32])
+    };
+    let mut positions = memory::filled("the positions of rectified pixels", size.pixels(), NOWHERE)?;
+    positions.par_chunks_exact_mut(size.width).enumerate().for_each(|(y, row)| {
+        for (x, found) in row.iter_mut().enumerate() {
+            *found = position([x as f64, y as f64]).unwrap_or(NOWHERE);
+        }
+    });
+    Ok(positions)
+}
+
+/// The colour between four pixels.
+fn mixed(image: &Image, [column, row]: [u32; 2]) -> [u8; 3] {
+    let [(x, right), (y, below)] = [column, row].map(|side| ((side >> 8) as usize, side & 0xff));
+    // The last column and row have no neighbour, and no weight for one.
+    let (next, down) = (usize::from(right > 0), isize::from(below > 0));
+    let [upper, lower] = [image.row_near(y as isize), image.row_near(y as isize + down)];
+    let weights = [(256 - right) * (256 - below), right * (256 - below), (256 - right) * below, right * below];
+    let colours = [upper[x], upper[x + next], lower[x], lower[x + next]];
+    [0, 1, 2].map(|channel| {
+        let sum: u32 = (0..4).map(|i| weights[i] * u32::from(colours[i][channel])).sum();
+        ((sum + (1 << 15)) >> 16) as u8
+    })
+}
