@@ -38,10 +38,10 @@ fn one_step_two_steps_and_a_video_give_the_same_maps() {
     let video = "match --video l%d.png r%d.pgm --labels 12 --output out --format npy --calib raw.yml --also depth";
     assert_eq!(folder.json(&format!("{video} --rectify --json"))["done"], 2);
     let bytes = |name: &str| fs::read(folder.path(name)).unwrap();
-    for name in ["two.npy", "out/l0.npy", "out/l1.npy"] {
+    for name in ["two.npy", "out/0.npy", "out/1.npy"] {
         assert!(bytes(name) == bytes("one.npy"), "{name}");
     }
-    assert!(bytes("out/l1.depth.npy") == bytes("one.depth.npy") && bytes("two.depth.npy") == bytes("one.depth.npy"));
+    assert!(bytes("out/1.depth.npy") == bytes("one.depth.npy") && bytes("two.depth.npy") == bytes("one.depth.npy"));
     // A batch that is repeated does nothing; with another calibration it begins again.
     assert_eq!(folder.json(&format!("{video} --rectify --json"))["done"], 0);
     let changed = fs::read_to_string(folder.path("raw.yml")).unwrap().replace("-0.05", "-0.06");
