@@ -77,16 +77,19 @@ pub fn mask(bytes: &[u8]) -> bool {
     true
 }
 
+/// The size of raw images.
+const RAW: Size = Size { width: 40, height: 24 };
+
 /// Reads a calibration, and uses it to convert a map to depths, and to rectify an image.
 ///
 /// # Panics
 /// If a depth is negative or not a number, or if a position lies outside of the image.
 pub fn calibration(bytes: &[u8]) -> bool {
     let Ok(cameras) = Cameras::parse(&[(NAME.into(), bytes.to_vec())]) else { return false };
-    if let Ok(rectifier) = cameras.rectifier(tiny::MAP) {
+    if let Ok(rectifier) = cameras.rectifier(RAW) {
         let Size { width, height } = rectifier.rectification().size;
         let sources = (0..2 * width * height).filter_map(|i| rectifier.source(i % 2, i / 2 % width, i / 2 / width));
-        let sides = [tiny::MAP.width as f64, tiny::MAP.height as f64];
+        let sides = [RAW.width as f64, RAW.height as f64];
         sources.for_each(|source| assert!((0..2).all(|i| (0.0..sides[i]).contains(&source[i])), "{source:?}"));
     }
     let Some(geometry) = cameras.geometry() else { return true };
