@@ -4,7 +4,7 @@ use std::{fs, process::Stdio, time::Duration};
 
 use crate::folder::{Folder, MATCH, text};
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "match",
     "convert",
     "evaluate",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 15] = [
     "gate",
     "compare",
     "export",
+    "rectify",
     "completions",
     "man",
 ];

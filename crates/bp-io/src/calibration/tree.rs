@@ -24,7 +24,9 @@ impl<'a> Tree<'a> {
     pub(super) fn parse(path: &'a Path, text: &str) -> Result<Self, Error> {
         let failed = |error: &dyn std::fmt::Display| {
             let what = "not a calibration that is known (Middlebury, OpenCV, ROS, KITTI, Kalibr)";
-            Error::reading(path, &format!("{what}: {:.200}", error.to_string().replace('\n', " ")))
+            // Some parsers show the place in the file, too.
+            let error = error.to_string();
+            Error::reading(path, &format!("{what}: {:.200}", error.lines().next().unwrap_or_default()))
         };
         let value = if text.trim_start().starts_with('<') {
             from_xml(Document::parse(text).map_err(|error| failed(&error))?.root_element())
