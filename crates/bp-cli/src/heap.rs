@@ -1,20 +1,35 @@
-//! The C library's heap.
+//! How much freed memory the program keeps.
 
-/// Buffers of at least this many bytes go back to the system as soon as they are freed. Mapping their pages anew costs
-/// little compared with the work on them. Smaller buffers are too small to matter.
+/// What glibc keeps of freed memory: buffers of up to this many bytes, and so many bytes in all, at the end of the heap.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-const LARGE: i32 = 64 << 10;
+struct Kept {
+    buffer: i32,
+    all: i32,
+}
 
-/// Makes freed memory go back to the system. By default, glibc keeps buffers of up to 32 MiB once it has seen one
-/// freed, so the program would exceed its memory limit. It also reserves 64 MiB of addresses for every thread, which count
+/// Buffers go back to the system as soon as they are freed. Smaller ones are too small to matter.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const LITTLE: Kept = Kept { buffer: 64 << 10, all: 128 << 10 };
+
+/// Buffers of images of a megapixel or two are kept for the next pair: mapping their pages anew takes up to an eighth of a
+/// match. `bp_stereo` leaves room for this where nobody limits the memory.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const MUCH: Kept = Kept { buffer: 8 << 20, all: 32 << 20 };
+
+/// Makes freed memory go back to the system where memory `is_limited`: by default, glibc keeps buffers of up to 32 MiB once it
+/// has seen one freed, so the program would exceed its limit. It also reserves 64 MiB of addresses for every thread, which count
 /// where the system limits those (`ulimit -v`); one heap for all threads is enough here.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "only the C library can set its own allocator")]
-pub(crate) fn hold_little() {
-    // SAFETY: `mallopt` takes two numbers and may be called at any time. If it fails, the setting does not change.
-    let _ = unsafe { [libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE), libc::mallopt(libc::M_ARENA_MAX, 1)] };
+pub(crate) fn set_up(is_limited: bool) {
+    let Kept { buffer, all } = if is_limited { LITTLE } else { MUCH };
+    let settings = [(libc::M_MMAP_THRESHOLD, buffer), (libc::M_TRIM_THRESHOLD, all), (libc::M_ARENA_MAX, 1)];
+    for (setting, value) in settings {
+        // SAFETY: `mallopt` takes two numbers and may be called at any time. If it fails, the setting does not change.
+        let _ = unsafe { libc::mallopt(setting, value) };
+    }
 }
 
 /// Other C libraries return large buffers by themselves.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub(crate) fn hold_little() {}
+pub(crate) fn set_up(_is_limited: bool) {}

@@ -1,9 +1,17 @@
 //! The energy of a labelling, in exact integers.
 
-use crate::{DataCost, Error, Model, StereoPair};
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
+use crate::{DataCost, EdgeLevels, Error, Image, Model, StereoPair, image::grey};
+
+/// Rows that one thread adds up. Only their features are held.
+const ROWS: usize = 32;
 
 /// The energy of a labelling in the units of its profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Energy {
     /// Sum of D(p, f_p) over all pixels.
     pub data: u64,
@@ -22,16 +30,30 @@ impl Energy {
         if labels.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: labels.len() });
         }
-        let cost = DataCost::of_pair(pair, *model)?;
-        let mut energy = Self { data: 0, smoothness: 0 };
-        for (i, &label) in labels.iter().enumerate() {
-            let (x, y) = (i % size.width, i / size.width);
-            energy.data += u64::from(cost.at(x, y, label));
-            let right = (x + 1 < size.width).then(|| (i + 1, (x + 1, y)));
-            let down = (y + 1 < size.height).then(|| (i + size.width, (x, y + 1)));
-            for (other, (other_x, other_y)) in right.into_iter().chain(down) {
-                let smoothness = model.smoothness_between(pair.left().grey(x, y), pair.left().grey(other_x, other_y));
-                energy.smoothness += u64::from(smoothness.of(label, labels[other]));
+        let parts = (0..size.height).into_par_iter().step_by(ROWS);
+        parts
+            .map(|first| Self::of_rows(pair, model, labels, first..size.height.min(first + ROWS)))
+            .try_reduce(Self::default, |a, b| {
+                Ok(Self { data: a.data + b.data, smoothness: a.smoothness + b.smoothness })
+            })
+    }
+
+    /// The data costs of some rows, and the smoothness costs of the edges within them and to the row below.
+    fn of_rows(pair: &StereoPair, model: &Model, labels: &[u16], rows: Range<usize>) -> Result<Self, Error> {
+        let size = pair.size();
+        let cost = DataCost::of_pair(&pair.strip(rows.clone()), *model)?;
+        let (edges, level) = (model.edges(), Level::new());
+        let labels_of = |y: usize| &labels[y * size.width..][..size.width];
+        let mut energy = Self::default();
+        let mut greys = greys(pair.left(), rows.start);
+        for (row, y) in rows.enumerate() {
+            let labels = labels_of(y);
+            energy.data += (0..).zip(labels).map(|(x, &label)| u64::from(cost.at(x, row, label))).sum::<u64>();
+            energy.smoothness += smoothness(level, edges, [labels, &labels[1..]], [&greys, &greys[1..]]);
+            if y + 1 < size.height {
+                let below = self::greys(pair.left(), y + 1);
+                energy.smoothness += smoothness(level, edges, [labels, labels_of(y + 1)], [&greys, &below]);
+                greys = below;
             }
         }
         Ok(energy)
@@ -42,6 +64,40 @@ impl Energy {
     pub fn total(&self) -> u64 {
         self.data + self.smoothness
     }
+}
+
+/// The grey values of a row.
+fn greys(image: &Image, y: usize) -> Vec<u8> {
+    image.row_near(y as isize).iter().copied().map(grey).collect()
+}
+
+/// The smoothness costs of the edges between nodes and as many neighbours.
+fn smoothness(level: Level, edges: &EdgeLevels, labels: [&[u16]; 2], greys: [&[u8]; 2]) -> u64 {
+    dispatch!(level, simd => smoothness_by(simd, edges, labels, greys))
+}
+
+/// Compares the costs of an edge's level and of all levels before it: the least of them is that of its own level, because costs never
+/// rise from level to level.
+#[inline(always)]
+fn smoothness_by<S: Simd>(simd: S, edges: &EdgeLevels, labels: [&[u16]; 2], greys: [&[u8]; 2]) -> u64 {
+    let levels = edges.smoothness().map(|level| [level.slope, level.truncation].map(u32::from));
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut sum = 0;
+            for ((a, b), (grey_a, grey_b)) in labels[0].iter().zip(labels[1]).zip(greys[0].iter().zip(greys[1])) {
+                let (distance, difference) = (u32::from(a.abs_diff(*b)), grey_a.abs_diff(*grey_b));
+                let mut least = u32::MAX;
+                for (i, [slope, truncation]) in levels.into_iter().enumerate() {
+                    let reached = i == 0 || difference > edges.most()[i - 1];
+                    let cost = (slope * distance).min(truncation);
+                    least = if reached { cost.min(least) } else { least };
+                }
+                sum += least;
+            }
+            u64::from(sum)
+        },
+    )
 }
 
 /// The label with the lowest data cost of every pixel, `[height][width]`: matching without smoothness. The smallest
@@ -77,6 +133,28 @@ mod tests {
         let energy = Energy::of(&pair, &model.with_edges_halved_above(10), &[1, 1, 0, 2]).unwrap();
         assert_eq!(energy.smoothness, 10 + 10 + 40);
         assert!(Energy::of(&pair, &model, &[0; 3]).is_err());
+    }
+
+    #[test]
+    fn rows_that_are_added_up_apart_give_the_sum_of_single_pixels() {
+        let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);
+        for (width, height) in [(1, 1), (1, 70), (7, 2 * ROWS), (5, 2 * ROWS + 1)] {
+            let view = |from: usize| Image::from_rgb(width, height, (from..from + width * height).map(noise).collect());
+            let pair = StereoPair::new(view(0).unwrap(), view(100).unwrap()).unwrap();
+            let model = Model::new(Profile::Census16, 5).unwrap();
+            let labels: Vec<u16> = (0..width * height).map(|i| (i * i % 5) as u16).collect();
+            let cost = DataCost::of_pair(&pair, model).unwrap();
+            let mut expected = Energy::default();
+            for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+                let label = |x: usize, y: usize| labels[y * width + x];
+                expected.data += u64::from(cost.at(x, y, label(x, y)));
+                for (x1, y1) in [(x + 1, y), (x, y + 1)].into_iter().filter(|&(x, y)| x < width && y < height) {
+                    let edge = model.smoothness_between(pair.left().grey(x, y), pair.left().grey(x1, y1));
+                    expected.smoothness += u64::from(edge.of(label(x, y), label(x1, y1)));
+                }
+            }
+            assert_eq!(Energy::of(&pair, &model, &labels).unwrap(), expected, "{width}x{height}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! directions, are clearly better than all alternatives, and do not form specks. From them, `range` derives the range
 //! of disparities and its sign. `rows` matches a few hundred again at full resolution to check that rows correspond.
 //!
-//! The survey is plain integer arithmetic on one thread, so it gives the same result on every machine and backend.
+//! The survey is plain integer arithmetic, so it gives the same result on every machine, backend and number of threads.
 
 mod coarse;
 pub(crate) mod points;
@@ -74,11 +74,14 @@ impl Survey {
         // A shrunk image is still matched if its rows are apart by one pixel, and half a pixel more at its borders.
         let most_down = looks.iter().map(|look| look.rows_down.unsigned_abs()).max().unwrap_or(0);
         let reach = factor * (most_down + 1) + factor.div_ceil(2);
-        let points = best.map_or_else(Vec::new, |_| points::find(pair, small.left(), &looks, factor, reach));
+        let (points, seen) = rayon::join(
+            || best.map_or_else(Vec::new, |_| points::find(pair, small.left(), &looks, factor, reach)),
+            || best.and_then(|best| SeenDisparities::of(pair, best, factor)),
+        );
         Ok(Self {
             identical: pair.left() == pair.right(),
             matched,
-            seen: best.and_then(|best| SeenDisparities::of(pair, best, factor)),
+            seen,
             exchanged: best.is_some() && negative as f64 >= NEARLY_ALL * count as f64,
             rows: rows::offsets(pair.size(), &points, reach),
             points,

@@ -7,6 +7,9 @@ use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSI
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
 pub(crate) const PROGRAM: u64 = 22 << 20;
 
+/// Bytes that allocators may keep of freed memory, unless the caller limits memory and has them keep less.
+const KEPT: u64 = 32 << 20;
+
 /// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
 pub(crate) const LISTED: u64 = 3 << 10;
 
@@ -185,13 +188,13 @@ struct Limit {
 }
 
 impl Limit {
-    /// The lower of `max_memory` and the memory that is held or free. The latter counts only if the device has no
-    /// memory of its own.
+    /// The lower of `max_memory` and the memory that is held or free, less what allocators keep. The latter counts only if the
+    /// device has no memory of its own.
     fn of(options: &Options, opened: &Opened, held: u64) -> Self {
         let free = Memory::available_to(opened.info.kind).map_or(u64::MAX, |free| free.saturating_add(held));
         match options.max_memory.filter(|&allowed| allowed <= free) {
             Some(bytes) => Self { bytes, reason: "allowed by `max_memory`", can_be_raised: true },
-            None => Self { bytes: free, reason: "available", can_be_raised: false },
+            None => Self { bytes: free.saturating_sub(KEPT), reason: "available", can_be_raised: false },
         }
     }
 

@@ -26,7 +26,7 @@ use crate::{
 
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
-    heap::hold_little();
+    heap::set_up(args.max_memory.is_some());
     match (args.batch()?, &args.left, &args.right) {
         (None, Some(left), Some(right)) => match_one(args, [left, right]),
         (Some(options), ..) => match_many(args, &options),

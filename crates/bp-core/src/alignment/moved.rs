@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::weights;
-use crate::{Image, StereoPair, image::grey, survey::points::Point};
+use crate::{Image, Size, StereoPair, image::grey, survey::points::Point};
 
 /// Columns and rows of a window.
 const WIDTH: usize = 16;
@@ -35,6 +35,10 @@ const LEAST_STEP: f32 = 0.03;
 
 /// A match farther than this from its start is another one.
 const FARTHEST: f32 = 1.5;
+
+/// The columns and rows that windows this far away may read.
+const FAR: usize = 2;
+const AREA: [usize; 2] = [WIDE + 2 * FAR, HEIGHT + 3 + 2 * FAR];
 
 /// A window matches if the sum of its squared differences is at most this share of the sum of its squared contrasts.
 const LARGEST_SHARE: f32 = 0.25;
@@ -78,10 +82,11 @@ fn measured<S: Simd>(simd: S, pair: &StereoPair, points: &[Point]) -> Vec<Moved>
 fn moved(pair: &StereoPair, point: &Point) -> Option<Moved> {
     let patch = Patch::of(pair.left(), point.x, point.y)?;
     let start = Match { x: point.column as f32, slant: 0.0, y: point.row as f32 };
+    let area = Area::of(pair.right(), point);
     let mut found = start;
     let mut squares = f32::INFINITY;
     for _ in 0..STEPS {
-        let differences = patch.differences(&window(pair.right(), found)?);
+        let differences = patch.differences(&area.window(found)?);
         squares = dot(&differences, &differences);
         let [across, slant, down] = patch.step(&differences);
         found = Match { x: found.x + across, slant: found.slant + slant, y: found.y + down };
@@ -127,7 +132,7 @@ struct Patch {
 impl Patch {
     #[inline(always)]
     fn of(left: &Image, x: usize, y: usize) -> Option<Self> {
-        let wide = greys(left, x.checked_sub(MIDDLE[0] + 1 + SLANT)?, y.checked_sub(MIDDLE[1] + 1)?)?;
+        let wide = greys(left, x, y)?;
         let mut slopes = [[[0.0; WIDTH]; HEIGHT]; 3];
         let mut greys = [[0.0; WIDTH]; HEIGHT];
         for j in 0..HEIGHT {
@@ -232,46 +237,84 @@ fn centred(mut window: Window) -> Window {
     window
 }
 
-/// The grey values less their mean where a window matches, by cubic interpolation (Keys 1981); `None` if it leaves the image.
-#[inline(always)]
-fn window(image: &Image, Match { x, slant, y }: Match) -> Option<Window> {
-    let (left, top) = (x.floor() as usize, y.floor() as usize);
-    let greys = greys(image, left.checked_sub(MIDDLE[0] + 1 + SLANT)?, top.checked_sub(MIDDLE[1] + 1)?)?;
-    let down = weights(y - y.floor());
-    let mut window = [[0.0; WIDTH]; HEIGHT];
-    for (j, row) in window.iter_mut().enumerate() {
-        let mut line = [0.0; WIDE];
-        for i in 0..WIDE {
-            line[i] = down[0] * greys[j][i]
-                + down[1] * greys[j + 1][i]
-                + down[2] * greys[j + 2][i]
-                + down[3] * greys[j + 3][i];
+/// The grey values of the right image around a point.
+struct Area {
+    size: Size,
+    /// The column and row of the first value.
+    first: [usize; 2],
+    values: [[f32; AREA[0]]; AREA[1]],
+}
+
+impl Area {
+    #[inline(always)]
+    fn of(image: &Image, point: &Point) -> Self {
+        let [left, top] = [point.column, point.row];
+        let first = [left.saturating_sub(BEFORE[0] + FAR), top.saturating_sub(BEFORE[1] + FAR)];
+        let size = image.size();
+        let mut values = [[0.0; AREA[0]]; AREA[1]];
+        for (y, values) in (first[1]..size.height).zip(&mut values) {
+            read(values, &image.pixels()[y * size.width..][first[0].min(size.width)..size.width]);
         }
-        let shift = SLANT as f32 + x - x.floor() + slant * (j as f32 - MIDDLE[1] as f32);
-        let across = weights(shift - shift.floor());
-        let line = line.get(shift as usize..shift as usize + WIDTH + 3)?;
-        for i in 0..WIDTH {
-            row[i] = across[0] * line[i] + across[1] * line[i + 1] + across[2] * line[i + 2] + across[3] * line[i + 3];
-        }
+        Self { size, first, values }
     }
-    Some(centred(window))
+
+    /// The grey values less their mean where a window matches, by cubic interpolation (Keys 1981); `None` if it leaves the image.
+    #[inline(always)]
+    fn window(&self, Match { x, slant, y }: Match) -> Option<Window> {
+        let [left, top] = before(x.floor() as usize, y.floor() as usize, self.size)?;
+        let [left, top] = [left.checked_sub(self.first[0])?, top.checked_sub(self.first[1])?];
+        let greys = self.values.get(top..top + HEIGHT + 3)?;
+        let down = weights(y - y.floor());
+        let mut window = [[0.0; WIDTH]; HEIGHT];
+        for (j, row) in window.iter_mut().enumerate() {
+            let near = [0, 1, 2, 3].map(
+                #[inline(always)]
+                |i: usize| greys[j + i].get(left..left + WIDE),
+            );
+            let [Some(a), Some(b), Some(c), Some(d)] = near else { return None };
+            let mut line = [0.0; WIDE];
+            for i in 0..WIDE {
+                line[i] = down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i];
+            }
+            let shift = SLANT as f32 + x - x.floor() + slant * (j as f32 - MIDDLE[1] as f32);
+            let across = weights(shift - shift.floor());
+            let line = line.get(shift as usize..shift as usize + WIDTH + 3)?;
+            for i in 0..WIDTH {
+                row[i] =
+                    across[0] * line[i] + across[1] * line[i + 1] + across[2] * line[i + 2] + across[3] * line[i + 3];
+            }
+        }
+        Some(centred(window))
+    }
+}
+
+/// The columns and rows before that of a window that it and its interpolation may read.
+const BEFORE: [usize; 2] = [MIDDLE[0] + 1 + SLANT, MIDDLE[1] + 1];
+
+/// The first column and row that a window at this column and row may read; `None` if it may leave the image.
+#[inline(always)]
+fn before(x: usize, y: usize, size: Size) -> Option<[usize; 2]> {
+    let (left, top) = (x.checked_sub(BEFORE[0])?, y.checked_sub(BEFORE[1])?);
+    (left + WIDE <= size.width && top + HEIGHT + 3 <= size.height).then_some([left, top])
 }
 
 /// The grey values of a window and of the pixels around it that interpolation needs; `None` if they leave the image.
 #[inline(always)]
-fn greys(image: &Image, left: usize, top: usize) -> Option<[[f32; WIDE]; HEIGHT + 3]> {
+fn greys(image: &Image, x: usize, y: usize) -> Option<[[f32; WIDE]; HEIGHT + 3]> {
     let mut greys = [[0.0; WIDE]; HEIGHT + 3];
-    let width = image.size().width;
-    if left + WIDE > width || top + HEIGHT + 3 > image.size().height {
-        return None;
-    }
+    let [left, top] = before(x, y, image.size())?;
     for (row, greys) in (top..).zip(&mut greys) {
-        let pixels = &image.pixels()[row * width + left..][..WIDE];
-        for (value, &pixel) in greys.iter_mut().zip(pixels) {
-            *value = f32::from(grey(pixel));
-        }
+        read(greys, &image.pixels()[row * image.size().width + left..][..WIDE]);
     }
     Some(greys)
+}
+
+/// Writes the grey values of some pixels, as many as there is room for.
+#[inline(always)]
+fn read(greys: &mut [f32], pixels: &[[u8; 3]]) {
+    for (value, &pixel) in greys.iter_mut().zip(pixels) {
+        *value = f32::from(grey(pixel));
+    }
 }
 
 #[cfg(test)]

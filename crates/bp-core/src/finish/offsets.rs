@@ -53,7 +53,8 @@ pub(super) fn write_offsets(
     })
 }
 
-/// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows.
+/// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows. The
+/// rows that means are taken of need less.
 #[must_use]
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
     size.height.div_ceil(ROWS).min(threads) as u64 * Windows::bytes(size.width)

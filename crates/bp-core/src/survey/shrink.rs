@@ -28,23 +28,17 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
     means.par_chunks_exact_mut(columns).with_min_len(MIN_ROWS).enumerate().for_each(|(row, means)| {
         let ys = row * factor..((row + 1) * factor).min(height);
         let count = (ys.len() * factor.min(width)) as u32;
-        let mut sums = vec![[0; 3]; columns];
+        // Rows are added up first, because that takes vectors.
+        let mut sums = vec![0; width * 3];
         for line in image.pixels()[ys.start * width..ys.end * width].chunks_exact(width) {
-            for (sum, block) in sums.iter_mut().zip(line.chunks(factor)) {
-                add(sum, block);
-            }
+            sums.iter_mut().zip(line.as_flattened()).for_each(|(sum, &value)| *sum += u32::from(value));
         }
-        for (mean, sum) in means.iter_mut().zip(&sums) {
+        for (mean, block) in means.iter_mut().zip(sums.as_chunks::<3>().0.chunks(factor)) {
+            let sum = block.iter().fold([0; 3], |sum, column| [0, 1, 2].map(|i| sum[i] + column[i]));
             *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
     });
     Image::from_grey(columns, rows, &means)
-}
-
-fn add(sums: &mut [u32; 3], colours: &[[u8; 3]]) {
-    for colour in colours {
-        sums.iter_mut().zip(colour).for_each(|(sum, &value)| *sum += u32::from(value));
-    }
 }
 
 #[cfg(test)]

@@ -23,18 +23,22 @@ fn nearest_step(disparity: f32) -> i32 {
     (STEPS as f32 * disparity + 0.5).floor().clamp(-BEYOND, BEYOND) as i32
 }
 
-/// Writes the grey values of a row in steps, in [`UNIT`]s rounded up. The borders are repeated outward.
+/// Writes the grey values of a row in steps, in [`UNIT`]s rounded up. `greys` has one more column on the left and two on the right.
 #[inline(always)]
 pub(super) fn interpolate(greys: &[u8], steps: &mut [i16]) {
     const WEIGHTS: [[i32; 4]; STEPS] = [[0, 128, 0, 0], [-9, 111, 29, -3], [-8, 72, 72, -8], [-3, 29, 111, -9]];
     const ROUND: i32 = 128 / UNIT as i32;
-    let at = |x: usize| i32::from(greys[x.min(greys.len() - 1)]);
-    let mut near = [at(0), at(0), at(1), at(2)];
-    for (x, steps) in steps.chunks_exact_mut(STEPS).enumerate() {
-        for (step, weights) in steps.iter_mut().zip(WEIGHTS) {
-            let sum: i32 = weights.iter().zip(near).map(|(weight, near)| weight * near).sum();
-            *step = ((sum + ROUND - 1) >> ROUND.ilog2()) as i16;
+    let (steps, _) = steps.as_chunks_mut::<STEPS>();
+    let near = [0, 1, 2, 3].map(
+        #[inline(always)]
+        |column: usize| &greys[column..column + steps.len()],
+    );
+    for (x, steps) in steps.iter_mut().enumerate() {
+        let near = [near[0][x], near[1][x], near[2][x], near[3][x]].map(i32::from);
+        for step in 0..STEPS {
+            let [a, b, c, d] = WEIGHTS[step];
+            let sum = a * near[0] + b * near[1] + c * near[2] + d * near[3];
+            steps[step] = ((sum + ROUND - 1) >> ROUND.ilog2()) as i16;
         }
-        near = [near[1], near[2], near[3], at(x + 3)];
     }
 }

@@ -11,12 +11,15 @@ use super::{
 };
 use crate::{Error, StereoPair, image::grey, memory};
 
+/// The columns that interpolation reads beyond the left and right border.
+const BORDER: [usize; 2] = [1, 2];
+
 /// The differences in the rows of windows whose centres lie in one row.
 pub(super) struct Windows {
     width: usize,
     /// How many rows there are.
     rows: usize,
-    /// The grey values of a row of both images.
+    /// The grey values of a row of the left image, and of the right one, whose borders are repeated outward by [`BORDER`].
     greys: [Vec<u8>; 2],
     /// The right image's row in steps.
     right: Vec<i16>,
@@ -37,7 +40,7 @@ impl Windows {
         Ok(Self {
             width,
             rows: 0,
-            greys: [memory::filled(what, width, 0)?, memory::filled(what, width, 0)?],
+            greys: [memory::filled(what, width, 0)?, memory::filled(what, BORDER[0] + width + BORDER[1], 0)?],
             right: memory::filled(what, STEPS * width, 0)?,
             first: memory::filled(what, width, 0)?,
             differences: memory::filled(what, SIDE * columns, 0)?,
@@ -51,7 +54,7 @@ impl Windows {
     pub(super) fn bytes(width: usize) -> u64 {
         let of = |len: usize, bytes: usize| len as u64 * bytes as u64;
         let (columns, steps) = (TRIED * (width + 2 * REACH), STEPS * width);
-        let (greys, first, sums) = (of(2 * width, 1), of(width, 4), of(2 * columns, 4));
+        let (greys, first, sums) = (of(2 * width + BORDER[0] + BORDER[1], 1), of(width, 4), of(2 * columns, 4));
         greys + first + sums + of(steps + SIDE * columns, 2) + of(TRIED * width, 4)
     }
 
@@ -66,10 +69,7 @@ impl Windows {
         simd.vectorize(
             #[inline(always)]
             || {
-                for (greys, image) in self.greys.iter_mut().zip([pair.left(), pair.right()]) {
-                    let pixels = &image.pixels()[y * self.width..][..self.width];
-                    greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel));
-                }
+                self.read_greys(pair, y);
                 interpolate(&self.greys[1], &mut self.right);
                 first_steps(disparities, &mut self.first);
                 self.compare(y);
@@ -86,6 +86,20 @@ impl Windows {
             #[inline(always)]
             || self.add::<-1>(y),
         );
+    }
+
+    /// Reads the grey values of row y.
+    #[inline(always)]
+    fn read_greys(&mut self, pair: &StereoPair, y: usize) {
+        let [left, right] = &mut self.greys;
+        let inside = BORDER[0]..BORDER[0] + self.width;
+        for (greys, image) in [(&mut left[..], pair.left()), (&mut right[inside.clone()], pair.right())] {
+            let pixels = &image.pixels()[y * self.width..][..self.width];
+            greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel));
+        }
+        let [first, last] = [right[inside.start], right[inside.end - 1]];
+        right[..inside.start].fill(first);
+        right[inside.end..].fill(last);
     }
 
     /// Writes the differences of row y.
