@@ -133,4 +133,5 @@ def markdown(heads, rows):
 
 def write(path, report):
     if path:
-        path.write_text(json.dumps(report, indent=1) + "\n")
+        path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(report, indent=1) + "\n")

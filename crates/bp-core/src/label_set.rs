@@ -1,50 +1,8 @@
 //! Label sets: the few labels that nodes of the finest grids may take.
 
-use std::{array, ops::Range};
+use std::array;
 
-use crate::{MAX_LABELS, Node, Plan, Size};
-
-/// Up to 64 columns of rows that are passed together: those of a band, or those around a seam. Under
-/// [`Settings::label_sets`](crate::Settings::label_sets) its nodes share a [`LabelSet`].
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Patch {
-    /// Its columns.
-    pub columns: Range<usize>,
-    /// Its rows.
-    pub rows: Range<usize>,
-}
-
-impl Patch {
-    /// The columns of a patch; the last one of a row may have fewer.
-    pub const COLUMNS: usize = 64;
-
-    /// How many nodes of the coarser grid are looked at beyond the parents, on every side.
-    const MARGIN: usize = 2;
-
-    /// The patches of these rows, from left to right.
-    pub fn all(width: usize, rows: Range<usize>) -> impl ExactSizeIterator<Item = Self> {
-        (0..width.div_ceil(Self::COLUMNS)).map(move |index| {
-            let first = index * Self::COLUMNS;
-            Self { columns: first..width.min(first + Self::COLUMNS), rows: rows.clone() }
-        })
-    }
-
-    /// Its nodes, row by row.
-    pub fn nodes(&self) -> impl Iterator<Item = Node> + use<> {
-        let columns = self.columns.clone();
-        self.rows.clone().flat_map(move |y| columns.clone().map(move |x| Node { x, y }))
-    }
-
-    /// The patch of the next coarser grid, of size `coarser`, whose labels decide the set: the parents and two more nodes on
-    /// every side, where there are any.
-    #[must_use]
-    pub fn region(&self, coarser: Size) -> Self {
-        let around = |range: &Range<usize>, end: usize| {
-            (range.start / 2).saturating_sub(Self::MARGIN)..end.min((range.end - 1) / 2 + 1 + Self::MARGIN)
-        };
-        Self { columns: around(&self.columns, coarser.width), rows: around(&self.rows, coarser.height) }
-    }
-}
+use crate::{MAX_LABELS, Patch, Plan};
 
 /// Some of a plan's labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,13 +21,6 @@ impl LabelSet {
     /// How many nodes must have such a label. The labels of fewer are mostly mistakes in hidden areas, each of which would add
     /// five labels; four nodes are as small as what the coarser grids find at all.
     const AGREEING: u16 = 4;
-
-    /// The number of grids that have label sets with so many labels, from the finest one on, if there are coarser ones: two, and
-    /// from 448 on three, because the third one's labels would be most of the work.
-    #[must_use]
-    pub const fn grids(labels: usize) -> usize {
-        if labels < 448 { 2 } else { 3 }
-    }
 
     /// All labels below `labels`, which is at most [`MAX_LABELS`].
     #[must_use]
@@ -147,25 +98,12 @@ impl LabelSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Model, Profile, Schedule, Settings};
+    use crate::{Algorithm, Model, Profile, Schedule, Settings, Size};
 
     fn plan(label_sets: bool) -> Plan {
         let size = Size { width: 150, height: 70 };
         let settings = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
         Plan::new(size, Model::new(Profile::Census, 70).unwrap(), Settings { label_sets, ..settings }).unwrap()
-    }
-
-    #[test]
-    fn patches_cover_their_rows_and_look_two_nodes_beyond_the_parents() {
-        let patches: Vec<_> = Patch::all(150, 32..64).collect();
-        assert_eq!(patches.len(), 3);
-        assert_eq!(patches[2], Patch { columns: 128..150, rows: 32..64 });
-        let coarser = plan(true).size(1);
-        assert_eq!(patches[1].region(coarser), Patch { columns: 30..66, rows: 14..34 });
-        assert_eq!(patches[2].region(coarser), Patch { columns: 62..75, rows: 14..34 });
-        let edge = Patch { columns: 0..64, rows: 52..68 };
-        assert_eq!(edge.region(coarser), Patch { columns: 0..34, rows: 24..35 });
-        assert_eq!(patches[0].nodes().count(), 64 * 32);
     }
 
     #[test]
@@ -207,6 +145,6 @@ mod tests {
         assert_eq!(LabelSet::of(&plan(false), 0, &patch, &coarser), LabelSet::all(70));
         assert_eq!(LabelSet::all(70).count(), 70);
         assert_eq!([0, 1, 2].map(|grid| plan(true).has_label_sets(grid)), [true, true, false]);
-        assert_eq!([447, 448].map(LabelSet::grids), [2, 3]);
+        assert_eq!([447, 448].map(Plan::most_grids_with_label_sets), [2, 3]);
     }
 }

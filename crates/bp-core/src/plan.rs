@@ -3,7 +3,7 @@
 mod traffic;
 mod updates;
 
-use crate::{Error, LabelSet, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
+use crate::{Error, MessageStart, Model, Node, Schedule, Seam, Settings, Side, Size};
 
 /// The most grids of a plan. This many reduce the longest side, [`crate::MAX_SIDE`], to 1.
 pub const MAX_GRIDS: u32 = 25;
@@ -158,6 +158,13 @@ impl Plan {
         if grid > 0 && self.settings.coarse_clip { truncation + truncation / 2 } else { self.model.clip() }
     }
 
+    /// The number of grids that have label sets with so many labels, from the finest one on, if there are coarser ones: two, and
+    /// from 448 on three, because the third one's labels would be most of the work.
+    #[must_use]
+    pub const fn most_grids_with_label_sets(labels: usize) -> usize {
+        if labels < 448 { 2 } else { 3 }
+    }
+
     /// Whether the nodes of a grid have label sets, under [`Settings::label_sets`]: those finer than
     /// [`Plan::finest_with_all_labels`].
     #[must_use]
@@ -171,7 +178,7 @@ impl Plan {
         if !self.settings.label_sets || self.grids() < 3 {
             return 0;
         }
-        LabelSet::grids(self.model.labels()).min(self.grids() - 1)
+        Self::most_grids_with_label_sets(self.model.labels()).min(self.grids() - 1)
     }
 
     /// Whether the labels of a grid are decided: those of grid 0, and those that determine label sets.

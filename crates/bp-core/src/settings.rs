@@ -250,7 +250,7 @@ pub struct Settings {
     /// coarser grids stay unclipped. Clipping lowers the energy and the root mean squared error of [`Algorithm::Sweep`].
     /// It is off for the algorithms of the thesis.
     pub coarse_clip: bool,
-    /// Whether the nodes of the finest grids ([`LabelSet::grids`](crate::LabelSet::grids)) may take only the labels that the
+    /// Whether the nodes of the finest grids ([`Plan::most_grids_with_label_sets`](crate::Plan::most_grids_with_label_sets)) may take only the labels that the
     /// next coarser grid's answer makes likely, see [`LabelSet`](crate::LabelSet). Only under [`Schedule::Sweep`], and without
     /// effect on fewer than three grids. The coarsest grid always has all labels.
     ///

@@ -2,24 +2,14 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Node, Side, Smoothness};
+use bp_core::{Node, Side, Smoothness};
 
 use crate::{
     beliefs::smallest_least,
     grid::Grid,
     messages::{Messages, add},
     row::{Parity, row_nodes},
-    seams::Seams,
 };
-
-/// Writes the label of every node in the order of [`bp_core::Schedule::Sweep`]. `sums` has room for one node's labels.
-pub(crate) fn decode(grid: &Grid<'_>, messages: &Messages, seams: &Seams, labels: &mut [u16], sums: &mut [u8]) {
-    let width = grid.size.width;
-    for (band, labels) in labels.chunks_mut(BAND_ROWS * width).enumerate() {
-        let first = band * BAND_ROWS;
-        decode_rows(grid, messages, first..first + labels.len() / width, seams.labels_above(width, band), labels, sums);
-    }
-}
 
 /// Writes the labels of these rows, given those of the row above, if there are any.
 ///

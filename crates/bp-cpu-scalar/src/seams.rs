@@ -52,8 +52,18 @@ impl Seams {
         }
     }
 
+    /// Writes the label of every node in the order of [`Schedule::Sweep`]. `sums` has room for one node's labels.
+    pub(crate) fn decode(&self, grid: &Grid<'_>, messages: &Messages, labels: &mut [u16], sums: &mut [u8]) {
+        let width = grid.size.width;
+        for (band, labels) in labels.chunks_mut(BAND_ROWS * width).enumerate() {
+            let first = band * BAND_ROWS;
+            let rows = first..first + labels.len() / width;
+            decode_rows(grid, messages, rows, self.labels_above(width, band), labels, sums);
+        }
+    }
+
     /// The labels of the row above a band; `None` above the first one.
-    pub(crate) fn labels_above(&self, width: usize, band: usize) -> Option<&[u16]> {
+    fn labels_above(&self, width: usize, band: usize) -> Option<&[u16]> {
         let labels = self.labels.chunks_exact(Seam::LABEL_ROWS * width).nth(band.checked_sub(1)?)?;
         labels.chunks_exact(width).last()
     }

@@ -5,8 +5,8 @@ use std::ops::Range;
 use bp_core::{BAND_ROWS, DataCost, Error, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory};
 
 use crate::{
-    coarsen::coarsen, costs::Costs, decode::decode, greys::Greys, grid::Grid, label_sets, match_cost::match_cost,
-    messages::Messages, refine::refine, seams::Seams, select_labels::select_labels, update_messages::update_messages,
+    coarsen::coarsen, costs::Costs, greys::Greys, grid::Grid, label_sets, match_cost::match_cost, messages::Messages,
+    refine::refine, seams::Seams, select_labels::select_labels, update_messages::update_messages,
 };
 
 /// A prepared plan.
@@ -163,7 +163,7 @@ impl ScalarSolver {
         }
         let labels = &mut self.coarser[..self.plan.size(grid).pixels()];
         let on = on_grid(&self.plan, grid, &self.costs, &self.greys);
-        decode(&on, &self.messages[grid % 2], &self.seams, labels, &mut self.h);
+        self.seams.decode(&on, &self.messages[grid % 2], labels, &mut self.h);
     }
 
     /// Gives rows that are passed together the costs of their label sets, if the grid has any.

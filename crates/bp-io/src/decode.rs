@@ -10,6 +10,7 @@ use image::{
 use crate::{
     Error, Limits,
     caught::caught,
+    decoding::{Decoded, ENDS_EARLY, TILE, check_memory},
     headers::{check_pam, jpeg_metadata, tiff_lists},
     png,
 };
@@ -66,29 +67,6 @@ fn decode_as(format: ImageFormat, path: &Path, bytes: &[u8], limit: Limits) -> R
     DynamicImage::from_decoder(decoder).map_err(undecoded)
 }
 
-/// A decoded image: its pixels, its bytes, and those of one value.
-pub(crate) struct Decoded {
-    pub(crate) pixels: u64,
-    pub(crate) total: u64,
-    pub(crate) value_bytes: u64,
-}
-
-/// Refuses an image whose file, decoding and conversion to 8-bit colours exceed the memory. The decoder holds `meanwhile`
-/// bytes besides the image.
-pub(crate) fn check_memory(
-    path: &Path,
-    limit: Limits,
-    file: u64,
-    image: &Decoded,
-    meanwhile: u64,
-) -> Result<(), Error> {
-    let &Decoded { pixels, total, value_bytes } = image;
-    // First a copy in colours of as many bits, then their 8-bit values.
-    let colours = 3 * pixels * value_bytes;
-    let conversion = colours + total.max(3 * pixels);
-    limit.check_memory(path, file.saturating_add(conversion.max(total.saturating_add(meanwhile))))
-}
-
 /// Refuses files whose stored values cannot be recovered: JPEG is lossy, and decoders stretch values of other bit
 /// depths to 8 or 16 bits.
 pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -116,11 +94,6 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 /// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
-
-/// Bytes by which a strip or tile of a TIFF may be larger than its image.
-pub(crate) const TILE: u64 = 4 << 20;
-
-pub(crate) const ENDS_EARLY: &str = "the file ends too early or is broken";
 
 const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; save others so, or floats as PFM";
 

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::{Error, decode::TILE};
+use crate::{Error, decoding::TILE};
 
 /// Most bytes in memory of the lists in a TIFF's header: where its strips are, how long they are.
 const LISTS: u64 = 64 << 20;

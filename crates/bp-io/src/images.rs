@@ -120,7 +120,7 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decode::ENDS_EARLY;
+    use crate::decoding::ENDS_EARLY;
 
     #[test]
     fn what_a_decoder_panics_on_is_refused() {

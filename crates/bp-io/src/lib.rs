@@ -22,6 +22,7 @@ mod calibration;
 mod caught;
 mod colours;
 mod decode;
+mod decoding;
 mod error;
 mod format;
 mod headers;

@@ -7,7 +7,7 @@ use image::{DynamicImage, ImageBuffer};
 
 use crate::{
     Error, Limits,
-    decode::{Decoded, ENDS_EARLY, check_memory},
+    decoding::{Decoded, ENDS_EARLY, check_memory},
 };
 
 /// Most bytes of the metadata that the decoder cannot pass over: what a camera noted.

@@ -9,8 +9,7 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{map, plane},
-    errors::raised,
-    files::there,
+    errors::{raised, there},
 };
 
 /// The geometry of a rectified pair: the focal length in pixels, the distance of the cameras (depth has its unit), the

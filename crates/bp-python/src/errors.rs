@@ -1,8 +1,10 @@
 //! Python's exceptions for the library's errors.
 
+use std::{fs, io::ErrorKind, path::Path};
+
 use bp_stereo::{Cause, Error, io};
 use pyo3::{
-    PyErr, create_exception,
+    PyErr, PyResult, create_exception,
     exceptions::{
         PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyUserWarning, PyValueError,
     },
@@ -39,4 +41,15 @@ pub(crate) fn raised(error: impl Into<Error>) -> PyErr {
         Cause::System => PyOSError::new_err(message),
         Cause::Stopped => PyKeyboardInterrupt::new_err(()),
     }
+}
+
+/// Fails as Python's `open` does where there is no such file, or none that may be read.
+pub(crate) fn there(path: &Path) -> PyResult<()> {
+    let about = |error: std::io::Error| std::io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    let what = fs::metadata(path).map_err(about)?;
+    if what.is_dir() {
+        return Err(about(ErrorKind::IsADirectory.into()).into());
+    }
+    // A pipe can be opened once only.
+    if what.is_file() { fs::File::open(path).map(drop).map_err(|error| about(error).into()) } else { Ok(()) }
 }

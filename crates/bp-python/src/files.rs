@@ -1,10 +1,6 @@
 //! The program's file formats.
 
-use std::{
-    fs::{self, File},
-    io::{Error, ErrorKind},
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 
 use bp_core::points;
 use bp_stereo::io::{self, Files, Limits, Picture, Raster};
@@ -14,7 +10,7 @@ use pyo3::prelude::*;
 use crate::{
     arrays::{image, map, plane},
     calibration::Calibration,
-    errors::raised,
+    errors::{raised, there},
 };
 
 /// Reads an image: PNG, JPEG, TIFF, PPM, PGM or PFM, as uint8 [height][width][3] (red, green, blue).
@@ -79,15 +75,4 @@ pub(crate) fn write_points(
     let calibration = calibration.0.of(map.size()).map_err(raised)?;
     let points = points(&map, &left, &calibration).map_err(raised)?;
     py.detach(|| io::write_points(&Files::default(), &path, points)).map_err(raised)
-}
-
-/// Fails as Python's `open` does where there is no such file, or none that may be read.
-pub(crate) fn there(path: &Path) -> PyResult<()> {
-    let about = |error: Error| Error::new(error.kind(), format!("{}: {error}", path.display()));
-    let what = fs::metadata(path).map_err(about)?;
-    if what.is_dir() {
-        return Err(about(ErrorKind::IsADirectory.into()).into());
-    }
-    // A pipe can be opened once only.
-    if what.is_file() { File::open(path).map(drop).map_err(|error| about(error).into()) } else { Ok(()) }
 }

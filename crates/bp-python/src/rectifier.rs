@@ -10,7 +10,11 @@ use bp_stereo::{
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::{arrays::pair, calibration::Calibration, errors::raised, files::there};
+use crate::{
+    arrays::pair,
+    calibration::Calibration,
+    errors::{raised, there},
+};
 
 /// The maps of one image: columns and rows.
 type Maps<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);

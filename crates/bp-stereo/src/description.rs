@@ -257,24 +257,6 @@ impl Stages {
     }
 }
 
-impl From<&crate::Disparity> for Answer {
-    fn from(answer: &crate::Disparity) -> Self {
-        let seconds = |time: Duration| time.as_secs_f64();
-        let crate::AnswerTimes { planning, matching, finishing } = answer.times;
-        Self {
-            times: Seconds {
-                planning: seconds(planning),
-                matching: seconds(matching.total),
-                finishing: seconds(finishing),
-                total: seconds(answer.times.total()),
-            },
-            energy: answer.energy.into(),
-            settings: answer.settings.clone(),
-            warnings: answer.warnings.iter().map(ToString::to_string).collect(),
-        }
-    }
-}
-
 impl From<bp_core::Energy> for Energy {
     fn from(energy: bp_core::Energy) -> Self {
         Self { total: energy.total(), data: energy.data, smoothness: energy.smoothness }

@@ -87,6 +87,24 @@ pub struct Disparity {
     pub warnings: Vec<Warning>,
 }
 
+impl From<&Disparity> for description::Answer {
+    fn from(answer: &Disparity) -> Self {
+        let seconds = |time: Duration| time.as_secs_f64();
+        let AnswerTimes { planning, matching, finishing } = answer.times;
+        Self {
+            times: description::Seconds {
+                planning: seconds(planning),
+                matching: seconds(matching.total),
+                finishing: seconds(finishing),
+                total: seconds(answer.times.total()),
+            },
+            energy: answer.energy.into(),
+            settings: answer.settings.clone(),
+            warnings: answer.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
 impl Matcher {
     /// Starts threads and opens the device that the options name.
     ///

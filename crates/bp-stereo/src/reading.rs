@@ -5,10 +5,13 @@ use std::path::Path;
 use bp_core::{DeviceKind, Image, StereoPair};
 use bp_io::{Limits, read_image};
 
-use crate::{Error, Memory, Rectifying, memory::PROGRAM};
+use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
 
 /// Bytes per pixel of an image in memory.
 const IMAGE: u64 = 3;
+
+/// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
+const RECTIFYING: u64 = 2 * IMAGE + POSITIONS;
 
 /// Bytes that may be read in any case: the threads and outputs that [`PROGRAM`] counts are not there yet. So small images
 /// are refused when their plan is known, with advice that suits it.
@@ -78,14 +81,15 @@ impl Room {
         let pair = StereoPair::new(one, other).map_err(named)?;
         match rectifying {
             Some(rectifying) => {
-                rectifying.rectified_within(&pair, self.without(2 * IMAGE * pair.size().pixels() as u64))
+                self.without(2 * IMAGE * pair.size().pixels() as u64).check(&pair, RECTIFYING, "rectifying")?;
+                rectifying.rectified(&pair)
             }
             None => Ok(pair),
         }
     }
 
     /// Fails if so many bytes for each pixel of a pair are not left for this step.
-    pub(crate) fn check(self, pair: &StereoPair, a_pixel: u64, step: &str) -> Result<(), Error> {
+    fn check(self, pair: &StereoPair, a_pixel: u64, step: &str) -> Result<(), Error> {
         let needed = a_pixel * pair.size().pixels() as u64;
         let Some(left) = self.limits.memory.filter(|&left| left < needed) else { return Ok(()) };
         let what = format!("{step} {}", pair.size());

@@ -9,10 +9,7 @@ use bp_core::{Calibration, Rectifier, Size, StereoPair};
 use bp_io::{Cameras, Contents, MOST_DESCRIPTION, hex};
 use sha2::{Digest, Sha256};
 
-use crate::{Error, reading::Room};
-
-/// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
-const A_PIXEL: u64 = 6 + POSITIONS;
+use crate::Error;
 
 /// Bytes per pixel of the rectifier.
 pub(crate) const POSITIONS: u64 = 16;
@@ -78,12 +75,6 @@ impl Rectifying {
     /// Those of [`Self::rectifier`], and [`Error::OutOfMemory`].
     pub fn rectified(&self, pair: &StereoPair) -> Result<StereoPair, Error> {
         Ok(self.rectifier(pair.size())?.rectified(pair.left(), pair.right())?)
-    }
-
-    /// [`Self::rectified`], if there is room for it beside the raw pair.
-    pub(crate) fn rectified_within(&self, pair: &StereoPair, room: Room) -> Result<StereoPair, Error> {
-        room.check(pair, A_PIXEL, "rectifying")?;
-        self.rectified(pair)
     }
 
     /// The geometry of the rectified pairs, if they have this size. Known once a pair was rectified.

@@ -6,6 +6,9 @@ use bp_core::{Error, Plan, Side};
 
 use crate::{Answer, Case};
 
+/// Bytes of scratch memory that a device may allocate beyond its plan.
+pub(crate) const SCRATCH_BYTES: u64 = 4096;
+
 /// A device failed the suite: the fault, and the plan that shows it.
 ///
 /// `Debug` prints the same words as `Display`, so that a test that returns a difference fails with them.

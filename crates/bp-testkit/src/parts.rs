@@ -7,7 +7,11 @@ use bp_core::{
     finish::never,
 };
 
-use crate::{Answer, Case, Difference, Fault, difference::same, noise_pair, solve, suite::SCRATCH_BYTES};
+use crate::{
+    Answer, Case, Difference, Fault,
+    difference::{SCRATCH_BYTES, same},
+    noise_pair, solve,
+};
 
 /// Sizes with even and odd cuts, more labels than a part has columns, cuts along a border, and parts of one column or row.
 fn cases() -> impl Iterator<Item = Case> {

@@ -7,15 +7,12 @@ use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, 
 use crate::{
     Answer, Case, Difference, Fault, cases,
     cases::outward_cases,
-    difference::same,
+    difference::{SCRATCH_BYTES, same},
     noise_pair,
     parts::compare_parts,
     random_case, solve,
     videos::{compare_outward_videos, compare_videos},
 };
-
-/// Bytes of scratch memory that a device may allocate beyond its plan.
-pub(crate) const SCRATCH_BYTES: u64 = 4096;
 
 /// Runs the whole suite on the `tested` device.
 ///

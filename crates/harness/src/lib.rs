@@ -25,4 +25,14 @@ mod statistics;
 mod summary;
 pub mod threads;
 
+use std::path::{Path, PathBuf};
+
 pub use failure::{Failure, Kind};
+
+/// Writes the report of any recorded run again. Returns the path of its page.
+///
+/// # Errors
+/// A message that names the file.
+pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
+    if speed::is_record(run) { speed::renew(run) } else { report::renew(run) }
+}

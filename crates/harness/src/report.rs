@@ -27,7 +27,6 @@ use crate::{
     failure::Failure,
     files::{write_text, write_whole},
     record::{RECORD_FILE, Record, load},
-    speed,
 };
 use results::Results;
 
@@ -106,14 +105,11 @@ pub fn pages_without_maps(record: &Record) -> Result<[String; 3], Failure> {
     Ok([markdown::page(&report), html::page(&report), readme::part(Path::new(""), Path::new(""), &report.results)])
 }
 
-/// Writes the report of a recorded run again. Returns the path of its page.
+/// Writes the report of a recorded run of `bp reproduce` again. Returns the path of its page.
 ///
 /// # Errors
 /// A message that names the file.
 pub fn renew(run: &Path) -> Result<PathBuf, Failure> {
-    if speed::is_record(run) {
-        return speed::renew(run);
-    }
     let (folder, record) = (folder(run), load(run)?);
     write(folder, &record)?;
     Ok(folder.join(PAGE_FILE))

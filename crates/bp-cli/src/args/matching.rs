@@ -10,9 +10,8 @@ use bp_io::Limits;
 use bp_stereo::{Labels, Quality, devices};
 
 use super::{
-    FinishArgs, ManyArgs, OutputArgs,
-    meaning::{AlignArg, align, labels},
-    named, positive, switch, threads,
+    FinishArgs, ManyArgs, OutputArgs, named, positive, switch, threads,
+    values::{AlignArg, align, labels},
 };
 
 /// `bp match`.

@@ -8,9 +8,9 @@ use std::{
 };
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
-use bp_io::{Geometry, MOST_TEXT, Picture, read_alignment};
+use bp_io::{Geometry, MOST_TEXT, Picture};
 use bp_stereo::{
-    Algorithm, Align, Hierarchy, Labels, Loops, Making, Options, Outputs, Quality, Rectifying,
+    Algorithm, Hierarchy, Loops, Making, Options, Outputs, Quality, Rectifying,
     batch::{Also, BatchOptions},
     pairs::{self, Source},
 };
@@ -268,45 +268,4 @@ impl PlanArgs {
         needs(self.z.is_some(), kind.divides_loops(), "--z", "--algorithm cfcsbp or ctcsbp")?;
         needs(self.seed_start.is_some(), kind.is_cut(), "--seed-start", "--algorithm ctbp or ctcsbp")
     }
-}
-
-/// The value of --align.
-#[derive(Clone, Debug)]
-pub(crate) enum AlignArg {
-    Off,
-    Auto,
-    /// The alignment of a camera, in a file that may be missing.
-    File(PathBuf),
-}
-
-impl AlignArg {
-    pub(crate) fn file(&self) -> Option<&PathBuf> {
-        if let Self::File(path) = self { Some(path) } else { None }
-    }
-
-    fn meaning(&self) -> Result<Align, Failure> {
-        match self {
-            Self::Off => Ok(Align::Off),
-            Self::File(path) if path.exists() => Ok(Align::Known(read_alignment(path)?)),
-            Self::Auto | Self::File(_) => Ok(Align::Auto),
-        }
-    }
-}
-
-/// Parses the value of --align.
-pub(super) fn align(text: &str) -> Result<AlignArg, String> {
-    match text {
-        "off" => Ok(AlignArg::Off),
-        "auto" => Ok(AlignArg::Auto),
-        "" => Err("must be auto, off or a file".to_owned()),
-        path => Ok(AlignArg::File(path.into())),
-    }
-}
-
-/// Parses the value of --labels.
-pub(super) fn labels(text: &str) -> Result<Labels, String> {
-    let most = bp_core::MAX_LABELS;
-    let count = || text.parse().ok().filter(|count| (1..=most).contains(count));
-    let labels = if text == "auto" { Some(Labels::Auto) } else { count().map(Labels::Count) };
-    labels.ok_or_else(|| format!("must be auto or a number from 1 to {most}"))
 }

@@ -8,7 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{file, instructions, subject::Renewal};
+use super::{file, subject::Renewal};
 use crate::{failure::Failure, machine, record::Machine};
 
 /// A baseline file. Programs identify its machine by the file's name, people by its fields.
@@ -102,7 +102,7 @@ impl Baselines {
 fn elsewhere(folder: &Path, here: &Path) -> Result<Vec<Baseline>, Failure> {
     let Ok(files) = fs::read_dir(folder) else { return Ok(Vec::new()) };
     let is_other = |path: &PathBuf| {
-        let others = [ANYWHERE, instructions::FILE].map(|name| folder.join(name));
+        let others = [ANYWHERE, file::INSTRUCTIONS].map(|name| folder.join(name));
         path.extension().is_some_and(|extension| extension == "json") && path != here && !others.contains(path)
     };
     let mut paths: Vec<_> = files.flatten().map(|file| file.path()).filter(is_other).collect();

@@ -16,9 +16,6 @@ use bp_stereo::Watch;
 
 use crate::{failure::Failure, report::format::whole};
 
-/// Name of the baseline file.
-pub(super) const FILE: &str = "instructions.json";
-
 /// A count may grow by this fraction. The same program takes the same instructions, but a new build of the same sources
 /// may differ by a few.
 const TOLERANCE: f64 = 0.01;
@@ -39,10 +36,10 @@ pub struct CountJudgement {
 pub fn instructions(baselines: &Path, watch: &Watch<'_>) -> Result<CountJudgement, Failure> {
     let missing = "--instructions needs valgrind; install it, or leave the option out";
     let valgrind = callgrind::valgrind().ok_or_else(|| Failure::unavailable(missing))?;
-    let recorded: Option<Counts> = file::read(&baselines.join(FILE))?;
+    let recorded: Option<Counts> = file::read(&baselines.join(file::INSTRUCTIONS))?;
     let counts = callgrind::count(valgrind, watch)?;
     let unlike = match &recorded {
-        None => Some(format!("there is no {}", baselines.join(FILE).display())),
+        None => Some(format!("there is no {}", baselines.join(file::INSTRUCTIONS).display())),
         Some(recorded) if recorded.tools() != counts.tools() => Some(format!("it is of {}", recorded.tools())),
         Some(_) => None,
     };
@@ -96,7 +93,7 @@ impl CountJudgement {
 
     /// Writes the counts as the new baseline; returns the file's name.
     pub fn update(&self) -> Result<String, Failure> {
-        let path = self.baselines.join(FILE);
+        let path = self.baselines.join(file::INSTRUCTIONS);
         file::write(&path, &self.counts)?;
         Ok(path.display().to_string())
     }

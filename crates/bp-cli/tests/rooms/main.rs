@@ -1,6 +1,8 @@
 //! The architecture: which crates may depend on each other, and what only the program may do.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+mod circles;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
@@ -121,5 +123,18 @@ fn libraries_print_nothing_and_change_no_panic_hook() {
         {
             assert!(is_comment || !line.contains(word), "{}: {line}", path.display());
         }
+    }
+}
+
+#[test]
+fn no_modules_of_a_crate_import_each_other_in_a_circle() {
+    for name in packages().into_keys().filter(|name| name != "bp-shaders") {
+        let folder = root().join("crates").join(&name).join("src");
+        let mut sources: BTreeMap<PathBuf, String> = BTreeMap::new();
+        for (path, line) in lines(&folder) {
+            *sources.entry(path.strip_prefix(&folder).unwrap().to_owned()).or_default() += &(line + "\n");
+        }
+        let circle = circles::circle(&sources);
+        assert!(circle.is_none(), "{name}: {}", circle.unwrap_or_default().join(" -> "));
     }
 }
