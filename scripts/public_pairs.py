@@ -134,4 +134,4 @@ def markdown(heads, rows):
 def write(path, report):
     if path:
         path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(report, indent=1) + "\n")
+        path.write_text(json.dumps(report, indent=1) + "\n")

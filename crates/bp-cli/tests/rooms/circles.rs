@@ -73,15 +73,13 @@ fn holder(import: &[String], modules: &BTreeMap<Names, Module>, depth: usize) ->
 }
 
 fn module(own: &Names, text: &str, paths: &BTreeSet<Names>) -> Module {
-    let mut module = Module::default();
     let code = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let mut module = Module::default();
     let mut rest = code.as_str();
-    // Imports: their paths, with all groups written out.
     while let Some((before, after)) = split_import(rest) {
         let (import, after) = after.split_once(';').unwrap_or((after, ""));
         let is_handed_on = before.lines().last().is_some_and(|line| line.trim_start().starts_with("pub"));
-        for names in written_out(import) {
-            let Some(names) = absolute(own, &names, paths) else { continue };
+        for names in written_out(import).iter().filter_map(|names| absolute(own, names, paths)) {
             if let Some(name) = names.last().filter(|_| is_handed_on) {
                 module.hands_on.insert(name.clone(), names.clone());
             }
@@ -89,13 +87,19 @@ fn module(own: &Names, text: &str, paths: &BTreeSet<Names>) -> Module {
         }
         rest = after;
     }
-    // Paths within the code.
-    for start in ["crate::", "super::"].into_iter().flat_map(|word| code.match_indices(word).map(|(at, _)| at)) {
-        let end = code[start..].find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(0);
-        let names: Names = code[start..start + end].split("::").map(str::to_owned).collect();
-        module.imports.extend(absolute(own, &names, paths));
-    }
+    module.imports.extend(within(&code).iter().filter_map(|names| absolute(own, names, paths)));
     module
+}
+
+/// The paths within code that begin at the crate's root or a module around.
+fn within(code: &str) -> Vec<Names> {
+    let starts = ["crate::", "super::"].into_iter().flat_map(|word| code.match_indices(word));
+    let path = |start: usize| {
+        let path = &code[start..];
+        let end = path.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(path.len());
+        path[..end].split("::").map(str::to_owned).collect()
+    };
+    starts.map(|(start, _)| path(start)).collect()
 }
 
 /// The text before and after the next word `use`.
