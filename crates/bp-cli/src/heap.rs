@@ -1,6 +1,6 @@
 //! How much freed memory the program keeps.
 
-/// What glibc keeps of freed memory: buffers of up to this many bytes, and so many bytes in all, at the end of the heap.
+/// What glibc keeps of freed memory: buffers below this many bytes, and this many bytes at the end of the heap.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 struct Kept {
     buffer: i32,
@@ -11,8 +11,8 @@ struct Kept {
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LITTLE: Kept = Kept { buffer: 64 << 10, all: 128 << 10 };
 
-/// Buffers of images of a megapixel or two are kept for the next pair: mapping their pages anew takes up to an eighth of a
-/// match. `bp_stereo` leaves room for this where nobody limits the memory.
+/// Buffers of images of up to two megapixels are kept for the next pair: mapping their pages anew takes up to an eighth of a
+/// match. `bp_stereo` leaves about as much memory free where nobody limits it.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MUCH: Kept = Kept { buffer: 8 << 20, all: 32 << 20 };
 

@@ -5,10 +5,16 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{DataCost, EdgeLevels, Error, Image, Model, StereoPair, image::grey};
+use crate::{
+    DataCost, EdgeLevels, Error, Image, Model, Size, StereoPair,
+    image::{APRON, grey},
+};
 
 /// Rows that one thread adds up. Only their features are held.
 const ROWS: usize = 32;
+
+/// The most bytes that a profile compares for each pixel.
+const MOST_FEATURES: usize = 4;
 
 /// The energy of a labelling in the units of its profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +42,14 @@ impl Energy {
             .try_reduce(Self::default, |a, b| {
                 Ok(Self { data: a.data + b.data, smoothness: a.smoothness + b.smoothness })
             })
+    }
+
+    /// The temporary bytes of [`Energy::of`] for images of this size on this many threads: colours and features of some rows of
+    /// both images.
+    #[must_use]
+    pub fn temporary_bytes(size: Size, threads: usize) -> u64 {
+        let a_column = 2 * (3 * (ROWS + 2 * APRON) + MOST_FEATURES * ROWS) + 2;
+        size.height.div_ceil(ROWS).min(threads) as u64 * (a_column * size.width) as u64
     }
 
     /// The data costs of some rows, and the smoothness costs of the edges within them and to the row below.
@@ -76,8 +90,8 @@ fn smoothness(level: Level, edges: &EdgeLevels, labels: [&[u16]; 2], greys: [&[u
     dispatch!(level, simd => smoothness_by(simd, edges, labels, greys))
 }
 
-/// Compares the costs of an edge's level and of all levels before it: the least of them is that of its own level, because costs never
-/// rise from level to level.
+/// Compares the costs of an edge's level and of all levels before it. The least of them is that of its own level, because
+/// costs never rise from level to level.
 #[inline(always)]
 fn smoothness_by<S: Simd>(simd: S, edges: &EdgeLevels, labels: [&[u16]; 2], greys: [&[u8]; 2]) -> u64 {
     let levels = edges.smoothness().map(|level| [level.slope, level.truncation].map(u32::from));
@@ -138,7 +152,7 @@ mod tests {
     #[test]
     fn rows_that_are_added_up_apart_give_the_sum_of_single_pixels() {
         let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);
-        for (width, height) in [(1, 1), (1, 70), (7, 2 * ROWS), (5, 2 * ROWS + 1)] {
+        for (width, height) in [(1, 1), (1, 70), (7, 2 * ROWS), (5, 2 * ROWS + 1), (150, 3)] {
             let view = |from: usize| Image::from_rgb(width, height, (from..from + width * height).map(noise).collect());
             let pair = StereoPair::new(view(0).unwrap(), view(100).unwrap()).unwrap();
             let model = Model::new(Profile::Census16, 5).unwrap();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::{Node, Size};
 
 /// Up to 64 columns of rows that are passed together: those of a band, or those around a seam. Under
-/// [`Settings::label_sets`](crate::Settings::label_sets) its nodes share a [`LabelSet`].
+/// [`Settings::label_sets`](crate::Settings::label_sets) its nodes share a [`LabelSet`](crate::LabelSet).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Patch {
     /// Its columns.

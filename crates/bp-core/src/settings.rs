@@ -250,9 +250,10 @@ pub struct Settings {
     /// coarser grids stay unclipped. Clipping lowers the energy and the root mean squared error of [`Algorithm::Sweep`].
     /// It is off for the algorithms of the thesis.
     pub coarse_clip: bool,
-    /// Whether the nodes of the finest grids ([`Plan::most_grids_with_label_sets`](crate::Plan::most_grids_with_label_sets)) may take only the labels that the
-    /// next coarser grid's answer makes likely, see [`LabelSet`](crate::LabelSet). Only under [`Schedule::Sweep`], and without
-    /// effect on fewer than three grids. The coarsest grid always has all labels.
+    /// Whether the nodes of the finest grids may take only the labels that the next coarser grid's answer makes likely, see
+    /// [`LabelSet`](crate::LabelSet). How many grids that are depends on the number of labels
+    /// ([`Plan::most_grids_with_label_sets`](crate::Plan::most_grids_with_label_sets)). Only under [`Schedule::Sweep`], and
+    /// without effect on fewer than three grids. The coarsest grid always has all labels.
     ///
     /// The labels of the coarser grid are decided as those of grid 0. Then the nodes of each [`Patch`](crate::Patch) of the
     /// next finer grid share a set, and other labels do not exist for them:

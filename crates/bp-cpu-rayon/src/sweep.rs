@@ -8,6 +8,7 @@
 
 mod block;
 mod costs;
+mod crossings;
 mod decode;
 mod edges;
 mod lists;

@@ -1,13 +1,13 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Plan, Schedule, Size, Tiling, finish};
+use bp_core::{Energy, Plan, Schedule, Size, Tiling, finish};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
 /// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
 pub(crate) const PROGRAM: u64 = 22 << 20;
 
-/// Bytes that allocators may keep of freed memory, unless the caller limits memory and has them keep less.
+/// About the bytes that allocators keep of freed memory where the caller does not limit memory.
 const KEPT: u64 = 32 << 20;
 
 /// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
@@ -134,7 +134,7 @@ struct Bytes {
     held: u64,
     /// Allocated later and then held, or reserved, until the end.
     coming: u64,
-    /// Held once the labels are selected. Computing their energy needs less than the steps after it.
+    /// Held once the labels are selected.
     finishing: u64,
 }
 
@@ -160,7 +160,7 @@ impl Bytes {
     }
 }
 
-/// Temporary bytes for finishing a map of this size on the threads of the current pool.
+/// Temporary bytes for finishing a map of this size, and for its energy, on the threads of the current pool.
 fn finishing(options: &Options, size: Size) -> u64 {
     let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
     let framed = MAP * ((size.width + FRAME) * (size.height + FRAME)) as u64;
@@ -169,7 +169,8 @@ fn finishing(options: &Options, size: Size) -> u64 {
     let trusted = if options.confidence { a_pixel(CONFIDENCE) + 2 * framed } else { 0 };
     let speckles = if options.speckle.is_some() { a_pixel(SPECKLE) } else { 0 };
     let refined = if options.finish().subpixel { refined } else { 0 };
-    filtered.max(refined).max(trusted).max(speckles)
+    let judged = Energy::temporary_bytes(size, rayon::current_num_threads());
+    filtered.max(refined).max(judged).max(trusted).max(speckles)
 }
 
 /// A tiling in words.
@@ -188,12 +189,13 @@ struct Limit {
 }
 
 impl Limit {
-    /// The lower of `max_memory` and the memory that is held or free, less what allocators keep. The latter counts only if the
-    /// device has no memory of its own.
+    /// The lower of `max_memory` and the memory that is held or free. Without `max_memory`, what allocators keep is left free. The
+    /// free memory counts only if the device has none of its own.
     fn of(options: &Options, opened: &Opened, held: u64) -> Self {
         let free = Memory::available_to(opened.info.kind).map_or(u64::MAX, |free| free.saturating_add(held));
-        match options.max_memory.filter(|&allowed| allowed <= free) {
-            Some(bytes) => Self { bytes, reason: "allowed by `max_memory`", can_be_raised: true },
+        match options.max_memory {
+            Some(bytes) if bytes <= free => Self { bytes, reason: "allowed by `max_memory`", can_be_raised: true },
+            Some(_) => Self { bytes: free, reason: "available", can_be_raised: false },
             None => Self { bytes: free.saturating_sub(KEPT), reason: "available", can_be_raised: false },
         }
     }

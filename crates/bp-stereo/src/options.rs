@@ -64,7 +64,7 @@ pub struct Options {
     /// Threads of the backend rayon and, on every backend, of what follows matching; `None` means RAYON_NUM_THREADS or, if that is not set, one per processor.
     pub threads: Option<usize>,
     /// Most bytes that the program may hold, including images and answer. Larger pairs are matched in tiles.
-    /// `None` means the free memory.
+    /// `None` means the free memory, less 32 MiB.
     pub max_memory: Option<u64>,
 }
 

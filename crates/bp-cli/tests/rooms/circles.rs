@@ -64,65 +64,65 @@ fn way_back(
 /// The module that a name comes from, behind all modules that hand it on.
 fn holder(import: &[String], modules: &BTreeMap<Names, Module>, depth: usize) -> Names {
     let len = (0..=import.len()).rev().find(|&len| modules.contains_key(&import[..len])).unwrap_or(0);
-    let module = import[..len].to_vec();
-    let handed_on = import.get(len).and_then(|name| modules.get(&module)?.hands_on.get(name));
+    let (module, rest) = import.split_at(len);
+    let handed_on = rest.first().and_then(|name| modules.get(module)?.hands_on.get(name));
     match handed_on {
-        Some(other) if depth < 8 => holder(other, modules, depth + 1),
-        _ => module,
+        Some(other) if depth < 8 => holder(&[other, &rest[1..]].concat(), modules, depth + 1),
+        _ => module.to_vec(),
     }
 }
 
 fn module(own: &Names, text: &str, paths: &BTreeSet<Names>) -> Module {
-    let code = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let code: Vec<&str> = text.lines().map(str::trim_start).filter(|line| !line.starts_with("//")).collect();
     let mut module = Module::default();
-    let mut rest = code.as_str();
-    while let Some((before, after)) = split_import(rest) {
-        let (import, after) = after.split_once(';').unwrap_or((after, ""));
-        let is_handed_on = before.lines().last().is_some_and(|line| line.trim_start().starts_with("pub"));
-        for names in written_out(import).iter().filter_map(|names| absolute(own, names, paths)) {
-            if let Some(name) = names.last().filter(|_| is_handed_on) {
-                module.hands_on.insert(name.clone(), names.clone());
-            }
+    for import in imports(&code) {
+        for (name, names) in written_out(&import) {
+            let Some(names) = absolute(own, &names, paths) else { continue };
+            // Modules within this one see what it imports, whether that is public or not.
+            module.hands_on.insert(name, names.clone());
             module.imports.push(names);
         }
-        rest = after;
     }
-    module.imports.extend(within(&code).iter().filter_map(|names| absolute(own, names, paths)));
+    module.imports.extend(within(&code.join("\n")).iter().filter_map(|names| absolute(own, names, paths)));
     module
+}
+
+/// The text of each import, from after the word `use` to its semicolon.
+fn imports(code: &[&str]) -> Vec<String> {
+    let start = |line: &str| {
+        let after = line.strip_prefix("pub").map_or(line, |rest| rest.split_once(')').map_or(rest, |(_, rest)| rest));
+        after.trim_start().strip_prefix("use ").map(str::to_owned)
+    };
+    let text = |(i, line): (usize, &&str)| Some([start(line)?, code[i + 1..].join(" ")].join(" "));
+    let all = code.iter().enumerate().filter_map(text);
+    all.map(|text| text.split(';').next().unwrap_or_default().to_owned()).collect()
 }
 
 /// The paths within code that begin at the crate's root or a module around.
 fn within(code: &str) -> Vec<Names> {
-    let starts = ["crate::", "super::"].into_iter().flat_map(|word| code.match_indices(word));
+    let is_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+    let starts = ["crate::", "super::"].into_iter().flat_map(|word| code.match_indices(word).map(|(start, _)| start));
     let path = |start: usize| {
         let path = &code[start..];
-        let end = path.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(path.len());
+        let end = path.find(|c| !is_of_name(c)).unwrap_or(path.len());
         path[..end].split("::").map(str::to_owned).collect()
     };
-    starts.map(|(start, _)| path(start)).collect()
+    starts.filter(|&start| !code[..start].ends_with(is_of_name)).map(path).collect()
 }
 
-/// The text before and after the next word `use`.
-fn split_import(text: &str) -> Option<(&str, &str)> {
-    let is_word = |at: usize| at == 0 || text[..at].ends_with(['\n', ' ', ')']);
-    let (at, word) = text.match_indices("use ").find(|&(at, _)| is_word(at))?;
-    Some((&text[..at], &text[at + word.len()..]))
-}
-
-/// `a::{b, c::d}` as `a::b` and `a::c::d`.
-fn written_out(import: &str) -> Vec<Names> {
+/// `a::{b, c::d as e}` as b, which is `a::b`, and e, which is `a::c::d`.
+fn written_out(import: &str) -> Vec<(String, Names)> {
     let Some((head, group)) = import.split_once('{') else {
-        let path = import.split(" as ").next().unwrap_or_default().trim().trim_end_matches("::self");
-        return vec![path.split("::").map(|name| name.trim().to_owned()).collect()];
+        let (path, name) = import.split_once(" as ").map_or((import, None), |(path, name)| (path, Some(name)));
+        let path = path.trim().trim_end_matches("::self");
+        let names: Names = path.split("::").map(|name| name.trim().to_owned()).collect();
+        let name = name.map_or_else(|| names.last().cloned().unwrap_or_default(), |name| name.trim().to_owned());
+        return vec![(name, names)];
     };
     let group = group.rsplit_once('}').map_or(group, |(group, _)| group);
     let (mut depth, mut parts) = (0, vec![String::new()]);
     for c in group.chars() {
-        depth += match c {
-            '{' => 1,
-            '}' => -1,
-            _ => 0,
-        };
+        depth += i32::from(c == '{') - i32::from(c == '}');
         match c {
             ',' if depth == 0 => parts.push(String::new()),
             c => parts.last_mut().unwrap().push(c),
@@ -166,6 +166,14 @@ mod tests {
             assert_eq!(circle_of(&[root, first, ("b.rs", back)]), Some("a -> b -> a".to_owned()), "{back}");
         }
         assert_eq!(circle_of(&[root, first, ("b.rs", "// see crate::a\n")]), None);
+    }
+
+    #[test]
+    fn what_a_module_imports_goes_on_to_those_within_it() {
+        let room = ("a.rs", "use c::{\n    C as D,\n};\n");
+        let (first, second) = (("a/b.rs", "use super::{self as up, D};\n"), ("a/c.rs", "use super::super::a::b::f;\n"));
+        assert_eq!(circle_of(&[("lib.rs", ""), room, first, ("a/c.rs", "")]), None);
+        assert_eq!(circle_of(&[("lib.rs", ""), room, first, second]), Some("a::b -> a::c -> a::b".to_owned()));
     }
 
     #[test]

@@ -36,8 +36,10 @@ const LEAST_STEP: f32 = 0.03;
 /// A match farther than this from its start is another one.
 const FARTHEST: f32 = 1.5;
 
+/// [`FARTHEST`] in whole pixels.
+const FAR: usize = FARTHEST.ceil() as usize;
+
 /// The columns and rows that windows this far away may read.
-const FAR: usize = 2;
 const AREA: [usize; 2] = [WIDE + 2 * FAR, HEIGHT + 3 + 2 * FAR];
 
 /// A window matches if the sum of its squared differences is at most this share of the sum of its squared contrasts.

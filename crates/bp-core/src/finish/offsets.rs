@@ -54,7 +54,7 @@ pub(super) fn write_offsets(
 }
 
 /// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows. The
-/// rows that means are taken of need less.
+/// rows that means are taken of need less, except in maps of a few columns, where they are about a kilobyte.
 #[must_use]
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
     size.height.div_ceil(ROWS).min(threads) as u64 * Windows::bytes(size.width)

@@ -10,6 +10,9 @@ pub const LONGEST_SIDE: usize = 200;
 /// The fewest rows that one thread computes.
 const MIN_ROWS: usize = 16;
 
+/// Columns that are added up together, unless a block has more.
+const TOGETHER: usize = 2048;
+
 /// The factor by which both sides are divided.
 pub(super) fn factor(size: Size) -> usize {
     size.width.max(size.height).div_ceil(LONGEST_SIDE)
@@ -28,14 +31,20 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
     means.par_chunks_exact_mut(columns).with_min_len(MIN_ROWS).enumerate().for_each(|(row, means)| {
         let ys = row * factor..((row + 1) * factor).min(height);
         let count = (ys.len() * factor.min(width)) as u32;
-        // Rows are added up first, because that takes vectors.
-        let mut sums = vec![0; width * 3];
-        for line in image.pixels()[ys.start * width..ys.end * width].chunks_exact(width) {
-            sums.iter_mut().zip(line.as_flattened()).for_each(|(sum, &value)| *sum += u32::from(value));
-        }
-        for (mean, block) in means.iter_mut().zip(sums.as_chunks::<3>().0.chunks(factor)) {
-            let sum = block.iter().fold([0; 3], |sum, column| [0, 1, 2].map(|i| sum[i] + column[i]));
-            *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
+        let together = (TOGETHER / factor).max(1);
+        for (part, means) in means.chunks_mut(together).enumerate() {
+            let first = part * together * factor;
+            let last = width.min(first + means.len() * factor);
+            // Rows are added up first, because that takes vectors.
+            let mut sums = vec![0; (last - first) * 3];
+            for y in ys.clone() {
+                let line = image.pixels()[y * width + first..y * width + last].as_flattened();
+                sums.iter_mut().zip(line).for_each(|(sum, &value)| *sum += u32::from(value));
+            }
+            for (mean, block) in means.iter_mut().zip(sums.as_chunks::<3>().0.chunks(factor)) {
+                let sum = block.iter().fold([0; 3], |sum, column| [0, 1, 2].map(|i| sum[i] + column[i]));
+                *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
+            }
         }
     });
     Image::from_grey(columns, rows, &means)

@@ -5,13 +5,12 @@
 
 use std::ops::Range;
 
-use bp_core::{EdgeLevels, Error, memory};
 use fearless_simd::dispatch;
 
 use super::{
     Sweep, Work,
     block::{Block, LANES, Padded},
-    lists::{Lists, Source, sources},
+    lists::{Lists, Source},
     messages::{Messages, Place},
     refine::At,
     send::{self, Slots, to_sides},
@@ -26,46 +25,6 @@ pub(crate) enum Start {
     Refined,
     /// The first messages of all rows. The last row holds those from below already, which came across a seam.
     RefinedAboveSeam,
-}
-
-/// For each entry, its source in the list of the patch to the left and in that to the right.
-#[derive(Default)]
-pub(crate) struct Crossings {
-    sources: Vec<[Source; 2]>,
-}
-
-impl Crossings {
-    pub(crate) fn fit(&mut self, entries: usize) -> Result<(), Error> {
-        memory::grow("label sets", &mut self.sources, entries, [Source::NONE; 2])
-    }
-
-    /// The most entries that there was ever room for.
-    pub(crate) fn most_entries(&self) -> usize {
-        self.sources.len()
-    }
-
-    /// Finds the sources of all entries.
-    pub(crate) fn find(&mut self, lists: &Lists, edges: &EdgeLevels) {
-        for patch in 0..lists.patches() {
-            let labels = lists.list(patch).labels;
-            let beside = [patch.checked_sub(1), Some(patch + 1).filter(|&next| next < lists.patches())];
-            for (index, other) in beside.into_iter().enumerate() {
-                let Some(other) = other else { continue };
-                let sources = sources(lists.list(other).labels, labels, edges);
-                let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
-                all.for_each(|(sources, source)| sources[index] = source);
-            }
-        }
-    }
-
-    pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.sources)
-    }
-}
-
-/// The bytes of the [`Crossings`] of so many entries.
-pub(crate) fn crossing_bytes(entries: usize) -> u64 {
-    (entries as u64).saturating_mul(size_of::<[Source; 2]>() as u64)
 }
 
 /// Rows that are passed together.
@@ -243,10 +202,10 @@ impl Pass<'_> {
             .split_at_mut(self.lists.range(before).len());
         let end = LANES as isize - 1;
         if plane == 1 {
-            let sources = &self.work.crossings.sources[self.lists.range(patch)];
+            let sources = self.work.crossings.of(self.lists.range(patch));
             carry(level, truncation, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
         } else {
-            let sources = &self.work.crossings.sources[self.lists.range(before)];
+            let sources = self.work.crossings.of(self.lists.range(before));
             carry(level, truncation, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
         }
     }

@@ -6,9 +6,9 @@ use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
 
 use super::{
     block::Block,
+    crossings::{self, Crossings},
     lists::{self, Lists},
     messages::{self, Messages},
-    pass::{self, Crossings},
     refine::{self, CoarseRows},
 };
 
@@ -65,7 +65,7 @@ fn windows(plan: &Plan) -> usize {
 pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
     let rows = BAND_ROWS.min(plan.image_size().height);
     let costs = ((costs(rows) * size_of::<Block>()) as u64).saturating_mul(entries as u64);
-    let work = costs + refine::bytes(entries) + pass::crossing_bytes(entries);
+    let work = costs + refine::bytes(entries) + crossings::bytes(entries);
     let window = work.saturating_add(messages::bytes(rows, entries)).saturating_add(lists::bytes(patches, entries));
     (windows(plan) as u64).saturating_mul(window)
 }
