@@ -48,7 +48,8 @@ impl Energy {
     /// both images.
     #[must_use]
     pub fn temporary_bytes(size: Size, threads: usize) -> u64 {
-        let a_column = 2 * (3 * (ROWS + 2 * APRON) + MOST_FEATURES * ROWS) + 2;
+        let (rows, known) = (size.height.min(ROWS), size.height.min(ROWS + 2 * APRON));
+        let a_column = 2 * (3 * known + MOST_FEATURES * rows) + 2;
         size.height.div_ceil(ROWS).min(threads) as u64 * (a_column * size.width) as u64
     }
 

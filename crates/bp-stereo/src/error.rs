@@ -11,7 +11,7 @@ use crate::watch::Stopped;
 pub enum Error {
     /// An error of the model, a plan, a backend or a device.
     #[error(transparent)]
-    Core(#[from] bp_core::Error),
+    Core(bp_core::Error),
     /// An error about a file.
     #[error(transparent)]
     File(#[from] bp_io::Error),
@@ -124,6 +124,13 @@ fn cause_of_file(error: &bp_io::Error) -> Cause {
     }
 }
 
+impl From<bp_core::Error> for Error {
+    /// A stop has one name, wherever it was noticed.
+    fn from(error: bp_core::Error) -> Self {
+        if error == bp_core::Error::Stopped { Self::Stopped } else { Self::Core(error) }
+    }
+}
+
 impl From<Stopped> for Error {
     fn from(Stopped: Stopped) -> Self {
         Self::Stopped
@@ -145,6 +152,11 @@ fn iec_or_more(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stop_is_the_same_error_wherever_it_was_noticed() {
+        assert_eq!([Error::from(bp_core::Error::Stopped), Error::from(Stopped)], [Error::Stopped, Error::Stopped]);
+    }
 
     #[test]
     fn bytes_are_rounded_up_to_what_is_enough() {
