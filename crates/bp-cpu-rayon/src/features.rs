@@ -9,7 +9,7 @@ use bp_core::{
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::shape::{self, BLOCK, MIN_ROWS, every_second};
+use crate::shape::{self, BLOCK, MIN_ROWS, deal, every_second};
 
 /// The features of both images of a pair, `[height][channel][parity][lane]`. The parity is that of the column.
 pub(crate) struct Features {
@@ -253,16 +253,4 @@ impl View<'_> {
 #[inline(always)]
 fn mean(a: u8, b: u8) -> u8 {
     (u16::from(a) + u16::from(b)).div_ceil(2) as u8
-}
-
-/// Writes a row block by block. `values(x, out)` computes the values of consecutive columns from x on, which alternate
-/// between the even and the odd plane.
-#[inline(always)]
-fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {
-    let mut block = [0; 2 * BLOCK];
-    for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
-        values(2 * BLOCK * index, &mut block[..even.len() + odd.len()]);
-        even.iter_mut().zip(block.iter().step_by(2)).for_each(|(out, &value)| *out = value);
-        odd.iter_mut().zip(block[1..].iter().step_by(2)).for_each(|(out, &value)| *out = value);
-    }
 }

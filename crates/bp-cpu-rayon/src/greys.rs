@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     compare::Vector,
-    shape::{BLOCK, Column, MIN_ROWS, Shape, every_second},
+    shape::{BLOCK, MIN_ROWS, Shape, deal, every_second},
 };
 
 /// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes. Empty if all
@@ -32,24 +32,30 @@ impl Greys {
         rows.for_each(|(y, row)| {
             let [even, odd] = planes_mut(&shape, row);
             let pixels = &image.pixels()[y * image.size().width + margin..][..shape.size.width];
-            dispatch!(level, simd => deal(simd, pixels, even, odd));
+            dispatch!(level, simd => load_row(simd, pixels, even, odd));
         });
     }
 
     /// Computes the grey values of a coarser grid: a node has the mean of its children, at most four.
-    pub(crate) fn coarsen(&mut self, fine: &Self) {
+    pub(crate) fn coarsen(&mut self, level: Level, fine: &Self) {
         let shape = self.shape;
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
         rows.for_each(|(y, row)| {
-            let planes = planes_mut(&shape, row);
-            let rows = [Some(2 * y), Some(2 * y + 1).filter(|&y| y < fine.shape.size.height)];
-            // Coarse column X has lane X of both fine planes as children.
-            let children = rows.into_iter().flatten().flat_map(|y| [fine.lanes(0, y), fine.lanes(1, y)]);
-            for Column { x, plane, lane } in shape.columns() {
-                let children = children.clone().enumerate().filter(|&(i, _)| x < fine.shape.nodes(i % 2));
-                let (sum, count) =
-                    children.fold((0, 0), |(sum, count), (_, lanes)| (sum + u16::from(lanes[x]), count + 1));
-                planes[plane][lane] = Model::coarse_grey(sum, count);
+            // Coarse column X has lane X of both fine planes as children. Where there is no second row or column, the first one
+            // counts twice.
+            let rows = [2 * y, (2 * y + 1).min(fine.shape.size.height - 1)];
+            let [[a, b], [c, d]] = rows.map(|y| [0, 1].map(|plane| fine.lanes(plane, y)));
+            let [even, odd] = planes_mut(&shape, row);
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || deal(even, odd, |first, means| {
+                    let inside = first..first + means.len();
+                    let children = a[inside.clone()].iter().zip(&b[inside.clone()]).zip(c[inside.clone()].iter().zip(&d[inside]));
+                    means.iter_mut().zip(children).for_each(|(mean, ((&a, &b), (&c, &d)))| *mean = mean_of([a, b, c, d]));
+                }),
+            ));
+            if let Some(x) = fine.shape.size.width.checked_sub(1).filter(|x| x % 2 == 0).map(|x| x / 2) {
+                [even, odd][x % 2][x / 2] = mean_of([a[x], a[x], c[x], c[x]]);
             }
         });
     }
@@ -102,9 +108,15 @@ fn planes_mut<'a>(shape: &Shape, row: &'a mut [u8]) -> [&'a mut [u8]; 2] {
     [&mut even[BLOCK..][..shape.nodes(0)], &mut odd[BLOCK..][..shape.nodes(1)]]
 }
 
+/// The grey value of a node with these children.
+#[inline(always)]
+fn mean_of(children: [u8; 4]) -> u8 {
+    Model::coarse_grey(children.map(u16::from).iter().sum(), 4)
+}
+
 /// Writes the grey values of a row to even and odd columns.
 #[inline(always)]
-fn deal<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
+fn load_row<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
     simd.vectorize(
         #[inline(always)]
         || {

@@ -121,3 +121,15 @@ pub(crate) fn lanes(size: Size) -> usize {
 pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
 }
+
+/// Writes a row block by block. `values(x, out)` computes the values of consecutive columns from x on, which alternate
+/// between the even and the odd plane.
+#[inline(always)]
+pub(crate) fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {
+    let mut block = [0; 2 * BLOCK];
+    for (index, (even, odd)) in even.chunks_mut(BLOCK).zip(odd.chunks_mut(BLOCK).chain([&mut [][..]])).enumerate() {
+        values(2 * BLOCK * index, &mut block[..even.len() + odd.len()]);
+        even.iter_mut().zip(block.iter().step_by(2)).for_each(|(out, &value)| *out = value);
+        odd.iter_mut().zip(block[1..].iter().step_by(2)).for_each(|(out, &value)| *out = value);
+    }
+}

@@ -168,7 +168,7 @@ impl Solver for RayonSolver {
         }
         self.costs[grid] = coarse;
         let (fine, coarse) = self.layouts.split_at_mut(grid);
-        coarse[0].greys.coarsen(&fine[grid - 1].greys);
+        coarse[0].greys.coarsen(self.level, &fine[grid - 1].greys);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! Data costs of the blocks of a row.
 
-use fearless_simd::{Simd, SimdBase, dispatch};
+use fearless_simd::{Simd, SimdBase};
 
 use super::{
     Sweep,
@@ -23,15 +23,24 @@ pub(crate) enum CostSource<'a> {
 
 impl CostSource<'_> {
     /// Writes the costs of both planes of a patch in row y, for these labels.
-    pub(crate) fn fill(&self, sweep: &Sweep<'_>, patch: usize, y: usize, labels: &[u16], costs: [&mut [Block]; 2]) {
+    #[inline(always)]
+    pub(crate) fn fill<S: Simd>(
+        &self,
+        simd: S,
+        sweep: &Sweep<'_>,
+        patch: usize,
+        y: usize,
+        labels: &[u16],
+        costs: [&mut [Block]; 2],
+    ) {
         match self {
-            Self::Computed(matching) => matching.costs(PatchRow { grid: sweep.grid, patch, y }, labels, costs),
+            Self::Computed(matching) => matching.costs(simd, PatchRow { grid: sweep.grid, patch, y }, labels, costs),
             Self::Stored(stored) => {
                 for (plane, costs) in costs.into_iter().enumerate() {
                     let first = (2 * y + plane) * sweep.layout.plane() + LANES * patch;
                     let entries = labels.iter().map(|&label| first + usize::from(label) * sweep.layout.lanes);
                     if sweep.plan.has_label_sets(sweep.grid) {
-                        restricted(sweep, stored, entries, costs);
+                        restricted(simd, sweep, stored, entries, costs);
                     } else {
                         copy(&stored.stored, entries, costs);
                     }
@@ -42,7 +51,14 @@ impl CostSource<'_> {
 }
 
 /// Normalises and clips costs again, for the labels of a list.
-fn restricted(sweep: &Sweep<'_>, stored: &Costs, entries: impl Iterator<Item = usize> + Clone, costs: &mut [Block]) {
+#[inline(always)]
+fn restricted<S: Simd>(
+    simd: S,
+    sweep: &Sweep<'_>,
+    stored: &Costs,
+    entries: impl Iterator<Item = usize> + Clone,
+    costs: &mut [Block],
+) {
     let clip = sweep.plan.clip(sweep.grid);
     match &stored.sums {
         Sums::None => copy(&stored.stored, entries, costs),
@@ -51,17 +67,18 @@ fn restricted(sweep: &Sweep<'_>, stored: &Costs, entries: impl Iterator<Item = u
         Sums::U32(sums) => return clipped(sums, entries, clip, costs),
         Sums::U64(sums) => return clipped(sums, entries, clip, costs),
     }
-    dispatch!(sweep.level, simd => normalise(simd, clip, costs));
+    normalise(simd, clip, costs);
 }
 
 impl Matching<'_> {
     /// Writes the costs of both planes of a patch of grid 0 or 1, for these labels.
-    fn costs(&self, at: PatchRow, labels: &[u16], [even, odd]: [&mut [Block]; 2]) {
+    #[inline(always)]
+    fn costs<S: Simd>(&self, simd: S, at: PatchRow, labels: &[u16], [even, odd]: [&mut [Block]; 2]) {
         let (clip, clips) = (self.plan.clip(at.grid), at.grid > 0 || !self.fits());
         let least = self.unclipped(at, labels, [&mut *even, &mut *odd]);
         for (plane, (costs, least)) in [even, odd].into_iter().zip(least).enumerate() {
             if clips {
-                dispatch!(self.level, simd => clip_above(simd, &least, clip, costs));
+                clip_above(simd, &least, clip, costs);
             }
             if at.grid == 0 {
                 self.fix_block(BlockStart { plane, lane: LANES * at.patch }, at.y, labels, costs);

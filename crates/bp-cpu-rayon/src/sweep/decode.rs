@@ -36,22 +36,49 @@ type Labels = [u16; LANES];
 impl Pass<'_> {
     /// Decides the labels of these rows, `[row][width]`, given those of the row above, if there are any.
     pub(crate) fn decode(&self, rows: Range<usize>, above: Option<&[u16]>, labels: &mut [u16]) {
+        let level = self.sweep.level;
         let mut above = above;
         for (row, y) in labels.chunks_exact_mut(self.sweep.layout.size.width).zip(rows) {
             let joined = above.filter(|_| self.sweep.layout.joined_above(y));
-            (0..self.lists.patches()).for_each(|patch| self.decide(patch, y % 2, y, joined, row));
-            (0..self.lists.patches()).for_each(|patch| self.decide(patch, 1 - y % 2, y, joined, row));
+            dispatch!(level, simd => self.decode_row(simd, y, joined, row));
             above = Some(row);
         }
     }
 
-    /// Decides the labels of the nodes of a plane of a patch. Those of the other plane are known if the nodes are odd.
-    fn decide(&self, patch: usize, plane: usize, y: usize, above: Option<&[u16]>, row: &mut [u16]) {
+    #[inline(always)]
+    fn decode_row<S: Simd>(&self, simd: S, y: usize, above: Option<&[u16]>, row: &mut [u16]) {
+        let patches = 0..self.lists.patches();
+        for patch in patches.clone() {
+            write(row, patch, self.decide::<_, false>(simd, patch, y, above, row));
+        }
+        // Written one patch late: the next one reads a column of this one, and would wait for it.
+        let mut late = None;
+        for patch in patches {
+            let planes = self.decide::<_, true>(simd, patch, y, above, row);
+            if let Some((patch, planes)) = late.replace((patch, planes)) {
+                write(row, patch, planes);
+            }
+        }
+        if let Some((patch, planes)) = late {
+            write(row, patch, planes);
+        }
+    }
+
+    /// Decides the labels of the even or the odd nodes of a patch. Even nodes come first.
+    #[inline(always)]
+    fn decide<S: Simd, const ODD: bool>(
+        &self,
+        simd: S,
+        patch: usize,
+        y: usize,
+        above: Option<&[u16]>,
+        row: &[u16],
+    ) -> [Labels; 2] {
+        let plane = if ODD { 1 - y % 2 } else { y % 2 };
         let (entries, range, at) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
         let messages = self.messages.at(Place { entries, row: at, plane, range: &range });
-        let is_odd = plane != y % 2;
         let first = (2 * LANES * patch + plane) as isize;
-        let [left, right] = if is_odd { [first - 1, first + 1].map(|x| every_second(row, x)) } else { [[0; LANES]; 2] };
+        let [left, right] = if ODD { [first - 1, first + 1].map(|x| every_second(row, x)) } else { [[0; LANES]; 2] };
         // By slot: the neighbour in the same pair of columns, that in the next pair, and that above.
         let [same, next] = if plane == 0 { [right, left] } else { [left, right] };
         let known = [same, next, every_second(above.unwrap_or_default(), first)];
@@ -67,14 +94,12 @@ impl Pass<'_> {
             masks: self.masks(plane, above.is_some()),
             greys: self.sweep.layout.around(plane, y),
         };
-        let level = self.sweep.level;
-        let labels = match (is_odd, undecided.greys.is_some()) {
-            (false, false) => dispatch!(level, simd => undecided.decide::<_, false, false>(simd, &known)),
-            (false, true) => dispatch!(level, simd => undecided.decide::<_, false, true>(simd, &known)),
-            (true, false) => dispatch!(level, simd => undecided.decide::<_, true, false>(simd, &known)),
-            (true, true) => dispatch!(level, simd => undecided.decide::<_, true, true>(simd, &known)),
+        let labels = if undecided.greys.is_some() {
+            undecided.decide::<_, ODD, true>(simd, &known)
+        } else {
+            undecided.decide::<_, ODD, false>(simd, &known)
         };
-        row.iter_mut().skip(first as usize).step_by(2).zip(labels).for_each(|(out, label)| *out = label);
+        if plane == 0 { [labels, same] } else { [same, labels] }
     }
 
     /// By slot, 255 where a node has a neighbour, `[lane]`.
@@ -85,12 +110,33 @@ impl Pass<'_> {
 }
 
 /// The labels of every second column from x on; 0 outside the image.
+#[inline(always)]
 fn every_second(row: &[u16], x: isize) -> Labels {
     let mut labels = [0; LANES];
+    let inside = usize::try_from(x).ok().and_then(|x| row.get(x..)?.first_chunk::<{ 2 * LANES - 1 }>());
+    // A known number of columns is dealt by vectors.
+    if let Some(columns) = inside {
+        labels.iter_mut().enumerate().for_each(|(lane, label)| *label = columns[2 * lane]);
+        return labels;
+    }
     let first = usize::from(x < 0);
     let columns = row.get((x + 2 * first as isize) as usize..).unwrap_or_default();
     labels[first..].iter_mut().zip(columns.iter().step_by(2)).for_each(|(label, &decided)| *label = decided);
     labels
+}
+
+/// Writes the labels of both planes of a patch, as far as there are columns.
+#[inline(always)]
+fn write(row: &mut [u16], patch: usize, planes: [Labels; 2]) {
+    let columns = &mut row[2 * LANES * patch..];
+    let mut labels = [0; 2 * LANES];
+    for (pair, (even, odd)) in labels.chunks_exact_mut(2).zip(planes[0].iter().zip(&planes[1])) {
+        (pair[0], pair[1]) = (*even, *odd);
+    }
+    match columns.first_chunk_mut() {
+        Some(columns) => *columns = labels,
+        None => columns.copy_from_slice(&labels[..columns.len()]),
+    }
 }
 
 /// The nodes of a block.
@@ -119,19 +165,20 @@ impl Undecided<'_> {
             let from = usize::from(self.list.labels[entry]);
             let end = entry + self.list.labels[entry..].partition_point(|&label| usize::from(label) < from + CHUNK);
             let before = best;
-            let index = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &mut best);
+            let nearest = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &mut best);
             let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
-            for lane in 0..LANES {
-                if better[lane] > 0 {
-                    labels[lane] = self.list.labels[entry + usize::from(index[lane])];
-                }
+            let (better, nearest): ([u8; LANES], [u8; LANES]) = (better.into(), nearest.into());
+            for ((label, better), nearest) in labels.iter_mut().zip(better).zip(nearest) {
+                let decided = (from as u16 + u16::from(nearest)).wrapping_sub(FAR as u16);
+                *label = if better > 0 { decided } else { *label };
             }
             entry = end;
         }
         labels
     }
 
-    /// Compares these entries with the best so far, and returns for each node the best of them, counted from the first.
+    /// Compares these entries with the best so far, and returns for each node the label of the best of them, counted from [`FAR`]
+    /// below the first.
     #[inline(always)]
     fn chunk<S: Simd, const ODD: bool, const LEVELS: bool>(
         &self,
@@ -149,7 +196,7 @@ impl Undecided<'_> {
         let (labels, costs) = (&self.list.labels[entries.clone()], &self.costs[entries.clone()]);
         let (same, next) = (&self.same[entries.clone()], &self.next[entries.clone()]);
         let below = &self.below[entries][..len];
-        let mut index = Bytes::splat(simd, 0);
+        let mut nearest = Bytes::splat(simd, 0);
         for i in 0..len {
             let here = Bytes::splat(simd, (usize::from(labels[i]) - from + FAR) as u8);
             let mut sum = below[i].load(simd);
@@ -164,10 +211,10 @@ impl Undecided<'_> {
             }
             // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
             let belief = costs[i].load(simd).saturating_add(sum);
-            index = belief.simd_lt(*best).select(Bytes::splat(simd, i as u8), index);
+            nearest = belief.simd_lt(*best).select(here, nearest);
             *best = best.min(belief);
         }
-        index
+        nearest
     }
 }
 

@@ -143,8 +143,9 @@ impl Source {
     /// The value for this label.
     #[inline(always)]
     pub(crate) fn value(self, level: usize, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
-        let [below, above] = self.nearest(level).map(|(entry, cost)| message(entry).saturating_add(cost));
-        below.min(above).min(truncation)
+        // In 16 bits no sum saturates, and none above the truncation counts.
+        let [below, above] = self.nearest(level).map(|(entry, cost)| u16::from(message(entry)) + u16::from(cost));
+        below.min(above).min(truncation.into()) as u8
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::dispatch;
+use fearless_simd::{Simd, dispatch};
 
 use super::{
     Sweep, Work,
@@ -15,6 +15,7 @@ use super::{
     refine::At,
     send::{self, Slots, to_sides},
 };
+use crate::greys::Around;
 
 /// The messages that a pass down starts with.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -53,60 +54,72 @@ enum Sends {
 
 /// The nodes of a plane of a patch in row y.
 #[derive(Clone, Copy)]
-struct Nodes {
+struct Nodes<'a> {
     patch: usize,
     plane: usize,
     y: usize,
+    greys: Option<Around<'a>>,
 }
 
 impl Pass<'_> {
     /// Passes down all rows.
     pub(crate) fn forward(&mut self, start: Start) {
         self.work.coarse_rows.clear();
-        self.rows.clone().for_each(|y| self.forward_row(y, start));
+        let level = self.sweep.level;
+        for y in self.rows.clone() {
+            dispatch!(level, simd => self.forward_row(simd, y, start));
+        }
     }
 
     /// Passes up these rows.
     pub(crate) fn backward(&mut self, rows: Range<usize>) {
-        rows.rev().for_each(|y| self.backward_row(y));
+        let level = self.sweep.level;
+        for y in rows.rev() {
+            dispatch!(level, simd => self.backward_row(simd, y));
+        }
     }
 
     /// Even nodes send left, right and down; then odd nodes send down. The last row sends nothing down.
-    fn forward_row(&mut self, y: usize, start: Start) {
+    #[inline(always)]
+    fn forward_row<S: Simd>(&mut self, simd: S, y: usize, start: Start) {
         let onward = y + 1 < self.rows.end && self.sweep.layout.joined_above(y + 1);
         let (even, odd) = (y % 2, 1 - y % 2);
+        let greys = [0, 1].map(|plane| self.sweep.layout.around(plane, y));
         if let Some(coarser) = self.sweep.coarser.filter(|_| start != Start::Held) {
-            self.work.coarse_rows.read(self.sweep.level, coarser, self.lists, y);
+            self.work.coarse_rows.read(simd, coarser, self.lists, y);
         }
         for patch in 0..=self.lists.patches() {
             if patch < self.lists.patches() {
                 if start != Start::Held {
-                    self.first_visit(patch, y, start);
+                    self.first_visit(simd, patch, y, start);
                 }
                 let sends = if onward { Sends::SidesAndAhead } else { Sends::Sides };
-                self.send(Way::Down, Nodes { patch, plane: even, y }, sends);
+                self.send(simd, Way::Down, Nodes { patch, plane: even, y, greys: greys[even] }, sends);
                 self.close(patch, y);
-                self.cross(patch, even, y);
+                self.cross(Nodes { patch, plane: even, y, greys: greys[0] });
             }
             if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
-                self.send(Way::Down, Nodes { patch, plane: odd, y }, Sends::Ahead);
+                self.send(simd, Way::Down, Nodes { patch, plane: odd, y, greys: greys[odd] }, Sends::Ahead);
             }
         }
     }
 
     /// Odd nodes send left, right and up; then even nodes send up. The first row sends nothing up.
-    fn backward_row(&mut self, y: usize) {
+    #[inline(always)]
+    fn backward_row<S: Simd>(&mut self, simd: S, y: usize) {
         let onward = y > self.rows.start && self.sweep.layout.joined_above(y);
         let (even, odd) = (y % 2, 1 - y % 2);
+        let greys = [0, 1].map(|plane| self.sweep.layout.around(plane, y));
+        let upwards = greys.map(|greys| greys.map(Around::upwards));
         for patch in 0..=self.lists.patches() {
             if patch < self.lists.patches() {
                 let sends = if onward { Sends::SidesAndAhead } else { Sends::Sides };
-                self.send(Way::Up, Nodes { patch, plane: odd, y }, sends);
+                self.send(simd, Way::Up, Nodes { patch, plane: odd, y, greys: upwards[odd] }, sends);
                 self.close(patch, y);
-                self.cross(patch, odd, y);
+                self.cross(Nodes { patch, plane: odd, y, greys: greys[0] });
             }
             if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
-                self.send(Way::Up, Nodes { patch, plane: even, y }, Sends::Ahead);
+                self.send(simd, Way::Up, Nodes { patch, plane: even, y, greys: upwards[even] }, Sends::Ahead);
             }
         }
     }
@@ -118,11 +131,12 @@ impl Pass<'_> {
 
     /// Computes the costs of a patch in row y, and the first messages that a pass down needs: those of even nodes, and in the
     /// last row also those that odd nodes hold from below.
-    fn first_visit(&mut self, patch: usize, y: usize, start: Start) {
+    #[inline(always)]
+    fn first_visit<S: Simd>(&mut self, simd: S, patch: usize, y: usize, start: Start) {
         let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
         let (even, odd) = self.work.costs[2 * row * entries..2 * (row + 1) * entries].split_at_mut(entries);
         let costs = [&mut even[range.clone()], &mut odd[range.clone()]];
-        self.sweep.costs.fill(self.sweep, patch, y, self.lists.list(patch).labels, costs);
+        self.sweep.costs.fill(simd, self.sweep, patch, y, self.lists.list(patch).labels, costs);
         let last = y + 1 == self.rows.end;
         let below = !last || start == Start::Refined;
         let joined = self.sweep.layout.joined_above(y + 1);
@@ -133,7 +147,7 @@ impl Pass<'_> {
                 let coarser_height = coarser.layout.size.height;
                 let at = At { lists: self.lists, patch, plane, y, coarser_height };
                 let below = below && (sides || last);
-                self.work.coarse_rows.interpolate(self.sweep.level, &at, sides, below, &mut around);
+                self.work.coarse_rows.interpolate(simd, &at, sides, below, &mut around);
             } else {
                 around.same.fill(Block::ZERO);
                 around.next.fill(Padded::ZERO);
@@ -145,12 +159,11 @@ impl Pass<'_> {
         self.close(patch, y);
     }
 
-    fn send(&mut self, way: Way, at: Nodes, sends: Sends) {
-        let Nodes { patch, plane, y } = at;
+    #[inline(always)]
+    fn send<S: Simd>(&mut self, simd: S, way: Way, at: Nodes<'_>, sends: Sends) {
+        let Nodes { patch, plane, y, greys } = at;
         let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
         let around = self.messages.around(Place { entries, row, plane, range: &range });
-        let greys = self.sweep.layout.around(plane, y);
-        let greys = greys.map(|around| if way == Way::Up { around.upwards() } else { around });
         let nodes = send::Nodes {
             plane,
             list: self.lists.list(patch),
@@ -163,14 +176,13 @@ impl Pass<'_> {
             Way::Up => (around.below, around.above),
         };
         let slots = Slots { same: around.same, next: around.next, behind, ahead };
-        let level = self.sweep.level;
         match (sends, nodes.greys.is_some()) {
-            (Sends::Sides, false) => dispatch!(level, simd => to_sides::<_, false, false>(simd, &nodes, slots)),
-            (Sends::Sides, true) => dispatch!(level, simd => to_sides::<_, true, false>(simd, &nodes, slots)),
-            (Sends::SidesAndAhead, false) => dispatch!(level, simd => to_sides::<_, false, true>(simd, &nodes, slots)),
-            (Sends::SidesAndAhead, true) => dispatch!(level, simd => to_sides::<_, true, true>(simd, &nodes, slots)),
-            (Sends::Ahead, false) => dispatch!(level, simd => send::ahead::<_, false>(simd, &nodes, slots)),
-            (Sends::Ahead, true) => dispatch!(level, simd => send::ahead::<_, true>(simd, &nodes, slots)),
+            (Sends::Sides, false) => to_sides::<_, false, false>(simd, &nodes, slots),
+            (Sends::Sides, true) => to_sides::<_, true, false>(simd, &nodes, slots),
+            (Sends::SidesAndAhead, false) => to_sides::<_, false, true>(simd, &nodes, slots),
+            (Sends::SidesAndAhead, true) => to_sides::<_, true, true>(simd, &nodes, slots),
+            (Sends::Ahead, false) => send::ahead::<_, false>(simd, &nodes, slots),
+            (Sends::Ahead, true) => send::ahead::<_, true>(simd, &nodes, slots),
         }
     }
 
@@ -191,10 +203,11 @@ impl Pass<'_> {
     }
 
     /// Carries the messages that the nodes of `plane` sent between this patch and the one before to the other of the two.
-    fn cross(&mut self, patch: usize, plane: usize, y: usize) {
+    fn cross(&mut self, at: Nodes<'_>) {
+        let Nodes { patch, plane, y, greys } = at;
         let Some(before) = patch.checked_sub(1) else { return };
         let lane = LANES * patch;
-        let level = self.sweep.layout.around(0, y).map_or(0, |around| around.level(1, lane));
+        let level = greys.map_or(0, |around| around.level(1, lane));
         let truncation = self.sweep.plan.model().edges().smoothness()[level].truncation;
         let inside = (y - self.rows.start) * self.lists.entries();
         let next = &mut self.messages.next[inside..inside + self.lists.entries()];

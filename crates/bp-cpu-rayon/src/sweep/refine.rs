@@ -4,21 +4,24 @@
 //! i is the parent of lane i of both planes of the finer patch, and lanes -1 and 32 lie beside the parents. Then every first
 //! message is a mean of such lanes. Three coarse rows are kept at a time.
 
-use std::cmp::Ordering;
+use std::{array, cmp::Ordering, hint::black_box};
 
 use bp_core::{BAND_ROWS, EdgeLevels, Error, MAX_TRUNCATION, memory};
-use fearless_simd::{Level, Simd, SimdBase, SimdCombine, SimdInt, dispatch, u8x16};
+use fearless_simd::{Simd, SimdBase, SimdCombine, SimdInt, u8x16};
 
 use super::{
     Band,
     block::{Block, Bytes, LANES, Padded},
     lists::{Lists, Source, sources},
-    messages::Around,
+    messages::{Around, Held, Place},
 };
 use crate::layout::Layout;
 
 /// The coarse rows that a finer row is interpolated between lie within this number of rows.
 const ROWS: usize = 3;
+
+/// Half a block. A finer patch has as many columns as half a coarser one.
+const HALF: usize = LANES / 2;
 
 /// From which side messages come: left, right or below.
 const SIDES: usize = 3;
@@ -78,17 +81,19 @@ impl CoarseRows {
     }
 
     /// Reads the coarse rows that a finer row is interpolated between.
-    pub(crate) fn read(&mut self, level: Level, coarser: Coarser<'_>, lists: &Lists, y: usize) {
+    #[inline(always)]
+    pub(crate) fn read<S: Simd>(&mut self, simd: S, coarser: Coarser<'_>, lists: &Lists, y: usize) {
         let near = y / 2;
         for row in [near.checked_sub(1 - y % 2), Some(near + y % 2)].into_iter().flatten() {
             if row < coarser.layout.size.height && self.rows[row % ROWS] != Some(row) {
-                self.read_row(level, coarser, lists, row);
+                self.read_row(simd, coarser, lists, row);
                 self.rows[row % ROWS] = Some(row);
             }
         }
     }
 
-    fn read_row(&mut self, level: Level, coarser: Coarser<'_>, lists: &Lists, y: usize) {
+    #[inline(always)]
+    fn read_row<S: Simd>(&mut self, simd: S, coarser: Coarser<'_>, lists: &Lists, y: usize) {
         let index = y / BAND_ROWS;
         let band = &coarser.bands[index];
         for patch in 0..lists.patches() {
@@ -104,13 +109,9 @@ impl CoarseRows {
                 let values = &mut self.values[start + range.start..start + range.end];
                 let sources = &self.sources[range];
                 match side {
-                    LEFT => {
-                        dispatch!(level, simd => reading.read::<_, LEFT>(simd, truncation, sources, values))
-                    }
-                    RIGHT => {
-                        dispatch!(level, simd => reading.read::<_, RIGHT>(simd, truncation, sources, values))
-                    }
-                    _ => dispatch!(level, simd => reading.read::<_, BELOW>(simd, truncation, sources, values)),
+                    LEFT => reading.read::<_, LEFT>(simd, truncation, sources, values),
+                    RIGHT => reading.read::<_, RIGHT>(simd, truncation, sources, values),
+                    _ => reading.read::<_, BELOW>(simd, truncation, sources, values),
                 }
             }
         }
@@ -130,11 +131,12 @@ impl CoarseRows {
     }
 
     /// Writes the first messages of the nodes of `plane` of a patch in row y: those from the sides and from below.
-    pub(crate) fn interpolate(&self, level: Level, at: &At<'_>, sides: bool, below: bool, to: &mut Around<'_>) {
+    #[inline(always)]
+    pub(crate) fn interpolate<S: Simd>(&self, simd: S, at: &At<'_>, sides: bool, below: bool, to: &mut Around<'_>) {
         if at.plane == 0 {
-            dispatch!(level, simd => self.interpolate_of::<_, -1, -1>(simd, at, sides, below, to));
+            self.interpolate_of::<_, -1, -1>(simd, at, sides, below, to);
         } else {
-            dispatch!(level, simd => self.interpolate_of::<_, 1, 0>(simd, at, sides, below, to));
+            self.interpolate_of::<_, 1, 0>(simd, at, sides, below, to);
         }
     }
 
@@ -170,9 +172,12 @@ impl CoarseRows {
         }
         // The last row receives nothing from below.
         if below && near + 1 < height {
-            for (out, (near, far)) in to.below.iter_mut().zip(both(BELOW, height - 1)) {
+            // Out of the compiler's sight: it would make the lanes aside from the others, which takes longer than loading them.
+            let aside = black_box(both(BELOW, height - 1));
+            let own = both(BELOW, height - 1);
+            for ((out, (near, far)), aside) in to.below.iter_mut().zip(own).zip(aside) {
                 let own = nearer(simd, near.load::<S, 0>(simd), far.load::<S, 0>(simd));
-                let aside = nearer(simd, near.load::<S, ASIDE>(simd), far.load::<S, ASIDE>(simd));
+                let aside = nearer(simd, aside.0.load::<S, ASIDE>(simd), aside.1.load::<S, ASIDE>(simd));
                 out.store(nearer(simd, own, aside));
             }
         } else if below {
@@ -191,7 +196,8 @@ pub(crate) struct At<'a> {
 }
 
 impl Reading<'_> {
-    /// Reads the messages from one side, in the order of columns.
+    /// Reads the messages from one side, in the order of columns. Those of columns that other patches hold are arbitrary at
+    /// first.
     #[inline(always)]
     fn read<S: Simd, const SIDE: usize>(
         &self,
@@ -200,50 +206,23 @@ impl Reading<'_> {
         sources: &[[Source; 3]],
         values: &mut [Padded],
     ) {
-        let own = self.patch / 2;
-        let first = self.band.lists.range(own).start;
+        let columns = Columns::<S, SIDE>::new(simd, self);
+        let most = Bytes::splat(simd, truncation);
         for ([source, ..], out) in sources.iter().zip(values.iter_mut()) {
-            let value = match source.exact() {
-                Some(entry) => self.columns::<S, SIDE>(simd, first + entry),
-                None => {
-                    let [below, above] = source.nearest(0).map(|(entry, cost)| {
-                        let value: Bytes<S> = self.columns::<S, SIDE>(simd, first + entry);
-                        value.saturating_add(Bytes::splat(simd, cost))
-                    });
-                    below.min(above).min(Bytes::splat(simd, truncation))
-                }
-            };
-            out.store::<S, 0>(value);
+            // Without a special case for entries that both lists have: they are many, but the branch costs more.
+            let [(below, cost), (above, cost_above)] = source.nearest(0);
+            let below = columns.of(below).saturating_add(Bytes::splat(simd, cost));
+            let above = columns.of(above).saturating_add(Bytes::splat(simd, cost_above));
+            out.store::<S, 0>(below.min(above).min(most));
         }
         self.read_borders::<SIDE>(truncation, sources, values);
     }
 
-    /// The messages of the columns of this entry. Those that other patches hold are arbitrary.
-    #[inline(always)]
-    fn columns<S: Simd, const SIDE: usize>(&self, simd: S, entry: usize) -> Bytes<S> {
-        let messages = &self.band.messages;
-        let entries = self.band.lists.entries();
-        let inside = self.row * entries + entry;
-        let half = (self.patch % 2) * (LANES / 2);
-        let block = |block: &Block, first: usize| u8x16::from_slice(simd, &block.0[first..first + LANES / 2]);
-        let padded = |first: isize| u8x16::from_slice(simd, messages.next[inside].half(half as isize + first));
-        let same = &messages.same[inside];
-        let moved = |by: isize| {
-            let first = half as isize + by;
-            let mut lanes = [0; LANES / 2];
-            for (i, lane) in lanes.iter_mut().enumerate() {
-                *lane = same.0[(first + i as isize).clamp(0, LANES as isize - 1) as usize];
-            }
-            u8x16::from_slice(simd, &lanes)
-        };
-        let [even, odd] = match (SIDE, self.y % 2) {
-            (LEFT, 0) => [padded(-1); 2],
-            (LEFT, _) => [moved(-1), block(same, half)],
-            (RIGHT, 0) => [block(same, half), moved(1)],
-            (RIGHT, _) => [padded(0); 2],
-            _ => [0, 1].map(|plane| block(&messages.vertical[(2 * self.row + 2 + plane) * entries + entry], half)),
-        };
-        even.zip_low(odd).combine(even.zip_high(odd))
+    /// The messages that the nodes of the coarser patch hold.
+    fn held(&self, plane: usize) -> Held<'_> {
+        let Band { lists, messages } = self.band;
+        let range = lists.range(self.patch / 2);
+        messages.at(Place { entries: lists.entries(), row: self.row, plane, range: &range })
     }
 
     /// Reads the columns that the coarse patches on the left and right hold. Where there is no such column, that at the border takes
@@ -335,6 +314,55 @@ impl Reading<'_> {
             let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
             out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| next[entry].lane(from)));
         }
+    }
+}
+
+/// The messages from one side to the columns of a finer patch, by entry of the coarser one. Those of columns that other patches
+/// hold are arbitrary.
+struct Columns<'a, S: Simd, const SIDE: usize> {
+    simd: S,
+    /// By plane.
+    held: [Held<'a>; 2],
+    is_odd: bool,
+    /// The first lane.
+    half: usize,
+    /// The lanes after or before those of half a block. There is none beyond the block; an end takes its place.
+    moved: u8x16<S>,
+}
+
+impl<'a, S: Simd, const SIDE: usize> Columns<'a, S, SIDE> {
+    #[inline(always)]
+    fn new(simd: S, reading: &'a Reading<'_>) -> Self {
+        let half = (reading.patch % 2) * HALF;
+        let by = if SIDE == LEFT { -1 } else { 1 };
+        let moved = array::from_fn(|i| (i as isize + by).clamp(0, HALF as isize - 1) as u8);
+        let held = [0, 1].map(|plane| reading.held(plane));
+        Self { simd, held, is_odd: reading.y % 2 == 1, half, moved: u8x16::load_array(simd, moved) }
+    }
+
+    #[inline(always)]
+    fn of(&self, entry: usize) -> Bytes<S> {
+        let Self { held: [held, below_odd], half, .. } = self;
+        let block = |block: &Block| u8x16::from_slice(self.simd, &block.0[*half..half + HALF]);
+        let [even, odd] = match (SIDE, self.is_odd) {
+            (BELOW, _) => [block(&held.below[entry]), block(&below_odd.below[entry])],
+            (LEFT, false) => [u8x16::from_slice(self.simd, held.next[entry].half(*half as isize - 1)); 2],
+            (LEFT, true) => [self.moved(&held.same[entry]), block(&held.same[entry])],
+            (_, false) => [block(&held.same[entry]), self.moved(&held.same[entry])],
+            (_, true) => [u8x16::from_slice(self.simd, held.next[entry].half(*half as isize)); 2],
+        };
+        even.zip_low(odd).combine(even.zip_high(odd))
+    }
+
+    /// The lanes of the pairs of columns beside.
+    #[inline(always)]
+    fn moved(&self, block: &Block) -> u8x16<S> {
+        // The second half has lanes to its left, the first one to its right.
+        let whole =
+            if SIDE == LEFT { self.half.checked_sub(1) } else { Some(self.half + 1).filter(|_| self.half == 0) };
+        let first = whole.unwrap_or(self.half);
+        let lanes = u8x16::from_slice(self.simd, &block.0[first..first + HALF]);
+        if whole.is_some() { lanes } else { lanes.swizzle_dyn_within_blocks(self.moved) }
     }
 }
 
