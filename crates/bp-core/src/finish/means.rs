@@ -18,26 +18,27 @@ const ROWS: usize = 48;
 /// The most lanes of a vector. Rows have room for whole vectors.
 const MOST_LANES: usize = 32;
 
-/// Whole disparities within this distance from 0 are computed as such.
-const MOST_WHOLE: f32 = 8192.0;
+/// Disparities within this distance from 0 are added up in [`PARTS`] of a pixel.
+const MOST: f32 = 1000.0;
+const PARTS: i16 = 32;
 
 /// Writes the mean of the disparities in the 9x9 window around each pixel that differ from its own by no more than [`AGREE`].
 /// Both maps are `[height][width]`.
 ///
-/// Whole disparities, which are those of labels, are added up as integers. That gives the same means in less time, because sums
-/// of whole numbers are exact.
+/// Disparities up to [`MOST`] are rounded to 1/32 px and added up as integers, which takes half the time. For whole disparities,
+/// which are those of labels, that changes nothing.
 pub(super) fn write_means(
     width: usize,
     map: &[f32],
     means: &mut [f32],
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
-    let is_whole = |&value: &f32| value == DisparityMap::UNKNOWN || value.abs() <= MOST_WHOLE && value.trunc() == value;
-    let all_whole = map.par_chunks(ROWS * width).all(|values| values.iter().all(is_whole));
+    let is_small = |&value: &f32| value == DisparityMap::UNKNOWN || value.abs() <= MOST;
+    let all_small = map.par_chunks(ROWS * width).all(|values| values.iter().all(is_small));
     let parts = means.par_chunks_mut(ROWS * width).enumerate();
     parts.map(|(index, means)| (ROWS * index..ROWS * index + means.len() / width, means)).try_for_each(
         |(rows, means)| {
-            if all_whole {
+            if all_small {
                 write_rows::<u16>(map, rows, means, is_stopped)
             } else {
                 write_rows::<f32>(map, rows, means, is_stopped)
@@ -149,23 +150,23 @@ impl Value for f32 {
     }
 }
 
-/// Whole disparities. Negative ones wrap, and so do differences.
+/// A disparity in [`PARTS`] of a pixel. Negative ones wrap, and so do differences.
 impl Value for u16 {
     const UNKNOWN: Self = i16::MAX as u16;
 
     #[inline(always)]
     fn of(disparity: f32) -> Self {
-        if disparity == DisparityMap::UNKNOWN { Self::UNKNOWN } else { disparity as i16 as u16 }
+        if disparity == DisparityMap::UNKNOWN { Self::UNKNOWN } else { rounded(disparity) as i16 as u16 }
     }
 
     #[inline(always)]
     fn write_means<S: Simd>(simd: S, rows: &[&[Self]; SIDE], own: &[f32], means: &mut [f32]) {
-        const WHOLE: u16 = AGREE as u16;
-        let [none, one, most] = [0, 1, 2 * WHOLE].map(|value| S::u16s::splat(simd, value));
+        const NEAR: u16 = AGREE as u16 * PARTS as u16;
+        let [none, one, most] = [0, 1, 2 * NEAR].map(|value| S::u16s::splat(simd, value));
         let load = |row: &[u16], from: usize| S::u16s::from_slice(simd, &row[from..from + S::u16s::LEN]);
         let parts = means.chunks_mut(S::u16s::LEN).zip(own.chunks(S::u16s::LEN));
         for (at, (means, own)) in (0..).step_by(S::u16s::LEN).zip(parts) {
-            let least = load(rows[REACH], at + REACH) - S::u16s::splat(simd, WHOLE);
+            let least = load(rows[REACH], at + REACH) - S::u16s::splat(simd, NEAR);
             let (mut sums, mut counts) = (none, none);
             for row in rows {
                 for dx in 0..SIDE {
@@ -176,11 +177,18 @@ impl Value for u16 {
                 }
             }
             let counted = sums.as_slice().iter().zip(counts.as_slice());
-            for ((mean, own), (&sum, &count)) in means.iter_mut().zip(own).zip(counted) {
-                *mean = own + f32::from(sum as i16 - AGREE as i16 * count as i16) / f32::from(count);
+            for ((mean, &own), (&sum, &count)) in means.iter_mut().zip(own).zip(counted) {
+                let parts = f32::from(sum as i16 - NEAR as i16 * count as i16) / f32::from(count);
+                *mean = (rounded(own) + parts) / f32::from(PARTS);
             }
         }
     }
+}
+
+/// A disparity in [`PARTS`] of a pixel.
+#[inline(always)]
+fn rounded(disparity: f32) -> f32 {
+    (disparity * f32::from(PARTS)).round_ties_even()
 }
 
 #[cfg(test)]
@@ -201,28 +209,42 @@ mod tests {
         if count > 0.0 { map[at] + sum / count } else { map[at] }
     }
 
-    fn assert_means(width: usize, map: &[f32]) {
+    /// The means, and those of single pixels.
+    fn both(width: usize, map: &[f32]) -> [Vec<f32>; 2] {
         let mut means = vec![0.0; map.len()];
         write_means(width, map, &mut means, &never).unwrap();
-        let expected: Vec<f32> = (0..map.len()).map(|at| mean(width, map, at)).collect();
+        [means, (0..map.len()).map(|at| mean(width, map, at)).collect()]
+    }
+
+    fn assert_means(width: usize, map: &[f32]) {
+        let [means, expected] = both(width, map);
         assert_eq!(means, expected, "{width}x{}", map.len() / width);
     }
 
     #[test]
     fn vectors_compute_what_single_pixels_do() {
         for (width, height) in [(1, 1), (3, 12), (31, 2), (40, 9), (73, 11), (130, 5), (9, 2 * ROWS + 1)] {
-            let value = |i: usize, whole: bool| match i * i * 29 % 101 {
+            let value = |i: usize, parts: f32| match i * i * 29 % 101 {
                 0..5 => DisparityMap::UNKNOWN,
-                noise if whole => (i % width / 7) as f32 - 3.0 + (noise / 40) as f32,
-                noise => (i % width) as f32 * 0.07 + noise as f32 / 40.0,
+                noise => (((i % width) as f32 * 0.07 + noise as f32 / 40.0 - 3.0) * parts).trunc() / parts,
             };
-            for whole in [false, true] {
-                assert_means(width, &(0..width * height).map(|i| value(i, whole)).collect::<Vec<_>>());
+            for parts in [1.0, 8.0] {
+                assert_means(width, &(0..width * height).map(|i| value(i, parts)).collect::<Vec<_>>());
             }
+            // One disparity beyond those that are added up in parts: they are as exact as `f32`.
+            let far = (0..width * height).map(|i| if i == 0 { 2.0 * MOST } else { value(i, 1000.0) });
+            assert_means(width, &far.collect::<Vec<_>>());
         }
-        // The largest whole disparities that are added up as such, and larger ones.
-        for most in [MOST_WHOLE, 2.0 * MOST_WHOLE, f32::MAX] {
+        for most in [MOST, 2.0 * MOST, f32::MAX] {
             assert_means(5, &[most, most - 1.0, -most, DisparityMap::UNKNOWN, 1.0 - most]);
         }
+    }
+
+    #[test]
+    fn means_in_parts_are_hardly_less_exact() {
+        let value = |i: usize| (i % 97) as f32 * 0.0193 + (i * i * 29 % 101) as f32 / 400.0;
+        let [means, exact] = both(97, &(0..97 * 40).map(value).collect::<Vec<_>>());
+        let squares: f32 = means.iter().zip(&exact).map(|(mean, exact)| (mean - exact).powi(2)).sum();
+        assert!((squares / means.len() as f32).sqrt() < 0.004);
     }
 }
