@@ -25,7 +25,7 @@ const PARTS: i16 = 32;
 /// Writes the mean of the disparities in the 9x9 window around each pixel that differ from its own by no more than [`AGREE`].
 /// Both maps are `[height][width]`.
 ///
-/// Disparities up to [`MOST`] are rounded to 1/32 px and added up as integers, which takes half the time. For whole disparities,
+/// Disparities up to [`MOST`] are rounded to 1/32 px and added up as integers, which takes a third less time. For whole disparities,
 /// which are those of labels, that changes nothing.
 pub(super) fn write_means(
     width: usize,
