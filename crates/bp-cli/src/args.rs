@@ -9,6 +9,7 @@ mod measuring;
 mod outputs;
 mod records;
 mod rectifying;
+mod streaming;
 mod values;
 
 use std::path::PathBuf;

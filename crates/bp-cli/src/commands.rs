@@ -10,6 +10,7 @@ mod export;
 mod gate;
 mod match_pair;
 mod match_report;
+mod match_stream;
 mod match_summary;
 mod rectify;
 mod report;

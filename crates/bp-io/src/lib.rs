@@ -1,4 +1,4 @@
-//! Files of stereo matching: images, disparity maps, masks, point clouds, calibrations and the sidecars that describe
+//! Files of stereo matching: images, frames of videos, disparity maps, masks, point clouds, calibrations and the sidecars that describe
 //! maps.
 //!
 //! Readers accept any bytes and return an [`Error`] instead of a panic. [`Limits`] bound their memory. Writers use
@@ -25,6 +25,7 @@ mod decode;
 mod decoding;
 mod error;
 mod format;
+mod frames;
 mod headers;
 mod images;
 mod limits;
@@ -46,6 +47,7 @@ pub use caught::is_caught;
 pub use colours::Colours;
 pub use error::Error;
 pub use format::{MapFormat, Quantity, check_ending, check_range};
+pub use frames::{FrameFormat, Frames, Layout, PairFrames};
 pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey, write_image};
 pub use limits::Limits;
 pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};

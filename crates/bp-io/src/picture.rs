@@ -79,7 +79,7 @@ pub fn encode_picture(file: &mut dyn Write, map: &DisparityMap, range: RangeIncl
     encode(file, &coloured(map, range, Colours::Viridis))
 }
 
-fn coloured(map: &DisparityMap, range: RangeInclusive<f32>, colours: Colours) -> Pixels {
+pub(crate) fn coloured(map: &DisparityMap, range: RangeInclusive<f32>, colours: Colours) -> Pixels {
     let (low, high) = (f64::from(*range.start()), f64::from(*range.end()));
     let place = |value: f32| if low < high { (f64::from(value) - low) / (high - low) } else { 0.5 };
     let pixel = |&value: &f32| if value.is_finite() { colours.at(place(value)) } else { UNKNOWN };

@@ -24,11 +24,13 @@ pub fn align_camera(
     watch.check()?;
     match (found, file) {
         (Some(alignment), Some((files, path))) => files.json(path, &alignment)?,
-        (None, Some((_, path))) => {
-            let what = "rows are not aligned, because too few points of the images agree";
-            watch.warn(&format!("{} is not written: {what}", path.display()));
-        }
+        (None, Some((_, path))) => watch.warn(&not_aligned(path)),
         (_, None) => {}
     }
     Ok(found.map_or(Align::Off, Align::Known))
+}
+
+/// Why the file of a camera is missing, as a warning.
+pub(crate) fn not_aligned(path: &Path) -> String {
+    format!("{} is not written: rows are not aligned, because too few points of the images agree", path.display())
 }

@@ -39,6 +39,7 @@ pub mod pairs;
 mod plan;
 mod reading;
 mod rectifying;
+pub mod stream;
 mod system;
 mod tiles;
 mod warning;

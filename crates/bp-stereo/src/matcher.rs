@@ -13,7 +13,7 @@ use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    AnswerTimes, Beside, Error, Options, Tiles, Warning, Watch, description,
+    Align, AnswerTimes, Beside, Error, Options, Tiles, Warning, Watch, description,
     devices::{self, Opened},
     finishing::{Finished, finished},
     memory::{self, Fitted},
@@ -224,6 +224,11 @@ impl Matcher {
         // Freeing the labels of tiles makes room for writing the answer.
         *prepared = Some(ready).filter(|ready| ready.tiled.tiling().is_whole());
         Ok(answer)
+    }
+
+    /// Aligns the rows of further pairs in this way.
+    pub(crate) fn align(&mut self, align: Align) {
+        self.options.align = align;
     }
 
     /// Fails if the device cannot start the next frame of a video from the messages of this one.

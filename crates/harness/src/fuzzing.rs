@@ -5,10 +5,13 @@
 
 mod tiny;
 
-use std::path::{Component, Path};
+use std::{
+    io::Cursor,
+    path::{Component, Path},
+};
 
 use bp_core::{Size, depth_map};
-use bp_io::{Cameras, Limits, MapFormat, Mask, Raster, parse_image, parse_map, parse_mask};
+use bp_io::{Cameras, Frames, Layout, Limits, MapFormat, Mask, PairFrames, Raster, parse_image, parse_map, parse_mask};
 use bp_stereo::pairs;
 
 use crate::{
@@ -29,8 +32,9 @@ const NAME: &str = "bytes";
 pub type Target = fn(&[u8]) -> bool;
 
 /// All targets, each with the name of its folder in `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("image", image),
+    ("frames", frames),
     ("map", map),
     ("mask", mask),
     ("calibration", calibration),
@@ -48,6 +52,21 @@ pub fn image(bytes: &[u8]) -> bool {
     let Ok(image) = parse_image(Path::new(NAME), bytes, LIMIT) else { return false };
     assert!(image.pixels().len() as u64 <= LIMIT.pixels, "{} pixels", image.size());
     true
+}
+
+/// Reads frames of a video, with both images side by side.
+///
+/// # Panics
+/// If an image is larger than allowed.
+pub fn frames(bytes: &[u8]) -> bool {
+    let Ok(frames) = Frames::new(Box::new(Cursor::new(bytes.to_vec())), Path::new(NAME), LIMIT) else { return false };
+    let mut pairs = PairFrames::Joined(Box::new(frames), Layout::SideBySide);
+    let mut count = 0;
+    while let Ok(Some(pair)) = pairs.next_pair() {
+        assert!(pair.size().pixels() as u64 <= LIMIT.pixels, "{} pixels", pair.size());
+        count += 1;
+    }
+    count > 0
 }
 
 /// Reads a map: PFM, NPY, TIFF, PNG or PNM.

@@ -29,7 +29,8 @@ Examples:
   bp match left.png right.png --output map.pfm --ground-truth truth.png --scale 2 --json
   bp match --pairs dataset --output maps                        # run it again to resume
   bp match --pairs list.csv --output maps --shard 2/4           # the second of four processes
-  bp match --video 'left/%04d.png' 'right/%04d.png' --output maps --format png --also picture";
+  bp match --video 'left/%04d.png' 'right/%04d.png' --output maps --format png --also picture
+  ffmpeg -i stereo.mp4 -f yuv4mpegpipe - | bp match --video - --output - --format y4m | ffplay -";
 
 pub(super) const CONVERT: &str = "\
 Examples:

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use bp_io::Layout;
 use bp_stereo::batch::{Also, Shard};
 
 use super::named;
@@ -23,10 +24,15 @@ pub(crate) struct ManyArgs {
     pub(crate) pairs: Option<PathBuf>,
     /// Match the frames of a video: 'left/%04d.png' 'right/%04d.png'; --output is a folder.
     ///
-    /// Each pattern has one %d or %04d for the frame number, or one * for any text. Quote patterns with *.
-    #[arg(long, num_args = 2, value_names = ["LEFT", "RIGHT"], group = "many")]
+    /// Each pattern has one %d or %04d for the frame number, or one * for any text. Quote patterns with *. Without them, frames are
+    /// read from pipes or files of the format YUV4MPEG2 (.y4m), as ffmpeg -f yuv4mpegpipe writes it: one with both images in each
+    /// frame (see --layout), or one for each camera; - is standard input. --output - then writes the maps one after another.
+    #[arg(long, num_args = 1..=2, value_names = ["LEFT", "RIGHT"], group = "many")]
     pub(crate) video: Option<Vec<String>>,
-    /// Extension of the maps, which selects their format.
+    /// Where the images are in frames that hold both. [default: side-by-side]
+    #[arg(long, value_parser = named(&Layout::ALL, Layout::name), requires = "video", hide_short_help = true)]
+    pub(crate) layout: Option<Layout>,
+    /// Extension of the maps, which selects their format; for frames from pipes pfm, npy, or y4m for a coloured video.
     #[arg(long, value_name = "EXT", default_value = "pfm", requires = "many", hide_short_help = true)]
     pub(crate) format: String,
     /// Other outputs for each pair, separated by commas.

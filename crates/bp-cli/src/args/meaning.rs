@@ -87,14 +87,17 @@ impl MatchArgs {
     /// How files are made.
     pub(crate) fn making(&self) -> Result<Making, Failure> {
         let also = |what| self.many.also.contains(&what);
-        let has_depth = also(Also::Depth) || also(Also::Points);
-        self.outputs.making(also(Also::Picture), has_depth, self.rectify)
+        let (has_depth, is_coloured) = (also(Also::Depth) || also(Also::Points), self.many.format == "y4m");
+        self.outputs.making(also(Also::Picture) || is_coloured, has_depth, self.rectify)
     }
 }
 
 fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
-    if args.is_piped() && (args.json || args.many.pairs.is_some() || args.many.video.is_some()) {
-        return Err(Failure::usage("--output - writes one map to standard output, without --json, --pairs or --video"));
+    let is_batch = args.many.stream()?.is_none() && (args.many.pairs.is_some() || args.many.video.is_some());
+    if args.is_piped() && (args.json || is_batch) {
+        return Err(Failure::usage(
+            "--output - writes maps to standard output, without --json, --pairs or patterns of --video",
+        ));
     }
     let finish = &args.finish;
     let checks = finish.check.is_some() || args.plan.quality == Quality::Best;

@@ -16,6 +16,7 @@ use bp_stereo::{
 use super::{
     evaluate,
     match_report::{Asked, Report, text},
+    match_stream::match_stream,
     match_summary, print, print_json,
 };
 use crate::{
@@ -27,6 +28,9 @@ use crate::{
 /// Runs the command.
 pub(crate) fn match_pair(args: &MatchArgs) -> Result<(), Failure> {
     heap::set_up(args.max_memory.is_some());
+    if let Some((options, format)) = args.stream()? {
+        return match_stream(options, format);
+    }
     match (args.batch()?, &args.left, &args.right) {
         (None, Some(left), Some(right)) => match_one(args, [left, right]),
         (Some(options), ..) => match_many(args, &options),

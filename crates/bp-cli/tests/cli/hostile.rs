@@ -92,6 +92,8 @@ fn one_signal_ends_a_batch_that_waits_for_a_pipe() {
         let mut command = folder.command(&format!("match --pairs {pairs} --output out {TINY}"));
         assert_eq!(code_after(signal, command.stderr(Stdio::null()).spawn().unwrap()), Some(130), "{pairs}");
     }
+    let mut frames = folder.command("match --video pipe.png --output -");
+    assert_eq!(code_after("-INT", frames.stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap()), Some(130));
     // What reads before it writes anything is ended by the system.
     let waiting = folder.command("convert pipe.png --picture p.png").stderr(Stdio::null()).spawn().unwrap();
     assert_eq!(code_after("-TERM", waiting), None);

@@ -14,6 +14,7 @@ mod rectify;
 mod resumed;
 mod running;
 mod speed;
+mod stream;
 mod survey;
 mod unwritable;
 
