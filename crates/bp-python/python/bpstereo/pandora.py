@@ -17,9 +17,7 @@ import xarray
 from pandora.disparity import disparity
 
 from ._bpstereo import Matcher
-
-#: Darker and brighter values than those of this share of all pixels, in percent, become black and white.
-CLIPPED = 0.5
+from .values import stretched
 
 
 @disparity.AbstractDisparity.register_subclass("bpstereo")
@@ -82,10 +80,7 @@ def _nearest(found: Any, steps: numpy.ndarray[Any, Any]) -> Any:
 
 
 def _as_images(*datasets: xarray.Dataset) -> list[numpy.ndarray[Any, Any]]:
-    """Values of any range as float32 from 0 to 1, by the same scale for both images; black where there is no data."""
-    images = [numpy.asarray(dataset["im"].data, numpy.float32) for dataset in datasets]
+    """The images as float32 from 0 to 1, by the same scale for both; black where there is no data."""
+    images = [numpy.asarray(dataset["im"].data) for dataset in datasets]
     # Bands come first: red, green and blue, or of fewer bands the first.
-    images = [image if image.ndim == 2 else numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0] for image in images]
-    low, high = numpy.nanpercentile(numpy.concatenate([image.ravel() for image in images]), [CLIPPED, 100 - CLIPPED])
-    scale = 1 / max(high - low, numpy.finfo(numpy.float32).tiny)
-    return [numpy.nan_to_num(numpy.clip((image - low) * scale, 0, 1)).astype(numpy.float32) for image in images]
+    return stretched(*(image if image.ndim == 2 else numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0] for image in images))
