@@ -1,6 +1,8 @@
 """Blocks of dask arrays: near the whole image's answer, and complete even if a worker dies."""
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -10,6 +12,7 @@ import pytest
 
 dask_array = pytest.importorskip("dask.array")
 import bpstereo.dask  # noqa: E402
+from conftest import ROOT  # noqa: E402
 
 
 def scene(height, width, most):
@@ -77,3 +80,28 @@ def test_a_worker_that_dies_loses_nothing():
             assert time.monotonic() - begin > 0.5, "the worker died too late"
             killer.join()
     assert numpy.array_equal(found, expected, equal_nan=True)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_example_reads_and_writes_geotiff_and_zarr(tmp_path):
+    rasterio, xarray = pytest.importorskip("rasterio"), pytest.importorskip("xarray")
+    pytest.importorskip("rioxarray")
+    pytest.importorskip("zarr")
+    left, right, _ = scene(700, 900, 40)
+    where = {"crs": "EPSG:32631", "transform": rasterio.transform.from_origin(500_000, 4_800_000, 0.5, 0.5)}
+    for name, image in (("left", left), ("right", right)):
+        with rasterio.open(tmp_path / f"{name}.tif", "w", driver="GTiff", height=700, width=900, count=1, dtype="uint8", **where) as file:
+            file.write(image, 1)
+        xarray.Dataset({"im": (("y", "x"), image)}).to_zarr(tmp_path / f"{name}.zarr")
+    expected = bpstereo.dask.match(*blocks(left, right, chunks=(256, 256)), labels=48).compute()
+    script = ROOT / "crates" / "bp-python" / "examples" / "rasters.py"
+    for ending in ("tif", "zarr"):
+        files = [tmp_path / f"{name}.{ending}" for name in ("left", "right", "map")]
+        subprocess.run([sys.executable, script, *files[:2], "48", files[2], "256"], check=True)
+    with rasterio.open(tmp_path / "map.tif") as file:
+        assert numpy.array_equal(file.read(1), expected, equal_nan=True)
+        assert file.crs == where["crs"] and file.transform == where["transform"] and numpy.isnan(file.nodata)
+        assert file.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG" and file.overviews(1)
+    stored = xarray.open_zarr(tmp_path / "map.zarr")["disparity"]
+    assert numpy.array_equal(stored.values, expected, equal_nan=True) and stored.chunks is not None
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".tif"] * 3 + [".zarr"] * 3

@@ -71,12 +71,6 @@ impl Stream {
         Ok(Self { options, matcher, frames: Some(frames), rate, count: 0, warned: BTreeSet::new() })
     }
 
-    /// The device.
-    #[must_use]
-    pub fn matcher(&self) -> &Matcher {
-        &self.matcher
-    }
-
     /// Frames per second that the source announces, as a fraction.
     #[must_use]
     pub fn rate(&self) -> [usize; 2] {
@@ -95,10 +89,10 @@ impl Stream {
         })?;
         let Some(pair) = pair? else { return Ok(None) };
         self.frames = Some(frames);
-        self.options
-            .rectifying
-            .as_ref()
-            .map_or(Ok(Some(pair.clone())), |rectifying| rectifying.rectified(&pair).map(Some))
+        match &self.options.rectifying {
+            Some(rectifying) => rectifying.rectified(&pair).map(Some),
+            None => Ok(Some(pair)),
+        }
     }
 
     /// Matches a pair. Each kind of warning is told once.
@@ -110,7 +104,7 @@ impl Stream {
         let planned = self.matcher.plan(pair)?;
         self.keep(planned.alignment, watch)?;
         for warning in planned.warnings.iter().filter(|warning| self.warned.insert(warning.of_many())) {
-            watch.warn(&warning.about(&format!("frame {}", self.count)));
+            watch.warn(&warning.about(&format!("the images of frame {}", self.count)));
         }
         // The caller counts frames, not the work within one.
         let events = |event: Event<'_>| {
@@ -143,11 +137,11 @@ impl StreamSource {
     fn frames(&self, room: Room) -> Result<PairFrames, Error> {
         let frames = |path: &Path| -> Result<Frames, Error> {
             let failed = |error: io::Error| bp_io::Error::Read { path: path.to_owned(), reason: error.to_string() };
-            let reader: Box<dyn Read + Send> = match path == Path::new("-") {
-                true => Box::new(io::stdin()),
-                false => Box::new(File::open(path).map_err(failed)?),
+            let (reader, name): (Box<dyn Read + Send>, _) = if path == Path::new("-") {
+                (Box::new(io::stdin()), Path::new("standard input"))
+            } else {
+                (Box::new(File::open(path).map_err(failed)?), path)
             };
-            let name = if path == Path::new("-") { Path::new("standard input") } else { path };
             room.explained(Frames::new(reader, name, room.limits))
         };
         match self {

@@ -65,6 +65,19 @@ fn frames_give_the_maps_of_their_images() {
 }
 
 #[test]
+fn rows_of_all_frames_are_aligned_as_those_of_the_first() {
+    let (folder, frames, _) = views(2);
+    assert!(folder.run("match l.png r.png --labels 24 --align pair.json -o map.pfm").status.success());
+    let (code, maps, told) = piped(&folder, "match --video - --labels 24 --align stream.json -o -", &frames);
+    assert_eq!(code, Some(0), "{told}");
+    let read = |name: &str| fs::read(folder.path(name)).unwrap();
+    assert!(read("stream.json") == read("pair.json") && maps == read("map.pfm").repeat(2));
+    // The file serves the next video.
+    let (_, again, _) = piped(&folder, "match --video - --labels 24 --align stream.json -o -", &frames);
+    assert!(again == maps);
+}
+
+#[test]
 fn a_map_comes_before_the_next_frame_is_there() {
     let (folder, frames, size) = views(2);
     let mut command = folder.command("match --video - -o - --labels 24 --quiet");
