@@ -1,15 +1,18 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, Plan, memory};
+use bp_core::{Error, Plan};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
-use crate::shape::{BLOCK, STRIP, Shape, Strip};
+use crate::{
+    lines::{self, Lines},
+    shape::{BLOCK, STRIP, Shape, Strip},
+};
 
 /// Data costs `[height][plane][label][lane]`, in the forms that messages and the sums of coarser grids need.
 pub(crate) struct Costs {
     /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless sums fit 8 bits without that.
-    pub(crate) stored: Vec<u8>,
+    pub(crate) stored: Lines<u8>,
     /// Neither normalised nor clipped. Only present if the plan keeps them.
     pub(crate) sums: Sums,
 }
@@ -18,10 +21,10 @@ pub(crate) struct Costs {
 pub(crate) enum Sums {
     /// None are kept, because the stored costs are used instead.
     None,
-    U8(Vec<u8>),
-    U16(Vec<u16>),
-    U32(Vec<u32>),
-    U64(Vec<u64>),
+    U8(Lines<u8>),
+    U16(Lines<u16>),
+    U32(Lines<u32>),
+    U64(Lines<u64>),
 }
 
 impl Costs {
@@ -30,28 +33,28 @@ impl Costs {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
             _ if !plan.keeps_sums(grid) => Sums::None,
-            1 => Sums::U8(memory::filled(what, len, 0)?),
-            2 => Sums::U16(memory::filled(what, len, 0)?),
-            4 => Sums::U32(memory::filled(what, len, 0)?),
-            _ => Sums::U64(memory::filled(what, len, 0)?),
+            1 => Sums::U8(Lines::new(what, len)?),
+            2 => Sums::U16(Lines::new(what, len)?),
+            4 => Sums::U32(Lines::new(what, len)?),
+            _ => Sums::U64(Lines::new(what, len)?),
         };
-        Ok(Self { stored: memory::filled("data cost", len, 0)?, sums })
+        Ok(Self { stored: Lines::new("data cost", len)?, sums })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { stored: Vec::new(), sums: Sums::None }
+        Self { stored: Lines::none(), sums: Sums::None }
     }
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.stored)
+        self.stored.bytes()
             + match &self.sums {
                 Sums::None => 0,
-                Sums::U8(sums) => memory::bytes(sums),
-                Sums::U16(sums) => memory::bytes(sums),
-                Sums::U32(sums) => memory::bytes(sums),
-                Sums::U64(sums) => memory::bytes(sums),
+                Sums::U8(sums) => sums.bytes(),
+                Sums::U16(sums) => sums.bytes(),
+                Sums::U32(sums) => sums.bytes(),
+                Sums::U64(sums) => sums.bytes(),
             }
     }
 }
@@ -63,8 +66,9 @@ pub(crate) fn volume(shape: &Shape) -> usize {
 
 /// The bytes that [`Costs`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
-    let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
-    (volume(&Shape::new(plan, grid)) as u64).saturating_mul(1 + sum_bytes as u64)
+    let len = volume(&Shape::new(plan, grid));
+    let sums = if plan.keeps_sums(grid) { lines::bytes(len, plan.sum_bytes(grid)) } else { 0 };
+    lines::bytes(len, 1).saturating_add(sums)
 }
 
 /// Calls `row(y, stored, sums)` for all rows of a grid, on several threads.

@@ -23,6 +23,7 @@ mod features;
 mod greys;
 mod half_steps;
 mod layout;
+mod lines;
 mod match_cost;
 mod shape;
 mod solver;

@@ -11,6 +11,7 @@ use crate::{
     features::{self, Features},
     half_steps::{self, Answer, Coarser, Edges, Pass, Rows, select_labels},
     layout::{self, Layout},
+    lines,
     match_cost::{Matching, is_stored, match_cost},
     shape::Shape,
     sweep::{self, CostSource, Grid, Swept},
@@ -70,7 +71,7 @@ fn bytes(plan: &Plan, labels: usize) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
     let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
-    let messages = kept.map(|grid| 2 * half_steps::bytes(&Shape::new(plan, grid)) as u64);
+    let messages = kept.map(|grid| 2 * lines::bytes(half_steps::bytes(&Shape::new(plan, grid)), 1));
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let (features, answer) = (features::bytes(plan), (size_of::<u16>() * plan.image_size().pixels()) as u64);
     let others = [features, answer, sweep::bytes(plan, labels)];

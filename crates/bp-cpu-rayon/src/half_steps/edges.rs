@@ -1,9 +1,10 @@
 //! Messages, one per edge.
 
-use bp_core::{Error, Plan, Side, memory};
+use bp_core::{Error, Plan, Side};
 
 use crate::{
     layout::Layout,
+    lines::Lines,
     shape::{BLOCK, Shape},
 };
 
@@ -15,18 +16,18 @@ const PLANES: usize = 4;
 /// came the other way, and the other end reads the new one before it answers. Row y of storage holds the edges up from
 /// row y and those inside row y. A row of zeros follows the last one.
 pub(crate) struct Edges {
-    values: Vec<u8>,
+    values: Lines<u8>,
 }
 
 impl Edges {
     /// Allocates room for the edges of `grid`, which is also enough for every coarser grid.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        Ok(Self { values: memory::filled("messages", bytes(&Shape::new(plan, grid)), 0)? })
+        Ok(Self { values: Lines::new("messages", bytes(&Shape::new(plan, grid)))? })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { values: Vec::new() }
+        Self { values: Lines::none() }
     }
 
     /// The rows of a grid.
@@ -41,7 +42,7 @@ impl Edges {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.values)
+        self.values.bytes()
     }
 }
 

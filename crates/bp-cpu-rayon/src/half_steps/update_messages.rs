@@ -44,22 +44,20 @@ impl Nodes<'_> {
         self.costs.len() / self.lanes
     }
 
-    /// A value of the smoothness cost for the edges of `W` vectors of nodes, by slot. Without `LEVELS`, every edge has the
-    /// same value.
+    /// A value of the smoothness cost for the edges of a vector of nodes, by slot. Without `LEVELS`, every edge has the same
+    /// value.
     #[inline(always)]
-    fn of_edges<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
+    fn of_edges<S: Simd, V: Vector<S>, const LEVELS: bool>(
         &self,
         simd: S,
         at: usize,
         value: impl Fn(Smoothness) -> u8,
-    ) -> [[V; 4]; W] {
+    ) -> [V; 4] {
         let by_level = self.edges.smoothness().map(value);
-        let mut values = [[V::splat(simd, by_level[0]); 4]; W];
+        let mut values = [V::splat(simd, by_level[0]); 4];
         if let Some(around) = self.around.filter(|_| LEVELS) {
-            for (w, values) in values.iter_mut().enumerate() {
-                for (slot, out) in values.iter_mut().enumerate() {
-                    *out = of_levels(simd, around.levels(simd, slot, at + w * V::LEN), by_level);
-                }
+            for (slot, out) in values.iter_mut().enumerate() {
+                *out = of_levels(simd, around.levels(simd, slot, at), by_level);
             }
         }
         values
@@ -75,72 +73,57 @@ pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: [&mut [u8]
     }
 }
 
-/// Processes a row two vectors at a time while there are enough nodes, then one at a time, then in narrow vectors.
+/// Processes a row vector by vector. The last vector may reach beyond the last node into the padding, where it does not matter what
+/// happens; it is narrow if a narrow one is enough.
 #[inline(always)]
 fn row<S: Simd, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
     let [same, next, up, down] = slots;
     // Slices of one known length let the compiler drop the bounds checks in the loops.
     let len = nodes.costs.len();
     let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
-    let mut at = 0;
-    while at + 2 * S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 2, LEVELS>(simd, nodes, &mut slots, at);
-        at += 2 * S::u8s::LEN;
-    }
-    while at + S::u8s::LEN <= nodes.nodes {
-        vectors::<S, S::u8s, 1, LEVELS>(simd, nodes, &mut slots, at);
-        at += S::u8s::LEN;
-    }
-    while at < nodes.nodes {
-        vectors::<S, u8x16<S>, 1, LEVELS>(simd, nodes, &mut slots, at);
-        at += u8x16::<S>::LEN;
+    for at in (0..nodes.nodes).step_by(S::u8s::LEN) {
+        if nodes.nodes - at > u8x16::<S>::LEN {
+            vector::<S, S::u8s, LEVELS>(simd, nodes, &mut slots, at);
+        } else {
+            vector::<S, u8x16<S>, LEVELS>(simd, nodes, &mut slots, at);
+        }
     }
 }
 
-/// Sends the messages of `W` vectors of nodes. A pass up the labels adds the received messages and starts the lower
+/// Sends the messages of a vector of nodes. A pass up the labels adds the received messages and starts the lower
 /// envelope; a pass down finishes it (Felzenszwalb and Huttenlocher 2006). Between the two passes, the slots hold the
 /// envelope.
 #[inline(always)]
-fn vectors<S, V, const W: usize, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
+fn vector<S, V, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
 where
     S: Simd,
     V: Vector<S>,
 {
-    let least = pass_up::<S, V, W, LEVELS>(simd, nodes, slots, at);
-    pass_down::<S, V, W, LEVELS>(simd, nodes, slots, at, least);
+    let least = pass_up::<S, V, LEVELS>(simd, nodes, slots, at);
+    pass_down::<S, V, LEVELS>(simd, nodes, slots, at, least);
 }
 
 /// Writes the upward envelopes to the slots and returns the least entry of each side's h.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "iterators keep the vectors in memory: twice as slow")]
-fn pass_up<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
+fn pass_up<S: Simd, V: Vector<S>, const LEVELS: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
     at: usize,
-) -> [[V; 4]; W] {
-    let step = nodes.of_edges::<S, V, W, LEVELS>(simd, at, Smoothness::step);
-    let mut masks = [[V::splat(simd, 0); 2]; W];
-    for w in 0..W {
-        let from = at + w * V::LEN;
-        masks[w] = nodes.masks.map(|mask| V::from_slice(simd, &mask[from..from + V::LEN]));
-    }
-    let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
+) -> [V; 4] {
+    let step = nodes.of_edges::<S, V, LEVELS>(simd, at, Smoothness::step);
+    let masks = nodes.masks.map(|mask| V::from_slice(simd, &mask[at..at + V::LEN]));
+    let mut envelope = [V::splat(simd, u8::MAX); 4];
     let mut least = envelope;
     let mut start = at;
-    while start + W * V::LEN <= nodes.costs.len() {
-        for w in 0..W {
-            let h = gather::<S, V>(simd, nodes, masks[w], slots, start + w * V::LEN);
-            for side in 0..4 {
-                envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(h[side]);
-                least[w][side] = least[w][side].min(envelope[w][side]);
-            }
+    while start + V::LEN <= nodes.costs.len() {
+        let h = gather::<S, V>(simd, nodes, masks, slots, start);
+        for side in 0..4 {
+            envelope[side] = envelope[side].saturating_add(step[side]).min(h[side]);
+            least[side] = least[side].min(envelope[side]);
         }
-        for w in 0..W {
-            let from = start + w * V::LEN;
-            for side in 0..4 {
-                envelope[w][side].store_slice(&mut slots[side][from..from + V::LEN]);
-            }
+        for side in 0..4 {
+            envelope[side].store_slice(&mut slots[side][start..start + V::LEN]);
         }
         start += nodes.lanes;
     }
@@ -149,34 +132,28 @@ fn pass_up<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
 
 /// Turns the upward envelopes into messages.
 #[inline(always)]
-fn pass_down<S: Simd, V: Vector<S>, const W: usize, const LEVELS: bool>(
+fn pass_down<S: Simd, V: Vector<S>, const LEVELS: bool>(
     simd: S,
     nodes: &Nodes<'_>,
     slots: &mut [&mut [u8]; 4],
     at: usize,
-    least: [[V; 4]; W],
+    least: [V; 4],
 ) {
-    let step = nodes.of_edges::<S, V, W, LEVELS>(simd, at, Smoothness::step);
-    let truncation = nodes.of_edges::<S, V, W, LEVELS>(simd, at, |smoothness| smoothness.truncation);
-    let mut envelope = [[V::splat(simd, u8::MAX); 4]; W];
+    let step = nodes.of_edges::<S, V, LEVELS>(simd, at, Smoothness::step);
+    let truncation = nodes.of_edges::<S, V, LEVELS>(simd, at, |smoothness| smoothness.truncation);
+    let mut envelope = [V::splat(simd, u8::MAX); 4];
     let mut start = at + nodes.labels() * nodes.lanes;
     while start > at {
         start -= nodes.lanes;
         // All loads come before the stores: slots often lie a multiple of 4 KiB apart, and a load would have to wait
         // for a store at such a distance.
-        for w in 0..W {
-            let from = start + w * V::LEN;
-            for side in 0..4 {
-                let half = V::from_slice(simd, &slots[side][from..from + V::LEN]);
-                envelope[w][side] = envelope[w][side].saturating_add(step[w][side]).min(half);
-            }
+        for side in 0..4 {
+            let half = V::from_slice(simd, &slots[side][start..start + V::LEN]);
+            envelope[side] = envelope[side].saturating_add(step[side]).min(half);
         }
-        for w in 0..W {
-            let from = start + w * V::LEN;
-            for side in 0..4 {
-                let message = (envelope[w][side] - least[w][side]).min(truncation[w][side]);
-                message.store_slice(&mut slots[side][from..from + V::LEN]);
-            }
+        for side in 0..4 {
+            let message = (envelope[side] - least[side]).min(truncation[side]);
+            message.store_slice(&mut slots[side][start..start + V::LEN]);
         }
     }
 }
