@@ -30,9 +30,12 @@ def test_everything_has_a_docstring_whose_examples_run(name, value, doctest_name
     assert not doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test).failed
 
 
-def test_the_stubs_agree_with_the_module():
+def test_the_stubs_agree_with_the_module(tmp_path):
     pytest.importorskip("mypy")
-    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "bpstereo"], capture_output=True, text=True)
+    # stereodemo is there, but not what it imports.
+    (tmp_path / "allowed").write_text("bpstereo.stereodemo\n")
+    options = ["--allowlist", tmp_path / "allowed", "--ignore-unused-allowlist"]
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "bpstereo", *options], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
 
 

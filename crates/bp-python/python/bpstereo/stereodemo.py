@@ -11,7 +11,16 @@ import time
 from typing import Any
 
 import numpy
-from stereodemo.methods import Config, EnumParameter, InputPair, IntParameter, StereoMethod, StereoOutput
+import stereodemo  # type: ignore[import-untyped]
+from stereodemo import visualizer
+from stereodemo.methods import (  # type: ignore[import-untyped]
+    Config,
+    EnumParameter,
+    InputPair,
+    IntParameter,
+    StereoMethod,
+    StereoOutput,
+)
 
 from ._bpstereo import Matcher
 
@@ -34,7 +43,7 @@ class BeliefPropagation(StereoMethod):
     def compute_disparity(self, input: InputPair) -> StereoOutput:
         """The disparities of the left image in pixels, negative where unknown, and the seconds that matching took."""
         labels = self.parameters["Labels"].value
-        matcher = Matcher(quality=self.parameters["Quality"].value, labels=labels or None)
+        matcher = Matcher(quality=self.parameters["Quality"].value, labels=labels or "auto")
         # The viewer's colours are blue, green, red.
         left, right = input.left_image[..., ::-1], input.right_image[..., ::-1]
         begun = time.perf_counter()
@@ -45,16 +54,14 @@ class BeliefPropagation(StereoMethod):
 
 def main() -> None:
     """Opens the viewer with this method before its own."""
-    from stereodemo import main as viewer
-
-    window = viewer.visualizer.Visualizer
+    window = visualizer.Visualizer
 
     def with_ours(methods: dict[str, Any], *others: Any) -> Any:
         ours = BeliefPropagation(next(iter(methods.values())).config)
         return window({ours.name: ours} | methods, *others)
 
-    viewer.visualizer.Visualizer = with_ours
-    viewer.main()
+    visualizer.Visualizer = with_ours
+    stereodemo.main()
 
 
 if __name__ == "__main__":
