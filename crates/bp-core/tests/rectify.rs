@@ -99,6 +99,39 @@ fn a_rectified_pair_stays_as_it_is() {
 }
 
 #[test]
+fn colours_lie_between_those_of_four_pixels() {
+    let colour = |i: usize| [i * 7, i * i, i / 5].map(|v| (v % 251) as u8);
+    let image = Image::from_rgb(SIZE.width, SIZE.height, (0..SIZE.pixels()).map(colour).collect()).unwrap();
+    for rig in rigs() {
+        let rectifier = Rectifier::new(&rig, Rectification::of(&rig, 1.0).unwrap()).unwrap();
+        let pair = rectifier.rectified(&image, &image).unwrap();
+        let mut black = 0;
+        for (index, rectified) in [pair.left(), pair.right()].into_iter().enumerate() {
+            let width = rectified.size().width;
+            for (i, &found) in rectified.pixels().iter().enumerate() {
+                let source = rectifier.source(index, i % width, i / width);
+                black += usize::from(source.is_none());
+                assert_eq!(found, source.map_or([0; 3], |at| between(&image, at)), "pixel {i} of image {index}");
+            }
+        }
+        assert!(black > 100, "{black}");
+    }
+}
+
+/// The nearest whole number to a colour between pixels.
+fn between(image: &Image, at: [f64; 2]) -> [u8; 3] {
+    let [column, row] = at.map(|side| (side.floor() as usize, side.fract()));
+    let mut sums = [0.5; 3];
+    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let weight = [(dx, column.1), (dy, row.1)].map(|(d, part)| if d == 1 { part } else { 1.0 - part });
+        let [x, y] = [(column.0 + dx).min(SIZE.width - 1), (row.0 + dy).min(SIZE.height - 1)];
+        let colour = image.pixels()[y * SIZE.width + x];
+        sums.iter_mut().zip(colour).for_each(|(sum, value)| *sum += weight[0] * weight[1] * f64::from(value));
+    }
+    sums.map(|sum| sum as u8)
+}
+
+#[test]
 fn a_view_shows_nothing_black_or_everything() {
     let white = Image::from_grey(SIZE.width, SIZE.height, &vec![255; SIZE.pixels()]).unwrap();
     let black = |rig: &Rig, kept| {

@@ -1,5 +1,6 @@
 //! Resamples the images of two cameras.
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::{camera::Rig, view::Rectification};
@@ -74,16 +75,76 @@ impl Rectifier {
     }
 
     fn resampled(&self, index: usize, image: &Image) -> Result<Image, Error> {
-        let size = self.rectification.size;
+        let (size, level) = (self.rectification.size, Level::new());
         let mut pixels = memory::filled("a rectified image", size.pixels(), [0; 3])?;
         let rows = pixels.par_chunks_exact_mut(size.width).zip(self.positions[index].par_chunks_exact(size.width));
-        rows.for_each(|(row, positions)| {
-            for (pixel, &position) in row.iter_mut().zip(positions).filter(|(_, position)| **position != NOWHERE) {
-                *pixel = mixed(image, position);
-            }
-        });
+        rows.for_each(|(row, positions)| dispatch!(level, simd => resample(simd, image, positions, row)));
         Image::from_rgb(size.width, size.height, pixels)
     }
+}
+
+/// Pixels that are interpolated together.
+const TOGETHER: usize = 16;
+
+/// The pixels around some positions, and how far each position is from the first of its four: to the right and down.
+struct Around {
+    /// Colours as the low bytes of an integer; of the pixel itself, to the right, below, and both.
+    corners: [[u32; TOGETHER]; 4],
+    parts: [[u32; TOGETHER]; 2],
+}
+
+impl Around {
+    /// Black where a position is nowhere.
+    #[inline(always)]
+    fn of(image: &Image, positions: &[[u32; 2]]) -> Self {
+        let (mut around, width) = (Self { corners: [[0; TOGETHER]; 4], parts: [[0; TOGETHER]; 2] }, image.size().width);
+        let colour = |at: usize| {
+            image.pixels().get(at).map_or(0, |&[red, green, blue]| u32::from_le_bytes([red, green, blue, 0]))
+        };
+        for (i, &position) in positions.iter().enumerate().filter(|(_, position)| **position != NOWHERE) {
+            let [(x, right), (y, below)] = position.map(|side| ((side >> 8) as usize, side & 0xff));
+            let at = y * width + x;
+            // The last column and row have no neighbour, and no weight for one: any colour will do.
+            for (corner, at) in around.corners.iter_mut().zip([at, at + 1, at + width, at + width + 1]) {
+                corner[i] = colour(at);
+            }
+            (around.parts[0][i], around.parts[1][i]) = (right, below);
+        }
+        around
+    }
+
+    /// The colours between the four pixels.
+    #[inline(always)]
+    fn mixed(&self) -> [u32; TOGETHER] {
+        let mut mixed = [0; TOGETHER];
+        for (i, mixed) in mixed.iter_mut().enumerate() {
+            let [right, below] = [self.parts[0][i], self.parts[1][i]];
+            let weights = [(256 - right) * (256 - below), right * (256 - below), (256 - right) * below, right * below];
+            for shift in [0, 8, 16] {
+                let channel = |corner: usize| weights[corner] * (self.corners[corner][i] >> shift & 0xff);
+                let sum = channel(0) + channel(1) + channel(2) + channel(3);
+                *mixed |= (sum + (1 << 15)) >> 16 << shift;
+            }
+        }
+        mixed
+    }
+}
+
+/// Writes the colours at positions of a raw image.
+#[inline(always)]
+fn resample<S: Simd>(simd: S, image: &Image, positions: &[[u32; 2]], row: &mut [[u8; 3]]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (row, positions) in row.chunks_mut(TOGETHER).zip(positions.chunks(TOGETHER)) {
+                let mixed = Around::of(image, positions).mixed();
+                for (pixel, colour) in row.iter_mut().zip(mixed) {
+                    let [red, green, blue, _] = colour.to_le_bytes();
+                    *pixel = [red, green, blue];
+                }
+            }
+        },
+    );
 }
 
 /// Where the pixels of one rectified image come from.
@@ -102,18 +163,4 @@ fn positions(rig: &Rig, rectification: &Rectification, index: usize) -> Result<V
         }
     });
     Ok(positions)
-}
-
-/// The colour between four pixels.
-fn mixed(image: &Image, [column, row]: [u32; 2]) -> [u8; 3] {
-    let [(x, right), (y, below)] = [column, row].map(|side| ((side >> 8) as usize, side & 0xff));
-    // The last column and row have no neighbour, and no weight for one.
-    let (next, down) = (usize::from(right > 0), isize::from(below > 0));
-    let [upper, lower] = [image.row_near(y as isize), image.row_near(y as isize + down)];
-    let weights = [(256 - right) * (256 - below), right * (256 - below), (256 - right) * below, right * below];
-    let colours = [upper[x], upper[x + next], lower[x], lower[x + next]];
-    [0, 1, 2].map(|channel| {
-        let sum: u32 = (0..4).map(|i| weights[i] * u32::from(colours[i][channel])).sum();
-        ((sum + (1 << 15)) >> 16) as u8
-    })
 }
