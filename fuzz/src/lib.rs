@@ -1,6 +1,6 @@
 //! What all targets share: a limit of memory for every input.
 
-use std::alloc::System;
+use std::{alloc::System, panic, process, sync::Once};
 
 use cap::Cap;
 
@@ -11,10 +11,17 @@ const A_BYTE: usize = 64;
 #[global_allocator]
 static HELD: Cap<System> = Cap::new(System, usize::MAX);
 
-/// Calls a target. An allocation beyond the limit fails, which ends the process unless the code expects it.
+/// libFuzzer's hook makes every panic a finding, also those of decoders that our readers catch.
+static CAUGHT: Once = Once::new();
+
+/// Calls a target. An allocation beyond the limit fails, which ends the process unless the code expects it. So does a panic that nobody
+/// catches.
 pub fn run(target: harness::fuzzing::Target, bytes: &[u8]) {
+    CAUGHT.call_once(|| panic::set_hook(Box::new(|panic| eprintln!("{panic}"))));
     let most = HELD.allocated() + FIXED + A_BYTE * bytes.len();
     HELD.set_limit(most).expect("more is allowed than allocated");
-    target(bytes);
+    if panic::catch_unwind(|| target(bytes)).is_err() {
+        process::abort();
+    }
     HELD.set_limit(usize::MAX).expect("everything is allowed");
 }

@@ -35,7 +35,8 @@ pub(crate) fn tiff_lists(path: &Path, bytes: &[u8]) -> Result<u64, Error> {
     let refused = |what: &str| Err(Error::reading(path, &format!("{what}; save it anew")));
     let Some(fields) = Fields::of(bytes) else { return refused("the TIFF's header is broken") };
     let lists = fields.0.iter().fold(0, |sum: u64, field| sum.saturating_add(field.count.saturating_mul(LISTED)));
-    if lists > LISTS {
+    // A value takes at least a byte of the file.
+    if lists > LISTS || fields.0.iter().any(|field| field.count > bytes.len() as u64) {
         return refused("the TIFF's header has too long lists");
     }
     if fields.first(COMPRESSION).is_some_and(|compression| JPEGS.contains(&compression)) {
@@ -159,7 +160,9 @@ mod tests {
 
     #[test]
     fn headers_that_stand_for_much_memory_are_refused() {
-        assert_eq!(lists(&[[273, 4, 100, 8]]), Ok(104 * LISTED));
+        assert_eq!(lists(&[[273, 4, 60, 8]]), Ok(64 * LISTED));
+        // The file has 70 bytes, so it has no list of 71 values.
+        assert!(lists(&[[273, 1, 71, 8]]).unwrap_err().contains("lists"));
         assert!(lists(&[[273, 1, 1 << 30, 8]]).unwrap_err().contains("lists"));
         assert!(lists(&[[259, 3, 1, 7]]).unwrap_err().contains("JPEG"));
         assert!(lists(&[[322, 4, 1, 1 << 30], [323, 4, 1, 16]]).unwrap_err().contains("tiles"));
