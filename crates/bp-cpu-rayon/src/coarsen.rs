@@ -11,17 +11,15 @@
 //!
 //! Here one lane of a vector is one coarse node.
 
-use std::array;
-
-use bp_core::{MAX_LABELS, Patch, Plan};
+use bp_core::{Patch, Plan};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::{
-    costs::{self, Costs, Sum, Sums, Widen, block},
+    block::{Block, Bytes, LANES},
+    costs::{self, Costs, Kept, Sum, Sums, Widen, clip_above},
     layout::Layout,
-    match_cost::Matching,
-    shape::{BLOCK, STRIP, Strip},
-    sweep::{Block, LANES, PatchRow, Windows, clip_above},
+    match_cost::{Matching, PatchRow, all_labels},
+    sweep::Windows,
 };
 
 /// Computes the costs of `grid` from those of the finer grid, `grid - 1`. `layouts` has the layouts of both, the finer
@@ -51,66 +49,38 @@ pub(crate) fn coarsen_unstored(
     layout: &Layout,
     coarse: &mut Costs,
 ) {
-    let labels = array::from_fn::<u16, MAX_LABELS, _>(|label| label as u16);
-    let unstored = Unstored { matching, windows, grid, layout, labels: &labels[..layout.labels] };
     match grid {
-        1 | 2 => unstored.narrow_rows(coarse),
-        _ => unstored.rows(coarse),
+        1 | 2 => matching.narrow_rows(grid, layout, coarse),
+        _ => Unstored { matching, windows, grid, layout }.rows(coarse),
     }
 }
 
-/// A grid that is made from the images.
+/// A grid that is made from the images, by way of sums of the finer grid.
 struct Unstored<'a> {
     matching: &'a Matching<'a>,
     windows: &'a Windows,
     grid: usize,
     layout: &'a Layout,
-    labels: &'a [u16],
 }
 
 impl Unstored<'_> {
-    /// Sums of grid 1 or 2, which fit 8 bits.
-    fn narrow_rows(&self, coarse: &mut Costs) {
-        let (layout, level, clip) = (self.layout, self.matching.level, self.matching.plan.clip(self.grid));
-        let Costs { stored, sums } = coarse;
-        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
-            self.windows.with(|window| {
-                let (even, rest) = window.work.costs.split_at_mut(self.labels.len());
-                let odd = &mut rest[..self.labels.len()];
-                for patch in 0..layout.size.width.div_ceil(Patch::COLUMNS) {
-                    let at = PatchRow { grid: self.grid, patch, y };
-                    let least = self.matching.unclipped(at, self.labels, [&mut *even, &mut *odd]);
-                    for (plane, (costs, least)) in [&mut *even, &mut *odd].into_iter().zip(least).enumerate() {
-                        let first = plane * layout.plane() + LANES * patch;
-                        if let Some(keep) = keep.as_deref_mut() {
-                            store(layout, costs, &mut keep[first..]);
-                        }
-                        dispatch!(level, simd => clip_above(simd, &least, clip, costs));
-                        store(layout, costs, &mut stored[first..]);
-                    }
-                }
-            });
-        });
-    }
-
-    /// Sums of grid 3, which are made of sums of grid 2.
     fn rows(&self, coarse: &mut Costs) {
         let (layout, clip) = (self.layout, self.matching.plan.clip(self.grid));
+        let labels = all_labels(layout);
         let Costs { stored, sums } = coarse;
         costs::rows(layout, stored, u16::of(sums), |y, stored, mut keep| {
             self.windows.with(|window| {
-                for lane in (0..layout.nodes(0)).step_by(BLOCK) {
-                    let (children, rest) = window.work.costs.split_at_mut(CHILDREN * self.labels.len());
-                    self.sum_pairs(lane, y, children, rest);
-                    let keep = keep.as_deref_mut();
+                for block in 0..layout.blocks {
+                    let (children, costs) = window.work.costs.split_at_mut(CHILDREN * labels.len());
+                    self.sum_pairs(block, y, labels, children, costs);
+                    let stored = layout.blocks_of(stored, block);
+                    let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
                     dispatch!(self.matching.level, simd => simd.vectorize(
                         #[inline(always)]
                         || costs::store_block(
-                            layout,
                             clip,
-                            lane,
                             #[inline(always)]
-                            |label| sum_of_rows(&children[CHILDREN * label..][..CHILDREN]),
+                            |label| sums_of_rows(&children.as_chunks().0[label]),
                             stored,
                             keep,
                         ),
@@ -120,28 +90,27 @@ impl Unstored<'_> {
         });
     }
 
-    /// For a block of nodes in row y, writes the sums of the pairs of children in each row below it, `[label][half][row][plane]`.
-    fn sum_pairs(&self, lane: usize, y: usize, children: &mut [Block], costs: &mut [Block]) {
+    /// For a block of nodes in row y, writes the sums of the pairs of children in each row below it, `[label][row][plane]`.
+    fn sum_pairs(&self, block: usize, y: usize, labels: &[u16], children: &mut [Block], costs: &mut [Block]) {
         let finer = self.matching.plan.size(self.grid - 1);
-        let (even, rest) = costs.split_at_mut(self.labels.len());
-        let odd = &mut rest[..self.labels.len()];
+        let (even, rest) = costs.split_at_mut(labels.len());
+        let odd = &mut rest[..labels.len()];
         children.fill(Block::ZERO);
-        for (child, row) in (0..4).flat_map(|child| [0, 1].map(|row| (child, row))) {
-            let at = PatchRow { grid: self.grid - 1, patch: 2 * lane / LANES + child, y: 2 * y + row };
+        for (half, row) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let at = PatchRow { grid: self.grid - 1, patch: 2 * block + half, y: 2 * y + row };
             if Patch::COLUMNS * at.patch >= finer.width || at.y >= finer.height {
                 continue;
             }
-            self.matching.unclipped(at, self.labels, [&mut *even, &mut *odd]);
-            let slot = 4 * (child / 2) + 2 * row;
+            self.matching.unclipped(at, labels, [&mut *even, &mut *odd]);
             for (label, children) in children.chunks_exact_mut(CHILDREN).enumerate() {
-                deal_pairs(&even[label], &odd[label], child % 2, &mut children[slot..slot + 2]);
+                deal_pairs(&even[label], &odd[label], half, &mut children[2 * row..2 * row + 2]);
             }
         }
     }
 }
 
-/// The blocks that hold the children of a block of nodes of both planes: two halves, two rows and two planes.
-const CHILDREN: usize = 8;
+/// The blocks that hold the children of a block of nodes of both planes: two rows and two planes.
+const CHILDREN: usize = 4;
 
 /// Sums pairs of columns of a patch, and writes them to the first or second half of a block of each plane.
 fn deal_pairs(even: &Block, odd: &Block, half: usize, to: &mut [Block]) {
@@ -156,22 +125,14 @@ fn deal_pairs(even: &Block, odd: &Block, half: usize, to: &mut [Block]) {
 
 /// The sums of the children of a block of nodes in both rows.
 #[inline(always)]
-fn sum_of_rows(children: &[Block]) -> [[u16; BLOCK]; 2] {
-    let mut sums = [[0; BLOCK]; 2];
-    for (half, rows) in children.chunks_exact(CHILDREN / 2).enumerate() {
-        for (i, row) in rows.iter().enumerate() {
-            let sums = sums[i % 2][half * LANES..(half + 1) * LANES].iter_mut();
-            sums.zip(row.0).for_each(|(sum, value)| *sum += u16::from(value));
+fn sums_of_rows([even, odd, even_below, odd_below]: &[Block; CHILDREN]) -> [[u16; LANES]; 2] {
+    let mut sums = [[0; LANES]; 2];
+    for (sums, rows) in sums.iter_mut().zip([[even, even_below], [odd, odd_below]]) {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = u16::from(rows[0].0[i]) + u16::from(rows[1].0[i]);
         }
     }
     sums
-}
-
-/// Stores the blocks of all labels.
-fn store(layout: &Layout, costs: &[Block], stored: &mut [u8]) {
-    for (label, block) in costs.iter().enumerate() {
-        stored[label * layout.lanes..][..LANES].copy_from_slice(&block.0);
-    }
 }
 
 struct Grids<'a> {
@@ -180,143 +141,115 @@ struct Grids<'a> {
     clip: u8,
 }
 
-/// A type of sums that a grid may keep.
-pub(crate) trait Kept: Sum {
-    fn of(sums: &mut Sums) -> Option<&mut [Self]>;
-}
-
-macro_rules! kept {
-    ($($type:ty => $variant:ident),*) => { $(
-        impl Kept for $type {
-            fn of(sums: &mut Sums) -> Option<&mut [Self]> {
-                if let Sums::$variant(sums) = sums { Some(sums) } else { None }
-            }
-        }
-    )* };
-}
-
-kept!(u8 => U8, u16 => U16, u32 => U32, u64 => U64);
-
 impl Grids<'_> {
-    fn rows<F: Sum + Widen<C>, C: Kept>(&self, fine: &[F], coarse: &mut Costs) {
-        let Costs { stored, sums } = coarse;
-        costs::rows(self.layouts[1], stored, C::of(sums), |y, stored, keep| {
-            let (fine_layout, children) = (self.layouts[0], self.children(fine, y));
-            dispatch!(self.level, simd => costs::store(
-                simd,
-                self.layouts[1],
-                self.clip,
-                #[inline(always)]
-                |lane, label| sum_children(fine_layout, children, lane, label),
-                stored,
-                keep,
-            ));
+    fn rows<F: Sum + Widen<C>, C: Kept>(&self, fine: &[Block<F>], coarse: &mut Costs) {
+        let (layout, Costs { stored, sums }) = (self.layouts[1], coarse);
+        costs::rows(layout, stored, C::of(sums), |y, stored, mut keep| {
+            let children = self.children(fine, y);
+            for block in 0..layout.blocks {
+                let halves = self.halves(children, block);
+                let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
+                let stored = layout.blocks_of(stored, block);
+                dispatch!(self.level, simd => simd.vectorize(
+                    #[inline(always)]
+                    || costs::store_block(
+                        self.clip,
+                        #[inline(always)]
+                        |label| sums_of_children(&halves, label),
+                        stored,
+                        keep,
+                    ),
+                ));
+            }
         });
     }
 
     /// As [`Grids::rows`], for sums that fit 8 bits, as those of the largest grids do.
-    fn narrow_rows(&self, fine: &[u8], coarse: &mut Costs) {
-        let Costs { stored, sums } = coarse;
-        costs::rows(self.layouts[1], stored, u8::of(sums), |y, stored, keep| {
+    fn narrow_rows(&self, fine: &[Block], coarse: &mut Costs) {
+        let (layout, Costs { stored, sums }) = (self.layouts[1], coarse);
+        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
             let children = self.children(fine, y);
-            dispatch!(self.level, simd => self.narrow_row(simd, children, stored, keep));
+            for block in 0..layout.blocks {
+                let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
+                dispatch!(self.level, simd => self.narrow_block(simd, children, block, layout.blocks_of(stored, block), keep));
+            }
         });
     }
 
     /// The two rows of the finer grid that row `y` covers. If the second is missing, it is empty.
-    fn children<'a, F>(&self, fine: &'a [F], y: usize) -> [&'a [F]; 2] {
+    fn children<'a, F>(&self, fine: &'a [Block<F>], y: usize) -> [&'a [Block<F>]; 2] {
         let row = self.layouts[0].row();
         let (upper, rest) = fine[2 * y * row..].split_at(row);
         [upper, rest.get(..row).unwrap_or_default()]
     }
 
+    /// Sums the children of a block of nodes of both planes. The children of coarse column X are lane X of both fine planes.
     #[inline(always)]
-    fn narrow_row<S: Simd>(&self, simd: S, children: [&[u8]; 2], stored: &mut [u8], mut keep: Option<&mut [u8]>) {
-        let layout = self.layouts[1];
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                for strip in layout.strips(0) {
-                    let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
-                    let least = self.narrow_strip(simd, children, strip, raw);
-                    for (plane, least) in least.iter().enumerate() {
-                        let range = plane * layout.plane()..(plane + 1) * layout.plane();
-                        let kept = keep.as_deref().map(|keep| &keep[range.clone()]);
-                        costs::normalise(simd, layout, strip, self.clip, least, kept, &mut stored[range]);
-                    }
-                }
-            },
-        );
+    fn narrow_block<S: Simd>(
+        &self,
+        simd: S,
+        children: [&[Block]; 2],
+        block: usize,
+        [even, odd]: [&mut [Block]; 2],
+        keep: Option<[&mut [Block]; 2]>,
+    ) {
+        let halves = self.halves(children, block);
+        let mut least = [Bytes::<S>::splat(simd, u8::MAX); 2];
+        for (label, (even, odd)) in even.iter_mut().zip(&mut *odd).enumerate() {
+            let [first, second] = halves.map(
+                #[inline(always)]
+                |blocks| sum_of_blocks(simd, blocks, label),
+            );
+            let sums = first.deinterleave(second);
+            even.store(sums.0);
+            odd.store(sums.1);
+            least = [least[0].min(sums.0), least[1].min(sums.1)];
+        }
+        if let Some(keep) = keep {
+            keep.into_iter().zip([&*even, &*odd]).for_each(|(keep, sums)| keep.copy_from_slice(sums));
+        }
+        clip_above(simd, &Block(least[0].into()), self.clip, even);
+        clip_above(simd, &Block(least[1].into()), self.clip, odd);
     }
 
-    /// Sums the children of a strip of nodes in both planes, and returns the least cost of each node.
-    #[inline(always)]
-    fn narrow_strip<S: Simd>(&self, simd: S, children: [&[u8]; 2], strip: Strip, raw: &mut [u8]) -> [[u8; STRIP]; 2] {
-        let [fine, layout] = self.layouts;
-        let (first, second) = raw.split_at_mut(layout.plane());
-        let raw = [first, second];
-        let mut least = [[u8::MAX; STRIP]; 2];
-        for label in 0..layout.labels {
-            let rows = children.map(|row| {
-                let lanes = |plane: usize| row.get(plane * fine.plane() + label * fine.lanes..).unwrap_or_default();
-                [lanes(0), lanes(1)].map(|lanes| lanes.get(..fine.lanes).unwrap_or_default())
-            });
-            for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
-                let from = 2 * (strip.first + lane);
-                let half = |from: usize| sum_of_children(simd, &rows, from);
-                let planes = half(from).deinterleave(half(from + S::u8s::LEN));
-                for (plane, sum) in [planes.0, planes.1].into_iter().enumerate() {
-                    let start = label * layout.lanes + strip.first + lane;
-                    sum.store_slice(&mut raw[plane][start..start + S::u8s::LEN]);
-                    let least = &mut least[plane][lane..lane + S::u8s::LEN];
-                    sum.min(S::u8s::from_slice(simd, least)).store_slice(least);
-                }
-            }
-        }
-        least
+    /// The labels of the two blocks of fine nodes that have a block of coarse nodes as parents, each in both rows and planes. Empty
+    /// where they do not exist, because the last block of coarse nodes may reach beyond the fine ones.
+    fn halves<'a, F>(&self, [upper, lower]: [&'a [Block<F>]; 2], block: usize) -> [[&'a [Block<F>]; 4]; 2] {
+        let fine = self.layouts[0];
+        [2 * block, 2 * block + 1].map(|index| {
+            [(upper, 0), (upper, 1), (lower, 0), (lower, 1)].map(|(row, plane)| {
+                let exists = index < fine.blocks && !row.is_empty();
+                if exists { &row[plane * fine.plane()..][fine.block(index)] } else { &[] }
+            })
+        })
     }
 }
 
-/// Sums a vector of fine lanes over both planes and rows. Lanes beyond the end count as zeros.
+/// Sums blocks that hold a label each. Those that do not exist count as zeros.
 #[inline(always)]
-fn sum_of_children<S: Simd>(simd: S, rows: &[[&[u8]; 2]; 2], from: usize) -> S::u8s {
-    let mut sum = S::u8s::splat(simd, 0);
-    for lanes in rows.iter().flatten() {
-        if from < lanes.len() {
-            sum += S::u8s::from_slice(simd, &lanes[from..from + S::u8s::LEN]);
-        }
-    }
-    sum
+fn sum_of_blocks<S: Simd>(simd: S, blocks: [&[Block]; 4], label: usize) -> Bytes<S> {
+    let [a, b, c, d] = blocks.map(
+        #[inline(always)]
+        |labels| labels.get(label).unwrap_or(&Block::ZERO).load(simd),
+    );
+    a + b + c + d
 }
 
 /// Sums for a block of coarse nodes of both planes. The children of coarse column X are lane X of both planes, so those of lane
 /// i of a coarse plane are lanes 2i + plane.
 #[inline(always)]
-fn sum_children<F: Sum + Widen<C>, C: Sum>(
-    fine: &Layout,
-    children: [&[F]; 2],
-    lane: usize,
-    label: usize,
-) -> [[C; BLOCK]; 2] {
-    let mut sums = [C::default(); 2 * BLOCK];
-    // The last block of coarse lanes may reach beyond the fine ones.
-    let blocks = (2 * lane..fine.lanes).step_by(BLOCK);
-    for (from, sums) in blocks.zip(sums.chunks_exact_mut(BLOCK)) {
-        for row in children.into_iter().filter(|row| !row.is_empty()) {
-            for plane in 0..2 {
-                let lanes = block(row, plane * fine.plane() + label * fine.lanes + from);
-                sums.iter_mut().zip(lanes).for_each(|(sum, lane)| *sum = *sum + lane.widen());
-            }
+fn sums_of_children<F: Sum + Widen<C>, C: Sum>(halves: &[[&[Block<F>]; 4]; 2], label: usize) -> [[C; LANES]; 2] {
+    let mut sums = [[C::default(); LANES]; 2];
+    for (sums, blocks) in sums.iter_mut().zip(halves) {
+        let none = Block([F::default(); LANES]);
+        let [a, b, c, d] = blocks.map(|labels| &labels.get(label).unwrap_or(&none).0);
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = a[i].widen() + b[i].widen() + (c[i].widen() + d[i].widen());
         }
     }
-    [0, 1].map(
-        #[inline(always)]
-        |plane| {
-            let mut every_second = [C::default(); BLOCK];
-            for (i, sum) in every_second.iter_mut().enumerate() {
-                *sum = sums[2 * i + plane];
-            }
-            every_second
-        },
-    )
+    let mut dealt = [[C::default(); LANES]; 2];
+    for (i, pair) in sums.as_flattened().as_chunks::<2>().0.iter().enumerate() {
+        (dealt[0][i], dealt[1][i]) = (pair[0], pair[1]);
+    }
+    dealt
 }

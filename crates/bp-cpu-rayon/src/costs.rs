@@ -1,18 +1,18 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, Plan};
+use bp_core::{Error, Plan, memory};
 use fearless_simd::{Simd, SimdBase};
 use rayon::prelude::*;
 
 use crate::{
-    lines::{self, Lines},
-    shape::{BLOCK, STRIP, Shape, Strip},
+    block::{Block, Bytes, LANES},
+    shape::Shape,
 };
 
-/// Data costs `[height][plane][label][lane]`, in the forms that messages and the sums of coarser grids need.
+/// Data costs `[height][plane][block][label]`, in the forms that messages and the sums of coarser grids need.
 pub(crate) struct Costs {
     /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless sums fit 8 bits without that.
-    pub(crate) stored: Lines<u8>,
+    pub(crate) stored: Vec<Block>,
     /// Neither normalised nor clipped. Only present if the plan keeps them.
     pub(crate) sums: Sums,
 }
@@ -21,10 +21,10 @@ pub(crate) struct Costs {
 pub(crate) enum Sums {
     /// None are kept, because the stored costs are used instead.
     None,
-    U8(Lines<u8>),
-    U16(Lines<u16>),
-    U32(Lines<u32>),
-    U64(Lines<u64>),
+    U8(Vec<Block>),
+    U16(Vec<Block<u16>>),
+    U32(Vec<Block<u32>>),
+    U64(Vec<Block<u64>>),
 }
 
 impl Costs {
@@ -33,50 +33,50 @@ impl Costs {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
             _ if !plan.keeps_sums(grid) => Sums::None,
-            1 => Sums::U8(Lines::new(what, len)?),
-            2 => Sums::U16(Lines::new(what, len)?),
-            4 => Sums::U32(Lines::new(what, len)?),
-            _ => Sums::U64(Lines::new(what, len)?),
+            1 => Sums::U8(memory::filled(what, len, Block::ZERO)?),
+            2 => Sums::U16(memory::filled(what, len, Block([0; LANES]))?),
+            4 => Sums::U32(memory::filled(what, len, Block([0; LANES]))?),
+            _ => Sums::U64(memory::filled(what, len, Block([0; LANES]))?),
         };
-        Ok(Self { stored: Lines::new("data cost", len)?, sums })
+        Ok(Self { stored: memory::filled("data cost", len, Block::ZERO)?, sums })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { stored: Lines::none(), sums: Sums::None }
+        Self { stored: Vec::new(), sums: Sums::None }
     }
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        self.stored.bytes()
+        memory::bytes(&self.stored)
             + match &self.sums {
                 Sums::None => 0,
-                Sums::U8(sums) => sums.bytes(),
-                Sums::U16(sums) => sums.bytes(),
-                Sums::U32(sums) => sums.bytes(),
-                Sums::U64(sums) => sums.bytes(),
+                Sums::U8(sums) => memory::bytes(sums),
+                Sums::U16(sums) => memory::bytes(sums),
+                Sums::U32(sums) => memory::bytes(sums),
+                Sums::U64(sums) => memory::bytes(sums),
             }
     }
 }
 
-/// The number of costs of a grid, including padding.
-pub(crate) fn volume(shape: &Shape) -> usize {
+/// The number of blocks of costs of a grid.
+fn volume(shape: &Shape) -> usize {
     shape.row().saturating_mul(shape.size.height)
 }
 
 /// The bytes that [`Costs`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let len = volume(&Shape::new(plan, grid));
-    let sums = if plan.keeps_sums(grid) { lines::bytes(len, plan.sum_bytes(grid)) } else { 0 };
-    lines::bytes(len, 1).saturating_add(sums)
+    let sums = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
+    (len as u64).saturating_mul((LANES * (1 + sums)) as u64)
 }
 
 /// Calls `row(y, stored, sums)` for all rows of a grid, on several threads.
 pub(crate) fn rows<T: Send>(
     shape: &Shape,
-    stored: &mut [u8],
-    sums: Option<&mut [T]>,
-    row: impl Fn(usize, &mut [u8], Option<&mut [T]>) + Sync,
+    stored: &mut [Block],
+    sums: Option<&mut [Block<T>]>,
+    row: impl Fn(usize, &mut [Block], Option<&mut [Block<T>]>) + Sync,
 ) {
     let stored = stored.par_chunks_exact_mut(shape.row());
     match sums {
@@ -131,104 +131,84 @@ macro_rules! widen {
 
 widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
-/// Stores the costs of a row, block by block. `raw(lane, label)` returns the unclipped costs of a block of both planes, which
+/// A type of sums that a grid may keep.
+pub(crate) trait Kept: Sum {
+    fn of(sums: &mut Sums) -> Option<&mut [Block<Self>]>;
+}
+
+macro_rules! kept {
+    ($($type:ty => $variant:ident),*) => { $(
+        impl Kept for $type {
+            fn of(sums: &mut Sums) -> Option<&mut [Block<Self>]> {
+                if let Sums::$variant(sums) = sums { Some(sums) } else { None }
+            }
+        }
+    )* };
+}
+
+kept!(u8 => U8, u16 => U16, u32 => U32, u64 => U64);
+
+/// Stores the costs of a row, block by block. `raw(block, label)` returns the unclipped costs of a block of both planes, which
 /// are also written to `keep`.
 #[inline(always)]
 pub(crate) fn store<S: Simd, T: Sum>(
     simd: S,
     shape: &Shape,
     clip: u8,
-    raw: impl Fn(usize, usize) -> [[T; BLOCK]; 2],
-    stored: &mut [u8],
-    mut keep: Option<&mut [T]>,
+    raw: impl Fn(usize, usize) -> [[T; LANES]; 2],
+    stored: &mut [Block],
+    mut keep: Option<&mut [Block<T>]>,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            for lane in (0..shape.nodes(0)).step_by(BLOCK) {
+            for block in 0..shape.blocks {
                 store_block(
-                    shape,
                     clip,
-                    lane,
                     #[inline(always)]
-                    |label| raw(lane, label),
-                    stored,
-                    keep.as_deref_mut(),
+                    |label| raw(block, label),
+                    shape.blocks_of(stored, block),
+                    keep.as_deref_mut().map(|keep| shape.blocks_of(keep, block)),
                 );
             }
         },
     );
 }
 
-/// Goes over all labels twice, because the least cost is known only after the first time. The second time it calls `raw` again,
-/// unless the costs were kept.
+/// Stores the costs of a block of both planes, for all labels. Goes over them twice, because the least cost is known only after
+/// the first time. The second time it calls `raw` again, unless the costs were kept.
 #[inline(always)]
 pub(crate) fn store_block<T: Sum>(
-    shape: &Shape,
     clip: u8,
-    lane: usize,
-    raw: impl Fn(usize) -> [[T; BLOCK]; 2],
-    stored: &mut [u8],
-    mut keep: Option<&mut [T]>,
+    raw: impl Fn(usize) -> [[T; LANES]; 2],
+    stored: [&mut [Block]; 2],
+    mut keep: Option<[&mut [Block<T>]; 2]>,
 ) {
-    let start = |plane: usize, label: usize| plane * shape.plane() + label * shape.lanes + lane;
-    let mut least = [[T::MAX; BLOCK]; 2];
-    for label in 0..shape.labels {
+    let mut least = [[T::MAX; LANES]; 2];
+    for label in 0..stored[0].len() {
         let costs = raw(label);
         for plane in 0..2 {
-            for (least, cost) in least[plane].iter_mut().zip(costs[plane]) {
-                *least = cost.min(*least);
-            }
+            least[plane].iter_mut().zip(costs[plane]).for_each(|(least, cost)| *least = cost.min(*least));
             if let Some(keep) = &mut keep {
-                keep[start(plane, label)..][..BLOCK].copy_from_slice(&costs[plane]);
+                keep[plane][label] = Block(costs[plane]);
             }
         }
     }
-    for label in 0..shape.labels {
+    for label in 0..stored[0].len() {
         let costs = match &keep {
-            Some(keep) => [0, 1].map(|plane| *block(keep, start(plane, label))),
+            Some(keep) => [keep[0][label].0, keep[1][label].0],
             None => raw(label),
         };
         for plane in 0..2 {
-            let stored = &mut stored[start(plane, label)..][..BLOCK];
-            for ((stored, cost), least) in stored.iter_mut().zip(costs[plane]).zip(least[plane]) {
-                *stored = (cost - least).clipped(clip);
-            }
+            let stored = stored[plane][label].0.iter_mut().zip(costs[plane]).zip(least[plane]);
+            stored.for_each(|((stored, cost), least)| *stored = (cost - least).clipped(clip));
         }
     }
 }
 
-/// A block of lanes.
+/// Subtracts each node's least cost, and clips the rest.
 #[inline(always)]
-pub(crate) fn block<T>(lanes: &[T], at: usize) -> &[T; BLOCK] {
-    match lanes[at..].first_chunk() {
-        Some(block) => block,
-        None => panic!("rows are padded to whole blocks"),
-    }
-}
-
-/// Normalises and clips a strip of nodes whose least costs are known. The unclipped costs are in `kept`, or already in
-/// `stored`.
-#[inline(always)]
-pub(crate) fn normalise<S: Simd>(
-    simd: S,
-    shape: &Shape,
-    strip: Strip,
-    clip: u8,
-    least: &[u8; STRIP],
-    kept: Option<&[u8]>,
-    stored: &mut [u8],
-) {
-    let clip = S::u8s::splat(simd, clip);
-    for label in 0..shape.labels {
-        let start = label * shape.lanes + strip.first;
-        let stored = &mut stored[start..start + strip.lanes];
-        let kept = kept.map(|kept| &kept[start..start + strip.lanes]);
-        for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
-            let range = lane..lane + S::u8s::LEN;
-            let raw = S::u8s::from_slice(simd, kept.map_or(&stored[range.clone()], |kept| &kept[range.clone()]));
-            let least = S::u8s::from_slice(simd, &least[range.clone()]);
-            (raw - least).min(clip).store_slice(&mut stored[range]);
-        }
-    }
+pub(crate) fn clip_above<S: Simd>(simd: S, least: &Block, clip: u8, costs: &mut [Block]) {
+    let (least, clip) = (least.load(simd), Bytes::splat(simd, clip));
+    costs.iter_mut().for_each(|block| block.store((block.load(simd) - least).min(clip)));
 }

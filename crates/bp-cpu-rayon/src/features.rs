@@ -9,14 +9,14 @@ use bp_core::{
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::shape::{self, BLOCK, MIN_ROWS, deal, every_second};
+use crate::shape::{MIN_ROWS, WIDEST, deal, every_second};
 
 /// The features of both images of a pair, `[height][channel][parity][lane]`. The parity is that of the column.
 pub(crate) struct Features {
     profile: Profile,
     lanes: usize,
     left: Vec<u8>,
-    /// Every row of lanes has a block of padding on both sides.
+    /// Every row of lanes has [`WIDEST`] lanes of padding on both sides.
     right: Vec<u8>,
     /// 255 where the right image has a column, otherwise 0: `[parity][lane]`, with the same padding as `right`.
     inside: [Vec<u8>; 2],
@@ -33,14 +33,14 @@ impl Features {
         let padded = || memory::filled("neighbours' values", padded_bytes(size, profile), 0);
         let inside = |parity: usize| {
             let nodes = (size.width + 1 - parity) / 2;
-            let lane = |lane: usize| if (BLOCK..BLOCK + nodes).contains(&lane) { u8::MAX } else { 0 };
-            (0..lanes + 2 * BLOCK).map(lane).collect()
+            let lane = |lane: usize| if (WIDEST..WIDEST + nodes).contains(&lane) { u8::MAX } else { 0 };
+            (0..lanes + 2 * WIDEST).map(lane).collect()
         };
         Ok(Self {
             profile,
             lanes,
             left: memory::filled("images", rows * lanes, 0)?,
-            right: memory::filled("images", rows * (lanes + 2 * BLOCK), 0)?,
+            right: memory::filled("images", rows * (lanes + 2 * WIDEST), 0)?,
             inside: [inside(0), inside(1)],
             padded: [padded()?, padded()?],
         })
@@ -50,7 +50,7 @@ impl Features {
     pub(crate) fn load(&mut self, level: Level, pair: &StereoPair) {
         let Self { profile, lanes, left, right, padded, .. } = self;
         let [left_padded, right_padded] = padded;
-        let right = Rows { values: right, lanes: *lanes + 2 * BLOCK, offset: BLOCK };
+        let right = Rows { values: right, lanes: *lanes + 2 * WIDEST, offset: WIDEST };
         let left = Rows { values: left, lanes: *lanes, offset: 0 };
         rayon::join(
             || load_image(level, *profile, pair.left(), left_padded, left),
@@ -63,9 +63,9 @@ impl Features {
         &self.left[((y * self.profile.channels() + channel) * 2 + parity) * self.lanes..][..self.lanes]
     }
 
-    /// The features of a row of the right image, starting one block before lane 0.
+    /// The features of a row of the right image, starting [`WIDEST`] lanes before lane 0.
     pub(crate) fn right(&self, y: usize, channel: usize, parity: usize) -> &[u8] {
-        let lanes = self.lanes + 2 * BLOCK;
+        let lanes = self.lanes + 2 * WIDEST;
         &self.right[((y * self.profile.channels() + channel) * 2 + parity) * lanes..][..lanes]
     }
 
@@ -90,16 +90,17 @@ fn load_image(level: Level, profile: Profile, image: &Image, padded: &mut [u8], 
     rows.for_each(|(y, rows)| dispatch!(level, simd => view.fill(simd, y, rows)));
 }
 
-/// The lanes of a row. Behind a margin, a strip of nodes may begin anywhere, and still ends with a whole block.
+/// The lanes of a row. Behind a margin, the first node may lie anywhere, and vectors still end inside the row.
 fn lanes(plan: &Plan) -> usize {
-    shape::lanes(plan.pair_size()) + if plan.margin() > 0 { BLOCK } else { 0 }
+    let lanes = plan.pair_size().width.div_ceil(2).next_multiple_of(WIDEST);
+    lanes + if plan.margin() > 0 { WIDEST } else { 0 }
 }
 
 /// The bytes that [`Features`] will hold.
 pub(crate) fn bytes(plan: &Plan) -> u64 {
     let (size, lanes, profile) = (plan.pair_size(), lanes(plan), plan.model().profile());
     let rows = 2 * profile.channels() * size.height;
-    (rows * (2 * lanes + 2 * BLOCK) + 2 * (lanes + 2 * BLOCK) + 2 * padded_bytes(size, profile)) as u64
+    (rows * (2 * lanes + 2 * WIDEST) + 2 * (lanes + 2 * WIDEST) + 2 * padded_bytes(size, profile)) as u64
 }
 
 fn padded_bytes(size: Size, profile: Profile) -> usize {

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use crate::{
     compare::Vector,
-    shape::{BLOCK, MIN_ROWS, Shape, deal, every_second},
+    shape::{MIN_ROWS, Shape, WIDEST, deal, every_second},
 };
 
-/// Grey values `[height][plane][lane]`, with a block of padding on both sides of every row of lanes. Empty if all
+/// Grey values `[height][plane][lane]`, with [`WIDEST`] lanes of padding on both sides of every row of lanes. Empty if all
 /// edges have the same cost.
 #[derive(Debug)]
 pub(crate) struct Greys {
@@ -68,16 +68,16 @@ impl Greys {
         // If there is no row above or below, no message goes there, so any values will do.
         let (above, below) = (y.saturating_sub(1), (y + 1).min(self.shape.size.height - 1));
         let beside = self.row(1 - plane, y);
-        let same = &beside[BLOCK..];
+        let same = &beside[WIDEST..];
         // An even column has its left neighbour in the pair before it, an odd one its right neighbour in the pair after it.
-        let next = if plane == 0 { &beside[BLOCK - 1..] } else { &beside[BLOCK + 1..] };
+        let next = if plane == 0 { &beside[WIDEST - 1..] } else { &beside[WIDEST + 1..] };
         let neighbours = [same, next, self.lanes(plane, above), self.lanes(plane, below)];
         Some(Around { edges: &self.edges, own: self.lanes(plane, y), neighbours })
     }
 
     /// The values of `plane` in row `y` from lane 0 on.
     fn lanes(&self, plane: usize, y: usize) -> &[u8] {
-        &self.row(plane, y)[BLOCK..]
+        &self.row(plane, y)[WIDEST..]
     }
 
     fn row(&self, plane: usize, y: usize) -> &[u8] {
@@ -99,13 +99,13 @@ pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
 
 /// The distance from one row of lanes to the next.
 fn stride(shape: &Shape) -> usize {
-    shape.lanes + 2 * BLOCK
+    shape.lanes() + 2 * WIDEST
 }
 
 /// Both planes of a row, from lane 0 on.
 fn planes_mut<'a>(shape: &Shape, row: &'a mut [u8]) -> [&'a mut [u8]; 2] {
     let (even, odd) = row.split_at_mut(stride(shape));
-    [&mut even[BLOCK..][..shape.nodes(0)], &mut odd[BLOCK..][..shape.nodes(1)]]
+    [&mut even[WIDEST..][..shape.nodes(0)], &mut odd[WIDEST..][..shape.nodes(1)]]
 }
 
 /// The grey value of a node with these children.

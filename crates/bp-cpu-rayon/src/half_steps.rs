@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use bp_core::Schedule;
 
-use crate::{layout::Layout, shape::PlaneRow};
+use crate::{block::Block, layout::Layout, shape::PlaneRow};
 use wavefront::{Part, Wavefront, fused_steps};
 
 pub(crate) use edges::{Edges, Rows, bytes};
@@ -23,7 +23,7 @@ pub(crate) use select_labels::{Answer, select_labels};
 
 /// The number of steps that run together on a grid.
 pub(crate) fn steps_at_a_time(layout: &Layout) -> usize {
-    fused_steps(layout.row() + edges::row_bytes(layout))
+    fused_steps(layout.row() + edges::row(layout))
 }
 
 /// Runs steps of the plan's schedule on the two sets of messages of a grid.
@@ -49,10 +49,10 @@ pub(crate) fn run(grid: &Pass<'_>, steps: Range<usize>, sets: &mut [Edges; 2]) {
 }
 
 /// Runs half-steps. In step 0 the nodes of colour `sends_first` send. The half-step `last` writes to the second set.
-fn half_steps(grid: &Pass<'_>, steps: Range<usize>, sends_first: usize, sets: [&mut [u8]; 2], last: Option<usize>) {
-    let row_bytes = edges::row_bytes(grid.layout);
-    let [set, other] = sets.map(|rows| Part { row_bytes: if rows.is_empty() { 0 } else { row_bytes }, rows });
-    let step = |[rows, other]: [&mut [u8]; 2], y: usize, t: usize| {
+fn half_steps(grid: &Pass<'_>, steps: Range<usize>, sends_first: usize, sets: [&mut [Block]; 2], last: Option<usize>) {
+    let row = edges::row(grid.layout);
+    let [set, other] = sets.map(|rows| Part { row: if rows.is_empty() { 0 } else { row }, rows });
+    let step = |[rows, other]: [&mut [Block]; 2], y: usize, t: usize| {
         let t = steps.start + t;
         let at = PlaneRow { plane: (y + t + sends_first) % 2, y };
         if t == 0 && !grid.keeps_messages {

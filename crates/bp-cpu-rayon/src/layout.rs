@@ -6,13 +6,13 @@ use bp_core::{Error, Node, Plan, Side, memory};
 
 use crate::{
     greys::{self, Around, Greys},
-    shape::{BLOCK, Shape},
+    shape::{Shape, WIDEST},
 };
 
 /// The bytes that the [`Layout`] of a grid will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
-    let Shape { lanes, size, .. } = Shape::new(plan, grid);
-    (4 * (lanes + 2 * BLOCK) + 2 * lanes + size.height) as u64 + greys::bytes(plan, grid)
+    let shape = Shape::new(plan, grid);
+    (4 * (shape.lanes() + 2 * WIDEST) + 2 * shape.lanes() + shape.size.height) as u64 + greys::bytes(plan, grid)
 }
 
 /// A shape and the edges between its nodes: which of them exist and, once a pair is loaded, their levels.
@@ -20,8 +20,8 @@ pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
 pub(crate) struct Layout {
     shape: Shape,
     /// Two masks for each plane. The first is 255 where a node exchanges messages with its neighbour in the same pair
-    /// of columns, otherwise 0. The second does the same for the neighbour in the next pair. A block of zeros precedes
-    /// and follows each mask.
+    /// of columns, otherwise 0. The second does the same for the neighbour in the next pair. As many zeros as the widest vector has lanes precede
+    /// and follow each mask.
     masks: [[Vec<u8>; 2]; 2],
     /// A mask for nodes without neighbours (all 0), and one for nodes that all have one (all 255).
     none_and_all: [Vec<u8>; 2],
@@ -43,10 +43,10 @@ impl Layout {
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
         let shape = Shape::new(plan, grid);
         let mask = |plane: usize, side: Side| -> Result<Vec<u8>, Error> {
-            let mut mask = memory::filled("masks", shape.lanes + 2 * BLOCK, 0)?;
+            let mut mask = memory::filled("masks", shape.lanes() + 2 * WIDEST, 0)?;
             for lane in 0..shape.nodes(plane) {
                 let joined = plan.neighbour(grid, Node { x: 2 * lane + plane, y: 0 }, side).is_some();
-                mask[BLOCK + lane] = if joined { u8::MAX } else { 0 };
+                mask[WIDEST + lane] = if joined { u8::MAX } else { 0 };
             }
             Ok(mask)
         };
@@ -57,7 +57,10 @@ impl Layout {
         Ok(Self {
             shape,
             masks: [[mask(0, Side::Right)?, mask(0, Side::Left)?], [mask(1, Side::Left)?, mask(1, Side::Right)?]],
-            none_and_all: [memory::filled("masks", shape.lanes, 0)?, memory::filled("masks", shape.lanes, u8::MAX)?],
+            none_and_all: [
+                memory::filled("masks", shape.lanes(), 0)?,
+                memory::filled("masks", shape.lanes(), u8::MAX)?,
+            ],
             joined_above,
             greys: Greys::new(plan, grid)?,
         })
@@ -71,10 +74,10 @@ impl Layout {
 
     /// The masks of `plane` for neighbours in the same and in the next pair of columns, `[lane]`.
     pub(crate) fn masks(&self, plane: usize) -> [&[u8]; 2] {
-        self.padded_masks(plane).map(|mask| &mask[BLOCK..BLOCK + self.lanes])
+        self.padded_masks(plane).map(|mask| &mask[WIDEST..WIDEST + self.lanes()])
     }
 
-    /// As [`Layout::masks`], with a block of zeros before and after.
+    /// As [`Layout::masks`], with the zeros before and after.
     pub(crate) fn padded_masks(&self, plane: usize) -> [&[u8]; 2] {
         self.masks[plane].each_ref().map(Vec::as_slice)
     }

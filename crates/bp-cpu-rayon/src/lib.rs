@@ -16,6 +16,7 @@
 //! * Both have the kernels `refine` and those that send messages and select labels. Each file begins with the loop of the
 //!   scalar version or with what differs from it.
 
+mod block;
 mod coarsen;
 mod compare;
 mod costs;
@@ -23,7 +24,6 @@ mod features;
 mod greys;
 mod half_steps;
 mod layout;
-mod lines;
 mod match_cost;
 mod shape;
 mod solver;

@@ -9,23 +9,31 @@
 //!     for each label d:   cost(d) = min(raw(d) - least, clip)
 //! ```
 //!
-//! Here one lane of a vector is one pixel, so a label is a shift of the right image's lanes.
+//! Here one lane of a vector is one pixel, so a label is a shift of the right image's lanes. `patch` does this for costs that fit
+//! 8 bits, also for coarser grids.
 
-use bp_core::{Plan, Schedule, Seed};
-use fearless_simd::{Level, Simd, SimdBase, dispatch};
+mod patch;
+
+use std::array;
+
+use bp_core::{MAX_LABELS, Plan, Schedule, Seed};
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::{
-    compare::compare_by,
-    costs::{self, Costs, Sums, block},
+    block::{Block, LANES},
+    costs::{self, Costs, Kept, clip_above},
     features::Features,
     layout::Layout,
-    shape::{BLOCK, BlockStart, Column, STRIP, Strip},
+    shape::{PlaneRow, WIDEST},
 };
+
+pub(crate) use patch::PatchRow;
 
 /// The inputs of the data costs of a pair.
 pub(crate) struct Matching<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
+    /// That of grid 0.
     pub(crate) layout: &'a Layout,
     pub(crate) features: &'a Features,
     pub(crate) seed: Option<Seed>,
@@ -48,243 +56,135 @@ fn is_narrow(plan: &Plan) -> bool {
     plan.sum_bytes(0) == 1
 }
 
+/// The list that has every label of a grid.
+pub(crate) fn all_labels(layout: &Layout) -> &'static [u16] {
+    static ALL: [u16; MAX_LABELS] = {
+        let mut all = [0; MAX_LABELS];
+        let mut label = 0;
+        while label < MAX_LABELS {
+            all[label] = label as u16;
+            label += 1;
+        }
+        all
+    };
+    &ALL[..layout.labels]
+}
+
 /// Computes the costs of grid 0.
 pub(crate) fn match_cost(matching: &Matching<'_>, costs: &mut Costs) {
-    let (layout, Costs { stored, sums }) = (matching.layout, costs);
-    match sums {
-        Sums::U8(sums) => {
-            costs::rows(layout, stored, Some(sums), |y, stored, sums| matching.narrow_row(y, stored, sums));
-        }
-        Sums::U16(sums) => {
-            costs::rows(layout, stored, Some(sums), |y, stored, sums| matching.wide_row(y, stored, sums));
-        }
-        _ if is_narrow(matching.plan) => costs::rows(layout, stored, None, |y, stored, _: Option<&mut [u8]>| {
-            matching.narrow_row(y, stored, None);
-        }),
-        _ => costs::rows(layout, stored, None, |y, stored, _: Option<&mut [u16]>| matching.wide_row(y, stored, None)),
+    if is_narrow(matching.plan) {
+        return matching.narrow_rows(0, matching.layout, costs);
     }
+    let Costs { stored, sums } = costs;
+    costs::rows(matching.layout, stored, u16::of(sums), |y, stored, sums| matching.wide_row(y, stored, sums));
 }
 
 impl Matching<'_> {
-    /// Stores the costs of a row of a narrow profile. Also stores the unclipped costs if `sums` has room for them.
-    pub(crate) fn narrow_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u8]>) {
-        let row = Row { matching: self, y };
-        if self.fits() && sums.is_none() {
-            dispatch!(self.level, simd => row.unclipped(simd, stored));
-        } else {
-            dispatch!(self.level, simd => row.narrow(simd, stored, sums));
+    /// Stores the costs of grid 0, 1 or 2, made from the images. They must fit 8 bits.
+    pub(crate) fn narrow_rows(&self, grid: usize, layout: &Layout, costs: &mut Costs) {
+        let labels = all_labels(layout);
+        let Costs { stored, sums } = costs;
+        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
+            for patch in 0..layout.blocks {
+                let at = PatchRow { grid, patch, y };
+                let costs = layout.blocks_of(stored, patch);
+                let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, patch));
+                dispatch!(self.level, simd => self.patch(simd, at, labels, costs, keep));
+            }
+        });
+    }
+
+    /// Writes the costs of both planes of a patch of grid 0, 1 or 2 for these labels, `[entry]`, and before they are clipped
+    /// also to `keep`. They must fit 8 bits.
+    #[inline(always)]
+    pub(crate) fn patch<S: Simd>(
+        &self,
+        simd: S,
+        at: PatchRow,
+        labels: &[u16],
+        [even, odd]: [&mut [Block]; 2],
+        keep: Option<[&mut [Block]; 2]>,
+    ) {
+        let least = self.unclipped(at, labels, [&mut *even, &mut *odd]);
+        if let Some(keep) = keep {
+            keep.into_iter().zip([&*even, &*odd]).for_each(|(keep, costs)| keep.copy_from_slice(costs));
+        } else if at.grid == 0 && self.fits() {
+            return self.fix(at, labels, [even, odd]);
         }
-        self.fix(y, stored);
+        let clip = self.plan.clip(at.grid);
+        clip_above(simd, &least[0], clip, even);
+        clip_above(simd, &least[1], clip, odd);
+        self.fix(at, labels, [even, odd]);
     }
 
     /// Whether unclipped costs need not be normalised and clipped. That never changes a message. It keeps sums within 8 bits.
-    pub(crate) fn fits(&self) -> bool {
+    fn fits(&self) -> bool {
         let model = self.plan.model();
         model.max_cost(0) + 4 * u64::from(model.truncation()) < u8::MAX.into()
     }
 
-    /// The cost of labels far from that of a known match.
-    pub(crate) fn dear(&self) -> u8 {
-        self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8
-    }
-
-    fn wide_row(&self, y: usize, stored: &mut [u8], sums: Option<&mut [u16]>) {
-        let row = Row { matching: self, y };
-        let row = &row;
+    /// Stores the costs of a row of a profile whose costs do not fit 8 bits.
+    fn wide_row(&self, y: usize, stored: &mut [Block], keep: Option<&mut [Block<u16>]>) {
+        let layout = self.layout;
         dispatch!(self.level, simd => costs::store(
             simd,
-            self.layout,
+            layout,
             self.plan.clip(0),
             #[inline(always)]
-            |lane, label| [0, 1].map(|plane| row.sum_of_differences(BlockStart { plane, lane }, label)),
-            stored,
-            sums,
+            |block, label| [0, 1].map(|plane| self.sums_of_differences(PlaneRow { plane, y }, LANES * block, label)),
+            &mut *stored,
+            keep,
         ));
-        self.fix(y, stored);
+        for patch in 0..layout.blocks {
+            self.fix(PatchRow { grid: 0, patch, y }, all_labels(layout), layout.blocks_of(stored, patch));
+        }
     }
 
     /// Sets the costs of the nodes around a known match; see [`Seed`]. It does not change sums: a plan with a cut has
     /// one grid, which needs none.
-    fn fix(&self, y: usize, row: &mut [u8]) {
-        let Some(seed) = self.seed else { return };
-        let layout = self.layout;
-        for Column { plane, lane, .. } in layout.columns().filter(|column| seed.touches(column.x, y)) {
-            for label in 0..layout.labels {
-                let near = (label as u16).abs_diff(seed.label) <= 1;
-                row[plane * layout.plane() + label * layout.lanes + lane] = if near { 0 } else { self.dear() };
+    fn fix(&self, at: PatchRow, labels: &[u16], costs: [&mut [Block]; 2]) {
+        let Some(seed) = self.seed.filter(|_| at.grid == 0) else { return };
+        // The cost of labels far from that of the match.
+        let dear = self.plan.model().profile().max_cost().min(self.plan.clip(0).into()) as u8;
+        for (plane, costs) in costs.into_iter().enumerate() {
+            for lane in (0..LANES).filter(|lane| seed.touches(2 * (LANES * at.patch + lane) + plane, at.y)) {
+                let cost = |&label: &u16| if label.abs_diff(seed.label) <= 1 { 0 } else { dear };
+                labels.iter().zip(&mut *costs).for_each(|(label, block)| block.0[lane] = cost(label));
             }
         }
     }
-}
 
-/// A row that is being matched.
-struct Row<'a> {
-    matching: &'a Matching<'a>,
-    y: usize,
-}
-
-impl Row<'_> {
-    /// Stores the costs of both planes, for profiles whose costs fit 8 bits.
+    /// For a block of nodes, the differences of a pixel and its match, summed over the colour channels.
     #[inline(always)]
-    fn narrow<S: Simd>(&self, simd: S, stored: &mut [u8], mut keep: Option<&mut [u8]>) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let bytes = self.matching.layout.plane();
-                for (plane, stored) in stored.chunks_exact_mut(bytes).enumerate() {
-                    let mut keep = keep.as_mut().map(|keep| &mut keep[plane * bytes..][..bytes]);
-                    for strip in self.matching.layout.strips(plane) {
-                        let raw = keep.as_deref_mut().unwrap_or(&mut *stored);
-                        let least = self.costs(simd, plane, strip, raw);
-                        let clip = self.matching.plan.clip(0);
-                        costs::normalise(simd, self.matching.layout, strip, clip, &least, keep.as_deref(), stored);
-                    }
-                }
-            },
-        );
-    }
-
-    /// Writes the unclipped costs of both planes.
-    #[inline(always)]
-    fn unclipped<S: Simd>(&self, simd: S, raw: &mut [u8]) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                for (plane, raw) in raw.chunks_exact_mut(self.matching.layout.plane()).enumerate() {
-                    for strip in self.matching.layout.strips(plane) {
-                        self.costs(simd, plane, strip, raw);
-                    }
-                }
-            },
-        );
-    }
-
-    #[inline(always)]
-    fn costs<S: Simd>(&self, simd: S, plane: usize, strip: Strip, raw: &mut [u8]) -> [u8; STRIP] {
-        compare_by!(self.matching.plan.model().profile(), S::u8s, self.strip(simd, plane, strip, raw))
-    }
-
-    /// Computes the costs of a strip of nodes by comparing `CHANNELS` channels. Returns the least cost of each node.
-    #[inline(always)]
-    fn strip<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        plane: usize,
-        strip: Strip,
-        raw: &mut [u8],
-        cost: impl Fn([S::u8s; CHANNELS], [S::u8s; CHANNELS]) -> S::u8s,
-    ) -> [u8; STRIP] {
-        let Matching { features, layout, plan, .. } = self.matching;
-        let outside = S::u8s::splat(simd, plan.model().profile().out_of_range_cost() as u8);
-        let (own, offset) = self.own(plane);
-        let left = channels::<CHANNELS>(|channel| strip.of(&features.left(self.y, channel, own)[offset..]));
-        let node = strip.of(&features.inside(own)[BLOCK + offset..]);
-        let right = [0, 1].map(|parity| {
-            let right = channels::<CHANNELS>(|channel| features.right(self.y, channel, parity));
-            (right, features.inside(parity))
-        });
-        let mut least = [u8::MAX; STRIP];
-        for label in 0..layout.labels {
-            let raw = &mut raw[label * layout.lanes + strip.first..][..strip.lanes];
-            let shift = self.shift(plane, label);
-            let (right, inside) = &right[shift.parity];
-            for lane in (0..strip.lanes).step_by(S::u8s::LEN) {
-                let load = |lanes: &[u8], at: usize| S::u8s::from_slice(simd, &lanes[at..at + S::u8s::LEN]);
-                let start = shift.start(strip.first + lane);
-                let cost = cost(left.map(|left| load(left, lane)), right.map(|right| load(right, start)));
-                let inside = load(inside, start);
-                let cost = (cost & inside | outside & !inside) & load(node, lane);
-                cost.store_slice(&mut raw[lane..lane + S::u8s::LEN]);
-                cost.min(load(&least, lane)).store_slice(&mut least[lane..lane + S::u8s::LEN]);
-            }
-        }
-        least
-    }
-
-    /// The sum of the differences over the colour channels.
-    #[inline(always)]
-    fn sum_of_differences(&self, start: BlockStart, label: usize) -> [u16; BLOCK] {
-        let outside = self.matching.plan.model().profile().out_of_range_cost();
-        let mut sum = [0; BLOCK];
-        for channel in 0..3 {
-            let Block { left, right, .. } = self.block(start, label, channel);
-            for i in 0..BLOCK {
-                sum[i] += u16::from(left[i].abs_diff(right[i]));
-            }
-        }
-        let Block { inside, node, .. } = self.block(start, label, 0);
-        std::array::from_fn(|i| match (inside[i], node[i]) {
-            (_, 0) => 0,
-            (0, _) => outside,
-            _ => sum[i],
-        })
-    }
-
-    /// Where the nodes of a plane match under a label.
-    #[inline(always)]
-    fn shift(&self, plane: usize, label: usize) -> Shift {
-        let Matching { plan, .. } = self.matching;
+    fn sums_of_differences(&self, PlaneRow { plane, y }: PlaneRow, first: usize, label: usize) -> [u16; LANES] {
+        let Matching { features, plan, .. } = self;
+        let (own, moved) = self.own(plane);
         // Left column 2i + p, with p = plane + margin, matches right column 2i + p - d, which is lane i + (p - d) div 2.
         let shift = (plan.margin() + plane) as i64 - i64::from(plan.model().disparity(label as u16));
-        let (parity, shift) = ((shift & 1) as usize, shift >> 1);
-        Shift { parity, lanes: shift, nodes: (plan.pair_size().width + 1 - parity) as i64 / 2 }
+        let (parity, columns) = ((shift & 1) as usize, plan.pair_size().width as i64);
+        let start = (first as i64 + (shift >> 1)).clamp(-(WIDEST as i64), (columns + 1 - parity as i64) / 2);
+        let start = (start + WIDEST as i64) as usize;
+        let mut sums = [0; LANES];
+        for channel in 0..3 {
+            let left = &features.left(y, channel, own)[first + moved..][..LANES];
+            let right = &features.right(y, channel, parity)[start..][..LANES];
+            let both = left.iter().zip(right);
+            sums.iter_mut().zip(both).for_each(|(sum, (&left, &right))| *sum += u16::from(left.abs_diff(right)));
+        }
+        let inside = &features.inside(parity)[start..][..LANES];
+        let node = &features.inside(own)[first + moved + WIDEST..][..LANES];
+        let outside = plan.model().profile().out_of_range_cost();
+        array::from_fn(|i| match (inside[i], node[i]) {
+            (_, 0) => 0,
+            (0, _) => outside,
+            _ => sums[i],
+        })
     }
 
     /// Where lane 0 of a plane is in the features of a row: the parity of its column in the pair, and the lane there.
     #[inline(always)]
     fn own(&self, plane: usize) -> (usize, usize) {
-        let column = self.matching.plan.margin() + plane;
+        let column = self.plan.margin() + plane;
         (column % 2, column / 2)
     }
-
-    /// The features that a block of nodes of a plane compares under a label.
-    #[inline(always)]
-    fn block(&self, at: BlockStart, label: usize, channel: usize) -> Block<'_> {
-        let BlockStart { plane, lane } = at;
-        let shift = self.shift(plane, label);
-        let (parity, start) = (shift.parity, shift.start(lane));
-        let (own, offset) = self.own(plane);
-        Block {
-            left: block(self.matching.features.left(self.y, channel, own), lane + offset),
-            right: block(self.matching.features.right(self.y, channel, parity), start),
-            inside: block(self.matching.features.inside(parity), start),
-            node: block(self.matching.features.inside(own), lane + offset + BLOCK),
-        }
-    }
-}
-
-/// The lanes of the right image that match the nodes of a plane under a label.
-#[derive(Clone, Copy)]
-struct Shift {
-    /// The parity of their columns.
-    parity: usize,
-    /// By how many lanes they lie further right.
-    lanes: i64,
-    /// The number of the right image's columns of this parity.
-    nodes: i64,
-}
-
-impl Shift {
-    /// Where the lanes that match those from `lane` on start in [`Features::right`].
-    #[inline(always)]
-    fn start(self, lane: usize) -> usize {
-        ((lane as i64 + self.lanes).clamp(-(BLOCK as i64), self.nodes) + BLOCK as i64) as usize
-    }
-}
-
-/// Calls `lanes` for every channel and collects the results.
-#[inline(always)]
-pub(crate) fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
-    let mut all = [[].as_slice(); CHANNELS];
-    all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
-    all
-}
-
-struct Block<'a> {
-    left: &'a [u8; BLOCK],
-    right: &'a [u8; BLOCK],
-    /// 255 where the right image has a column, otherwise 0.
-    inside: &'a [u8; BLOCK],
-    /// 255 where the left image has a column, otherwise 0.
-    node: &'a [u8; BLOCK],
 }

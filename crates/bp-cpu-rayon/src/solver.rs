@@ -11,7 +11,6 @@ use crate::{
     features::{self, Features},
     half_steps::{self, Answer, Coarser, Edges, Pass, Rows, select_labels},
     layout::{self, Layout},
-    lines,
     match_cost::{Matching, is_stored, match_cost},
     shape::Shape,
     sweep::{self, CostSource, Grid, Swept},
@@ -71,7 +70,7 @@ fn bytes(plan: &Plan, labels: usize) -> u64 {
     let stored = (0..plan.grids()).filter(|&grid| is_stored(plan, grid));
     let costs = stored.map(|grid| costs::bytes(plan, grid));
     let kept = (0..plan.grids().min(2)).filter(|_| has_sets(plan));
-    let messages = kept.map(|grid| 2 * lines::bytes(half_steps::bytes(&Shape::new(plan, grid)), 1));
+    let messages = kept.map(|grid| half_steps::bytes(&Shape::new(plan, grid)).saturating_mul(2));
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let (features, answer) = (features::bytes(plan), (size_of::<u16>() * plan.image_size().pixels()) as u64);
     let others = [features, answer, sweep::bytes(plan, labels)];

@@ -6,14 +6,13 @@
 //!
 //! `pass` runs over rows; it calls `costs`, `refine` and `send` block by block. `decode` decides labels.
 
-mod block;
 mod costs;
 mod crossings;
 mod decode;
 mod edges;
 mod lists;
-mod match_cost;
 mod messages;
+mod padded;
 mod pass;
 mod refine;
 mod room;
@@ -34,14 +33,15 @@ use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-pub(crate) use block::{Block, LANES};
-pub(crate) use costs::{CostSource, clip_above};
-pub(crate) use match_cost::PatchRow;
+pub(crate) use costs::CostSource;
 pub(crate) use room::bytes;
 pub(crate) use swept::{Grid, Swept};
 pub(crate) use windows::Windows;
 
-use crate::layout::Layout;
+use crate::{
+    block::{Block, LANES},
+    layout::Layout,
+};
 use lists::Lists;
 use messages::{Entry, Messages};
 use pass::{Gap, Pass, Start};

@@ -8,22 +8,22 @@ use std::ops::Range;
 
 use bp_core::{Node, Side, Smoothness};
 
-use super::{edges, pass::Pass, refine::slot};
+use super::{
+    edges::{self, Slots},
+    pass::Pass,
+    refine::slot,
+};
+use crate::block::{Block, LANES};
 
 /// Runs loops on both sets.
-pub(super) fn run(grid: &Pass<'_>, start: Node, loops: Range<usize>, mut sets: [&mut [u8]; 2]) {
+pub(super) fn run(grid: &Pass<'_>, start: Node, loops: Range<usize>, mut sets: [&mut [Block]; 2]) {
     if loops.start == 0 && !grid.keeps_messages {
-        sets.iter_mut().for_each(|set| set.fill(0));
+        sets.iter_mut().for_each(|set| set.fill(Block::ZERO));
     }
-    let row_bytes = edges::row_bytes(grid.layout);
+    let row = edges::row(grid.layout);
     for _ in loops {
-        grid.send_rows(
-            start,
-            start.y,
-            start.y..start.y + 1,
-            sets.each_mut().map(|set| &mut set[start.y * row_bytes..]),
-        );
-        let [even, odd] = sets.each_mut().map(|set| set.split_at_mut((start.y + 1) * row_bytes));
+        grid.send_rows(start, start.y, start.y..start.y + 1, sets.each_mut().map(|set| &mut set[start.y * row..]));
+        let [even, odd] = sets.each_mut().map(|set| set.split_at_mut((start.y + 1) * row));
         rayon::join(
             || grid.send_rows(start, 0, (0..start.y).rev(), [even.0, odd.0]),
             || grid.send_rows(start, start.y + 1, start.y + 1..grid.layout.size.height, [even.1, odd.1]),
@@ -33,27 +33,55 @@ pub(super) fn run(grid: &Pass<'_>, start: Node, loops: Range<usize>, mut sets: [
 
 /// A node that sends, and what its messages depend on, by slot.
 struct Sender<'a> {
-    /// Data costs `[label][lane]`.
-    costs: &'a [u8],
-    lanes: usize,
+    /// Data costs of its block, `[label]`.
+    costs: &'a [Block],
     lane: usize,
     smoothness: [Smoothness; 4],
     /// Whether there is a neighbour.
     is_joined: [bool; 4],
 }
 
+/// The messages of one node in one slot: a lane of a block. Empty at the end of a row.
+struct Held<'a> {
+    values: &'a mut [Block],
+    lane: usize,
+}
+
+impl Held<'_> {
+    fn get(&self, label: usize) -> u8 {
+        self.values.get(label).map_or(0, |block| block.0[self.lane])
+    }
+
+    fn set(&mut self, label: usize, value: u8) {
+        if let Some(block) = self.values.get_mut(label) {
+            block.0[self.lane] = value;
+        }
+    }
+}
+
 impl Pass<'_> {
     /// Sends from the nodes of these rows. The sets begin with row `first`.
-    fn send_rows(&self, start: Node, first: usize, rows: impl Iterator<Item = usize>, [even, odd]: [&mut [u8]; 2]) {
+    fn send_rows(&self, start: Node, first: usize, rows: impl Iterator<Item = usize>, [even, odd]: [&mut [Block]; 2]) {
         for y in rows {
-            let from = (y - first) * edges::row_bytes(self.layout);
+            let from = (y - first) * edges::row(self.layout);
             for x in (0..=start.x).rev().chain(start.x + 1..self.layout.size.width) {
                 let node = Node { x, y };
                 let (received, sent) = if node.is_even() { (&mut *even, &mut *odd) } else { (&mut *odd, &mut *even) };
-                let slots = |set| edges::slots(self.layout, set, x % 2);
-                self.sender(node).send(slots(&mut received[from..]), slots(&mut sent[from..]));
+                let (received, sent) = (self.held(node, &mut received[from..]), self.held(node, &mut sent[from..]));
+                self.sender(node).send(&received, sent);
             }
         }
+    }
+
+    /// What a set holds for a node, by slot. Rows start with that of the node.
+    fn held<'a>(&self, node: Node, rows: &'a mut [Block]) -> [Held<'a>; 4] {
+        let Slots { values, moving } = edges::slots(self.layout, rows, node.x % 2);
+        let mut slot = 0;
+        values.map(|values| {
+            let lane = node.x / 2 + usize::from(slot == 1 && moving.is_some());
+            slot += 1;
+            Held { values: values.get_mut(self.layout.block(lane / LANES)).unwrap_or_default(), lane: lane % LANES }
+        })
     }
 
     fn sender(&self, node: Node) -> Sender<'_> {
@@ -64,10 +92,10 @@ impl Pass<'_> {
             is_joined[slot(side, plane)] = self.plan.neighbour(0, node, side).is_some();
         }
         let level = |slot| around.filter(|_| is_joined[slot]).map_or(0, |around| around.level(slot, lane));
+        let first = node.y * layout.row() + plane * layout.plane();
         Sender {
-            costs: &self.costs[node.y * layout.row() + plane * layout.plane()..][..layout.plane()],
-            lanes: layout.lanes,
-            lane,
+            costs: &self.costs[first..][layout.block(lane / LANES)],
+            lane: lane % LANES,
             smoothness: [0, 1, 2, 3].map(|slot| smoothness[level(slot)]),
             is_joined,
         }
@@ -76,22 +104,22 @@ impl Pass<'_> {
 
 impl Sender<'_> {
     /// Sends to all neighbours, in the two passes of [`super::update_messages`]. Between them, the slots hold the envelope.
-    fn send(&self, received: [&mut [u8]; 4], sent: [&mut [u8]; 4]) {
+    fn send(&self, received: &[Held<'_>; 4], mut sent: [Held<'_>; 4]) {
         let (mut envelope, mut least) = ([u8::MAX; 4], [u8::MAX; 4]);
-        for at in (self.lane..self.costs.len()).step_by(self.lanes) {
-            let h = gather(self.costs[at], received.each_ref().map(|slot| slot[at]));
+        for (label, cost) in self.costs.iter().enumerate() {
+            let h = gather(cost.0[self.lane], received.each_ref().map(|held| held.get(label)));
             for slot in (0..4).filter(|&slot| self.is_joined[slot]) {
                 envelope[slot] = envelope[slot].saturating_add(self.smoothness[slot].step()).min(h[slot]);
                 least[slot] = least[slot].min(envelope[slot]);
-                sent[slot][at] = envelope[slot];
+                sent[slot].set(label, envelope[slot]);
             }
         }
         envelope = [u8::MAX; 4];
-        for at in (self.lane..self.costs.len()).step_by(self.lanes).rev() {
+        for label in (0..self.costs.len()).rev() {
             for slot in (0..4).filter(|&slot| self.is_joined[slot]) {
                 let Smoothness { truncation, .. } = self.smoothness[slot];
-                envelope[slot] = envelope[slot].saturating_add(self.smoothness[slot].step()).min(sent[slot][at]);
-                sent[slot][at] = (envelope[slot] - least[slot]).min(truncation);
+                envelope[slot] = envelope[slot].saturating_add(self.smoothness[slot].step()).min(sent[slot].get(label));
+                sent[slot].set(label, (envelope[slot] - least[slot]).min(truncation));
             }
         }
     }

@@ -8,14 +8,14 @@ use super::{
     refine::{Coarser, refine},
     update_messages::{Nodes, update_messages},
 };
-use crate::{layout::Layout, shape::PlaneRow};
+use crate::{block::Block, layout::Layout, shape::PlaneRow};
 
 /// Everything that updating the messages of a grid needs besides the messages.
 pub(crate) struct Pass<'a> {
     pub(crate) level: Level,
     pub(crate) plan: &'a Plan,
     pub(crate) layout: &'a Layout,
-    pub(crate) costs: &'a [u8],
+    pub(crate) costs: &'a [Block],
     pub(crate) coarser: Option<Coarser<'a>>,
     /// Whether the grid starts with the messages that it already holds, instead of those of the coarser grid.
     pub(crate) keeps_messages: bool,
@@ -23,15 +23,15 @@ pub(crate) struct Pass<'a> {
 
 impl Pass<'_> {
     /// Writes the first messages of the nodes of a plane in a row. `rows` start with that row.
-    pub(crate) fn refine(&self, at: PlaneRow, rows: &mut [u8]) {
+    pub(crate) fn refine(&self, at: PlaneRow, rows: &mut [Block]) {
         let mut slots = edges::slots(self.layout, rows, at.plane);
-        refine(self.level, self.plan, self.layout, self.coarser, at, &mut slots);
+        refine(self.level, self.plan, self.layout, self.coarser, at, &mut slots.values);
     }
 
     /// Sends the messages of the nodes of a plane in a row. `rows` start with that row.
-    pub(crate) fn send(&self, at: PlaneRow, rows: &mut [u8]) {
+    pub(crate) fn send(&self, at: PlaneRow, rows: &mut [Block]) {
         let mut slots = edges::slots(self.layout, rows, at.plane);
-        self.drop_missing(at.y, &mut slots);
+        self.drop_missing(at.y, &mut slots.values);
         update_messages(self.level, &self.nodes(at), slots);
     }
 
@@ -40,18 +40,17 @@ impl Pass<'_> {
         Nodes {
             costs: &self.costs[y * layout.row() + plane * layout.plane()..][..layout.plane()],
             masks: layout.masks(plane),
-            nodes: layout.nodes(plane),
-            lanes: layout.lanes,
+            shape: layout,
             edges: model.edges(),
             around: layout.around(plane, y),
         }
     }
 
     /// Sets the slots of missing neighbours above and below to zeros. Masks handle those at the sides.
-    fn drop_missing(&self, y: usize, [_, _, up, down]: &mut [&mut [u8]; 4]) {
+    fn drop_missing(&self, y: usize, [_, _, up, down]: &mut [&mut [Block]; 4]) {
         for (row, slot) in [(y, up), (y + 1, down)] {
             if !self.layout.joined_above(row) {
-                slot.fill(0);
+                slot.fill(Block::ZERO);
             }
         }
     }

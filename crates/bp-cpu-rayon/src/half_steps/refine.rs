@@ -12,10 +12,11 @@
 use bp_core::{MessageStart, Plan, Side};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use super::edges::Rows;
+use super::edges::{Received, Rows};
 use crate::{
+    block::{Block, Bytes, LANES},
     layout::Layout,
-    shape::{BLOCK, PlaneRow},
+    shape::{PlaneRow, WIDEST},
 };
 
 /// The last messages of the next coarser grid.
@@ -35,13 +36,13 @@ pub(crate) fn refine(
     layout: &Layout,
     coarser: Option<Coarser<'_>>,
     at: PlaneRow,
-    slots: &mut [&mut [u8]; 4],
+    slots: &mut [&mut [Block]; 4],
 ) {
     for side in Side::ALL {
         let slot = &mut *slots[slot(side, at.plane)];
         match coarser.and_then(|coarser| source(plan, coarser, at, side)) {
-            Some(source) => dispatch!(level, simd => source.expand(simd, layout, at.plane, slot)),
-            None => slot[..layout.plane()].fill(0),
+            Some(source) => dispatch!(level, simd => source.expand(simd, layout, slot)),
+            None => slot.fill(Block::ZERO),
         }
     }
 }
@@ -56,18 +57,16 @@ pub(crate) fn slot(side: Side, plane: usize) -> usize {
     }
 }
 
-/// The source of the first messages of fine nodes: lane i takes them from lane i div 2 of `planes[i % 2]`.
+/// The source of the first messages in a slot: lane i takes them from lane i div 2 of `planes[i % 2]`.
 #[derive(Clone, Copy)]
 struct Source<'a> {
-    lanes: usize,
     planes: [Parents<'a>; 2],
 }
 
 /// The nodes of a coarse row and plane that messages are taken from.
 #[derive(Clone, Copy)]
 struct Parents<'a> {
-    /// Their messages, `[label][lane]`.
-    values: &'a [u8],
+    received: Received<'a>,
     /// 255 where a lane has a neighbour that sends, otherwise 0. `None` if all have one.
     mask: Option<&'a [u8]>,
 }
@@ -86,81 +85,53 @@ fn source<'a>(plan: &Plan, coarser: Coarser<'a>, at: PlaneRow, side: Side) -> Op
     };
     let y = (y / 2).checked_add_signed(rows).filter(|&y| y < layout.size.height)?;
     let [even, odd] = columns(side, plane, by_sender).map(|(plane, moved)| {
-        let received = &coarser.received[(plane + y) % 2];
+        let received = coarser.received[(plane + y) % 2].towards(side, plane, y)?.moved(moved);
         let mask = matches!(side, Side::Left | Side::Right).then(|| layout.padded_masks(plane)[slot(side, plane)]);
-        let mask = mask.map(|mask| &mask[BLOCK.wrapping_add_signed(moved)..]);
-        Some(Parents { values: received.towards_moved(side, plane, y, moved)?, mask })
+        Some(Parents { received, mask: mask.map(|mask| &mask[WIDEST.wrapping_add_signed(moved)..]) })
     });
-    Some(Source { lanes: layout.lanes, planes: [even?, odd?] })
+    Some(Source { planes: [even?, odd?] })
 }
 
-/// For the even and the odd lanes of a fine plane, whose lane i has coarse column i as its parent: the coarse plane
-/// that messages are taken from, and the offset in lanes.
+/// For the even and the odd lanes of the slot of a fine plane, whose lane i has coarse column i as its parent: the coarse
+/// plane that messages are taken from, and the offset in lanes.
 fn columns(side: Side, plane: usize, by_sender: bool) -> [(usize, isize); 2] {
     match (side, plane) {
         // A sender's parent that is also the receiver's parent sends to the adjacent coarse column.
         (Side::Left, 1) if by_sender => [(1, 0), (0, 1)],
         (Side::Right, 0) if by_sender => [(1, -1), (0, 0)],
+        // The values of this slot are moved; see [`super::edges`].
+        (Side::Right, 1) => [(1, -1), (0, 0)],
         _ => [(0, 0), (1, 0)],
     }
 }
 
 impl Source<'_> {
-    /// Writes the first messages of the nodes of `plane`.
+    /// Writes the first messages of a slot.
     #[inline(always)]
-    fn expand<S: Simd>(&self, simd: S, layout: &Layout, plane: usize, slot: &mut [u8]) {
-        interleave(
-            simd,
-            layout,
-            plane,
-            slot,
-            #[inline(always)]
-            |label, lane| self.load(simd, label * self.lanes + lane, lane),
-        );
+    fn expand<S: Simd>(&self, simd: S, layout: &Layout, slot: &mut [Block]) {
+        for (block, to) in slot.chunks_mut(2 * layout.labels).enumerate() {
+            let (first, second) = to.split_at_mut(layout.labels);
+            self.expand_block(simd, block, first, second);
+        }
     }
 
-    /// The messages of two vectors of parents, those in even and those in odd columns.
+    /// Writes the first messages of the two blocks of nodes that have the nodes of a coarse block as parents. The second block
+    /// may be missing.
     #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> [S::u8s; 2] {
-        let [even, odd] = &self.planes;
-        [even.load(simd, from, lane), odd.load(simd, from, lane)]
-    }
-}
-
-/// Writes to the nodes of a plane what `parents` returns for a label and a lane of their parents.
-#[inline(always)]
-fn interleave<S: Simd>(
-    simd: S,
-    layout: &Layout,
-    plane: usize,
-    slot: &mut [u8],
-    parents: impl Fn(usize, usize) -> [S::u8s; 2],
-) {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            for (label, to) in slot[..layout.plane()].chunks_exact_mut(layout.lanes).enumerate() {
-                for at in (0..layout.nodes(plane)).step_by(2 * S::u8s::LEN) {
-                    let [even, odd] = parents(label, at / 2);
-                    let (low, high) = even.interleave(odd);
-                    low.store_slice(&mut to[at..at + S::u8s::LEN]);
-                    if at + S::u8s::LEN < layout.lanes {
-                        high.store_slice(&mut to[at + S::u8s::LEN..at + 2 * S::u8s::LEN]);
-                    }
-                }
+    fn expand_block<S: Simd>(&self, simd: S, block: usize, first: &mut [Block], second: &mut [Block]) {
+        let parents = self.planes.map(|parents| parents.received.block(block));
+        let all = Bytes::<S>::splat(simd, u8::MAX);
+        let masks = self.planes.map(|parents| {
+            parents.mask.map_or(all, |mask| Bytes::from_slice(simd, &mask[LANES * block..LANES * (block + 1)]))
+        });
+        for (label, first) in first.iter_mut().enumerate() {
+            let even = parents[0].load(simd, label) & masks[0];
+            let odd = parents[1].load(simd, label) & masks[1];
+            let (low, high) = even.interleave(odd);
+            first.store(low);
+            if let Some(second) = second.get_mut(label) {
+                second.store(high);
             }
-        },
-    );
-}
-
-impl Parents<'_> {
-    /// The messages of a vector of lanes that starts at `from`; zeros where a lane has no sender.
-    #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, from: usize, lane: usize) -> S::u8s {
-        let values = S::u8s::from_slice(simd, &self.values[from..from + S::u8s::LEN]);
-        match self.mask {
-            Some(mask) => values & S::u8s::from_slice(simd, &mask[lane..lane + S::u8s::LEN]),
-            None => values,
         }
     }
 }

@@ -12,148 +12,163 @@
 //!     the message is h
 //! ```
 //!
-//! Here one lane of a vector is one node, and all sides are computed together: [`pass_up`] runs the upward loop and
-//! [`pass_down`] the downward one. An edge has one slot. It holds the message received until `pass_up` overwrites it.
+//! Here one lane of a vector is one node, and all sides are computed together: `pass_up` runs the upward loop and
+//! `pass_down` the downward one. An edge has one slot. It holds the message received until `pass_up` overwrites it.
 
 use bp_core::{EdgeLevels, Smoothness};
-use fearless_simd::{Level, Simd, SimdBase, dispatch, u8x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdInt, dispatch};
 
+use super::edges::Slots;
 use crate::{
-    compare::Vector,
+    block::{Block, Bytes, LANES},
     greys::{Around, of_levels},
+    shape::Shape,
 };
 
 /// The nodes of one plane in one row, with everything that their messages depend on.
 pub(crate) struct Nodes<'a> {
-    /// Data costs `[label][lane]`.
-    pub(crate) costs: &'a [u8],
+    /// Data costs `[block][label]`.
+    pub(crate) costs: &'a [Block],
     /// The masks of the first two slots; see [`crate::layout::Layout::masks`].
     pub(crate) masks: [&'a [u8]; 2],
-    /// Number of nodes.
-    pub(crate) nodes: usize,
-    /// Lanes from one label to the next.
-    pub(crate) lanes: usize,
+    pub(crate) shape: &'a Shape,
     /// The smoothness costs of edges.
     pub(crate) edges: &'a EdgeLevels,
     /// The grey values that determine the levels of edges; `None` if all have the same cost.
     pub(crate) around: Option<Around<'a>>,
 }
 
+/// Sends messages in place: each overwrites the message that came over the same edge.
+pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: Slots<'_>) {
+    match (nodes.around.is_some(), slots.moving.is_some()) {
+        (false, false) => dispatch!(level, simd => nodes.send::<_, false, false>(simd, slots)),
+        (false, true) => dispatch!(level, simd => nodes.send::<_, false, true>(simd, slots)),
+        (true, false) => dispatch!(level, simd => nodes.send::<_, true, false>(simd, slots)),
+        (true, true) => dispatch!(level, simd => nodes.send::<_, true, true>(simd, slots)),
+    }
+}
+
+/// The data costs of a block of nodes and its edges, for every label.
+struct OfBlock<'a> {
+    costs: &'a [Block],
+    slots: [&'a mut [Block]; 4],
+    /// If values of the second slot are moved, that slot in the next block, and the messages that the block before this one sent
+    /// there. The first lane of the slot belongs to the last node of that block, so it is written one block late.
+    moved: [&'a mut [Block]; 2],
+    /// See [`Nodes::masks`].
+    masks: [&'a [u8]; 2],
+}
+
 impl Nodes<'_> {
-    fn labels(&self) -> usize {
-        self.costs.len() / self.lanes
+    /// Sends the messages of the plane, block by block.
+    #[inline(always)]
+    fn send<S: Simd, const LEVELS: bool, const MOVED: bool>(&self, simd: S, slots: Slots<'_>) {
+        let (labels, [same, next, up, down]) = (self.shape.labels, slots.values);
+        let room = slots.moving.unwrap_or_default();
+        let nothing: &mut [Block] = &mut [];
+        for block in 0..self.shape.blocks {
+            let range = self.shape.block(block);
+            let (own, after) = next[range.start..].split_at_mut(labels);
+            // Behind the last block are no nodes, so any values will do.
+            let after = if !MOVED { &mut *nothing } else { after.get_mut(..labels).unwrap_or(&mut *nothing) };
+            let masks = self.masks.map(|mask| &mask[LANES * block..LANES * (block + 1)]);
+            let mut of_block = OfBlock {
+                costs: &self.costs[range.clone()],
+                slots: [&mut same[range.clone()], own, &mut up[range.clone()], &mut down[range]],
+                moved: [after, &mut *room],
+                masks,
+            };
+            let step = self.of_edges::<S, LEVELS>(simd, block, Smoothness::step);
+            let least = of_block.pass_up::<S, MOVED>(simd, step);
+            let truncation = self.of_edges::<S, LEVELS>(simd, block, |smoothness| smoothness.truncation);
+            of_block.pass_down::<S, MOVED>(simd, step, least, truncation);
+        }
     }
 
-    /// A value of the smoothness cost for the edges of a vector of nodes, by slot. Without `LEVELS`, every edge has the same
+    /// A value of the smoothness cost for the edges of a block of nodes, by slot. Without `LEVELS`, every edge has the same
     /// value.
     #[inline(always)]
-    fn of_edges<S: Simd, V: Vector<S>, const LEVELS: bool>(
+    fn of_edges<S: Simd, const LEVELS: bool>(
         &self,
         simd: S,
-        at: usize,
+        block: usize,
         value: impl Fn(Smoothness) -> u8,
-    ) -> [V; 4] {
+    ) -> [Bytes<S>; 4] {
         let by_level = self.edges.smoothness().map(value);
-        let mut values = [V::splat(simd, by_level[0]); 4];
+        let mut values = [Bytes::splat(simd, by_level[0]); 4];
         if let Some(around) = self.around.filter(|_| LEVELS) {
             for (slot, out) in values.iter_mut().enumerate() {
-                *out = of_levels(simd, around.levels(simd, slot, at), by_level);
+                *out = of_levels(simd, around.levels(simd, slot, LANES * block), by_level);
             }
         }
         values
     }
 }
 
-/// Sends messages in place: each overwrites the message that came over the same edge.
-pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
-    if nodes.around.is_some() {
-        dispatch!(level, simd => row::<_, true>(simd, nodes, slots));
-    } else {
-        dispatch!(level, simd => row::<_, false>(simd, nodes, slots));
+/// The messages of a block of nodes (Felzenszwalb and Huttenlocher 2006). A pass up the labels adds the received messages and
+/// starts the lower envelope; a pass down finishes it. Between the two passes, the slots hold the envelope.
+impl OfBlock<'_> {
+    /// Writes the upward envelopes to the slots and returns the least entry of each side's h.
+    #[inline(always)]
+    fn pass_up<S: Simd, const MOVED: bool>(&mut self, simd: S, step: [Bytes<S>; 4]) -> [Bytes<S>; 4] {
+        let Self { costs, slots: [same, next, up, down], moved: [after, _], masks } = self;
+        let masks = masks.map(|mask| Bytes::from_slice(simd, mask));
+        let mut envelope = [Bytes::splat(simd, u8::MAX); 4];
+        let mut least = envelope;
+        let slots = same.iter_mut().zip(next.iter_mut()).zip(up.iter_mut().zip(down.iter_mut()));
+        for (label, (cost, ((same, next), (up, down)))) in costs.iter().zip(slots).enumerate() {
+            let mut received = [&*same, &*next, &*up, &*down].map(
+                #[inline(always)]
+                |block| block.load(simd),
+            );
+            if MOVED {
+                let after = after.get(label).unwrap_or(&Block::ZERO).load(simd);
+                received[1] = received[1].slide::<1>(after);
+            }
+            let [of_same, of_next, of_up, of_down] = received;
+            let h = gather(cost.load(simd), [of_same & masks[0], of_next & masks[1], of_up, of_down]);
+            for side in 0..4 {
+                envelope[side] = envelope[side].saturating_add(step[side]).min(h[side]);
+                least[side] = least[side].min(envelope[side]);
+            }
+            same.store(envelope[0]);
+            next.store(envelope[1]);
+            up.store(envelope[2]);
+            down.store(envelope[3]);
+        }
+        least
     }
-}
 
-/// Processes a row vector by vector. The last vector may reach beyond the last node into the padding, where it does not matter what
-/// happens; it is narrow if a narrow one is enough.
-#[inline(always)]
-fn row<S: Simd, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: [&mut [u8]; 4]) {
-    let [same, next, up, down] = slots;
-    // Slices of one known length let the compiler drop the bounds checks in the loops.
-    let len = nodes.costs.len();
-    let mut slots = [&mut same[..len], &mut next[..len], &mut up[..len], &mut down[..len]];
-    for at in (0..nodes.nodes).step_by(S::u8s::LEN) {
-        if nodes.nodes - at > u8x16::<S>::LEN {
-            vector::<S, S::u8s, LEVELS>(simd, nodes, &mut slots, at);
-        } else {
-            vector::<S, u8x16<S>, LEVELS>(simd, nodes, &mut slots, at);
-        }
-    }
-}
-
-/// Sends the messages of a vector of nodes. A pass up the labels adds the received messages and starts the lower
-/// envelope; a pass down finishes it (Felzenszwalb and Huttenlocher 2006). Between the two passes, the slots hold the
-/// envelope.
-#[inline(always)]
-fn vector<S, V, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slots: &mut [&mut [u8]; 4], at: usize)
-where
-    S: Simd,
-    V: Vector<S>,
-{
-    let least = pass_up::<S, V, LEVELS>(simd, nodes, slots, at);
-    pass_down::<S, V, LEVELS>(simd, nodes, slots, at, least);
-}
-
-/// Writes the upward envelopes to the slots and returns the least entry of each side's h.
-#[inline(always)]
-fn pass_up<S: Simd, V: Vector<S>, const LEVELS: bool>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    slots: &mut [&mut [u8]; 4],
-    at: usize,
-) -> [V; 4] {
-    let step = nodes.of_edges::<S, V, LEVELS>(simd, at, Smoothness::step);
-    let masks = nodes.masks.map(|mask| V::from_slice(simd, &mask[at..at + V::LEN]));
-    let mut envelope = [V::splat(simd, u8::MAX); 4];
-    let mut least = envelope;
-    let mut start = at;
-    while start + V::LEN <= nodes.costs.len() {
-        let h = gather::<S, V>(simd, nodes, masks, slots, start);
-        for side in 0..4 {
-            envelope[side] = envelope[side].saturating_add(step[side]).min(h[side]);
-            least[side] = least[side].min(envelope[side]);
-        }
-        for side in 0..4 {
-            envelope[side].store_slice(&mut slots[side][start..start + V::LEN]);
-        }
-        start += nodes.lanes;
-    }
-    least
-}
-
-/// Turns the upward envelopes into messages.
-#[inline(always)]
-fn pass_down<S: Simd, V: Vector<S>, const LEVELS: bool>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    slots: &mut [&mut [u8]; 4],
-    at: usize,
-    least: [V; 4],
-) {
-    let step = nodes.of_edges::<S, V, LEVELS>(simd, at, Smoothness::step);
-    let truncation = nodes.of_edges::<S, V, LEVELS>(simd, at, |smoothness| smoothness.truncation);
-    let mut envelope = [V::splat(simd, u8::MAX); 4];
-    let mut start = at + nodes.labels() * nodes.lanes;
-    while start > at {
-        start -= nodes.lanes;
-        // All loads come before the stores: slots often lie a multiple of 4 KiB apart, and a load would have to wait
-        // for a store at such a distance.
-        for side in 0..4 {
-            let half = V::from_slice(simd, &slots[side][start..start + V::LEN]);
-            envelope[side] = envelope[side].saturating_add(step[side]).min(half);
-        }
-        for side in 0..4 {
-            let message = (envelope[side] - least[side]).min(truncation[side]);
-            message.store_slice(&mut slots[side][start..start + V::LEN]);
+    /// Turns the upward envelopes into messages.
+    #[inline(always)]
+    fn pass_down<S: Simd, const MOVED: bool>(
+        &mut self,
+        simd: S,
+        step: [Bytes<S>; 4],
+        least: [Bytes<S>; 4],
+        truncation: [Bytes<S>; 4],
+    ) {
+        let Self { slots: [same, next, up, down], moved: [_, before], .. } = self;
+        let mut envelope = [Bytes::splat(simd, u8::MAX); 4];
+        let slots = same.iter_mut().zip(next.iter_mut()).zip(up.iter_mut().zip(down.iter_mut()));
+        for (label, ((same, next), (up, down))) in slots.enumerate().rev() {
+            let mut message = [&*same, &*next, &*up, &*down].map(
+                #[inline(always)]
+                |block| block.load(simd),
+            );
+            for side in 0..4 {
+                envelope[side] = envelope[side].saturating_add(step[side]).min(message[side]);
+                message[side] = (envelope[side] - least[side]).min(truncation[side]);
+            }
+            if let Some(before) = before.get_mut(label).filter(|_| MOVED) {
+                let sent = message[1];
+                message[1] = before.load(simd).slide::<{ LANES - 1 }>(sent);
+                before.store(sent);
+            }
+            same.store(message[0]);
+            next.store(message[1]);
+            up.store(message[2]);
+            down.store(message[3]);
         }
     }
 }
@@ -161,18 +176,7 @@ fn pass_down<S: Simd, V: Vector<S>, const LEVELS: bool>(
 /// Computes h for each side: the data cost plus the messages received from the other three sides. The sum of two
 /// messages is at most 2K, so only additions to the data cost can saturate.
 #[inline(always)]
-fn gather<S: Simd, V: Vector<S>>(
-    simd: S,
-    nodes: &Nodes<'_>,
-    masks: [V; 2],
-    slots: &[&mut [u8]; 4],
-    start: usize,
-) -> [V; 4] {
-    let range = start..start + V::LEN;
-    let load = |values: &[u8]| V::from_slice(simd, &values[range.clone()]);
-    let cost = load(nodes.costs);
-    let [same, next] = [load(slots[0]) & masks[0], load(slots[1]) & masks[1]];
-    let [up, down] = [load(slots[2]), load(slots[3])];
+fn gather<S: Simd>(cost: Bytes<S>, [same, next, up, down]: [Bytes<S>; 4]) -> [Bytes<S>; 4] {
     let sides = cost.saturating_add(same + next);
     let (vertical_up, vertical_down) = (sides.saturating_add(down), sides.saturating_add(up));
     let vertical = cost.saturating_add(up + down);

@@ -15,15 +15,17 @@
 
 use std::ops::Range;
 
+use crate::block::Block;
+
 /// Bytes of rows that one thread keeps in cache. Running more steps together needs more rows.
 const REACH: usize = 6 << 20;
 
 /// The most steps that run together. More would save nothing.
 const MOST_STEPS: usize = 16;
 
-/// The number of steps to run together over rows of `row_bytes` bytes. Each step needs one more row in cache.
-pub(crate) fn fused_steps(row_bytes: usize) -> usize {
-    (REACH / row_bytes.max(1)).clamp(1, MOST_STEPS)
+/// The number of steps to run together over rows of so many blocks. Each step needs one more row in cache.
+pub(crate) fn fused_steps(row: usize) -> usize {
+    (REACH / (row * size_of::<Block>()).max(1)).clamp(1, MOST_STEPS)
 }
 
 /// Steps over the rows of a grid. A step on row y reads and writes rows y and y + 1, and needs the step before it to be
@@ -45,7 +47,7 @@ impl Wavefront {
     pub(crate) fn run<const N: usize>(
         self,
         buffers: [Part<'_>; N],
-        step: &(impl Fn([&mut [u8]; N], usize, usize) + Sync),
+        step: &(impl Fn([&mut [Block]; N], usize, usize) + Sync),
     ) {
         let slab = self.slab();
         let last = (self.height - 1) / slab;
@@ -79,7 +81,7 @@ impl Wavefront {
         mut rows: [Part<'_>; N],
         first: usize,
         range: impl Fn(usize) -> Range<usize>,
-        step: &impl Fn([&mut [u8]; N], usize, usize),
+        step: &impl Fn([&mut [Block]; N], usize, usize),
     ) {
         let (from, to) = (range(0).start.min(range(self.steps - 1).start), range(0).end.max(range(self.steps - 1).end));
         for front in from..to + self.steps {
@@ -94,25 +96,25 @@ impl Wavefront {
 /// Consecutive rows of a buffer.
 pub(crate) struct Part<'a> {
     /// The rows.
-    pub(crate) rows: &'a mut [u8],
-    /// The bytes of one row.
-    pub(crate) row_bytes: usize,
+    pub(crate) rows: &'a mut [Block],
+    /// The blocks of one row.
+    pub(crate) row: usize,
 }
 
 impl<'a> Part<'a> {
     fn reborrow(&mut self) -> Part<'_> {
-        Part { rows: self.rows, row_bytes: self.row_bytes }
+        Part { rows: self.rows, row: self.row }
     }
 
-    fn starting_at(&mut self, row: usize) -> &mut [u8] {
-        &mut self.rows[row * self.row_bytes..]
+    fn starting_at(&mut self, index: usize) -> &mut [Block] {
+        &mut self.rows[index * self.row..]
     }
 
     /// Splits off the first `rows` rows.
     fn split_at(self, rows: usize) -> (Self, Self) {
-        let (first, second) = self.rows.split_at_mut((rows * self.row_bytes).min(self.rows.len()));
-        let row_bytes = self.row_bytes;
-        (Self { rows: first, row_bytes }, Self { rows: second, row_bytes })
+        let (first, second) = self.rows.split_at_mut((rows * self.row).min(self.rows.len()));
+        let row = self.row;
+        (Self { rows: first, row }, Self { rows: second, row })
     }
 }
 
@@ -136,7 +138,7 @@ pub(crate) fn each_slab<const N: usize>(
                 index += 1;
                 first
             });
-            let second = second.map(|rest| rest.unwrap_or(Part { rows: &mut [], row_bytes: 0 }));
+            let second = second.map(|rest| rest.unwrap_or(Part { rows: &mut [], row: 0 }));
             let halves = (slabs.start..middle, middle..slabs.end);
             rayon::join(|| each_slab(first, halves.0, slab, f), || each_slab(second, halves.1, slab, f));
         }

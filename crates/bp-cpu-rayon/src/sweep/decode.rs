@@ -15,13 +15,16 @@ use bp_core::{MAX_TRUNCATION, Model, Smoothness};
 use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
 
 use super::{
-    block::{Block, Bytes, LANES, Padded},
     edges::{levels, of_sides},
     lists::List,
     messages::Place,
+    padded::Padded,
     pass::Pass,
 };
-use crate::greys::Around;
+use crate::{
+    block::{Block, Bytes, LANES},
+    greys::Around,
+};
 
 /// A distance of labels that costs the truncation for every slope but 0.
 const FAR: usize = MAX_TRUNCATION as usize + 1;

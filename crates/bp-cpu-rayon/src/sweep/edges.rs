@@ -5,8 +5,10 @@
 use bp_core::EdgeLevels;
 use fearless_simd::{Simd, SimdBase};
 
-use super::block::Bytes;
-use crate::greys::{Around, of_levels};
+use crate::{
+    block::Bytes,
+    greys::{Around, of_levels},
+};
 
 /// The levels of the edges of these slots, or the first level if there are no grey values.
 #[inline(always)]

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use bp_core::{Error, Side, memory};
 
-use super::block::{Block, Padded};
+use super::padded::Padded;
+use crate::block::Block;
 
 /// Messages by edge, each array `[row][..][entry]` with the entries of [`Lists`](super::lists::Lists). An edge has one slot,
 /// which holds the message that was sent over it last. Only the edge between two patches has two: the same message for the

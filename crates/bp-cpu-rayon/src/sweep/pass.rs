@@ -9,13 +9,16 @@ use fearless_simd::{Simd, dispatch};
 
 use super::{
     Sweep, Work,
-    block::{Block, LANES, Padded},
     lists::{Lists, Source},
     messages::{Messages, Place},
+    padded::Padded,
     refine::At,
     send::{self, Slots, to_sides},
 };
-use crate::greys::Around;
+use crate::{
+    block::{Block, LANES},
+    greys::Around,
+};
 
 /// The messages that a pass down starts with.
 #[derive(Clone, Copy, PartialEq, Eq)]

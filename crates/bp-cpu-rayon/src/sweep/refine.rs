@@ -11,11 +11,14 @@ use fearless_simd::{Simd, SimdBase, SimdCombine, SimdInt, u8x16};
 
 use super::{
     Band,
-    block::{Block, Bytes, LANES, Padded},
     lists::{Lists, Source, sources},
     messages::{Around, Held, Place},
+    padded::Padded,
 };
-use crate::layout::Layout;
+use crate::{
+    block::{Block, Bytes, LANES},
+    layout::Layout,
+};
 
 /// The coarse rows that a finer row is interpolated between lie within this number of rows.
 const ROWS: usize = 3;

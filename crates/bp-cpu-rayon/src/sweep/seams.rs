@@ -4,10 +4,8 @@ use std::sync::RwLock;
 
 use bp_core::{Error, Plan, Schedule, Seam, memory};
 
-use super::{
-    block::Block,
-    lists::{self, Lists, sources},
-};
+use super::lists::{self, Lists, sources};
+use crate::block::Block;
 
 /// One seam. Every grid overwrites what was prepared for the coarser one.
 #[derive(Default)]

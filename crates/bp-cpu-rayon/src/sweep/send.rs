@@ -7,11 +7,14 @@ use bp_core::EdgeLevels;
 use fearless_simd::{Simd, SimdBase, SimdInt};
 
 use super::{
-    block::{Block, Bytes, LANES, Padded},
     edges::{levels, of_edges, of_sides},
     lists::List,
+    padded::Padded,
 };
-use crate::greys::Around;
+use crate::{
+    block::{Block, Bytes, LANES},
+    greys::Around,
+};
 
 /// The nodes of a block, with everything that their messages depend on. Each slice is `[entry]`.
 pub(crate) struct Nodes<'a> {

@@ -5,12 +5,12 @@ use std::sync::{Mutex, PoisonError};
 use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
 
 use super::{
-    block::Block,
     crossings::{self, Crossings},
     lists::{self, Lists},
     messages::{self, Messages},
     refine::{self, CoarseRows},
 };
+use crate::block::Block;
 
 /// The memory in which one thread passes messages.
 #[derive(Default)]
@@ -30,9 +30,9 @@ pub(crate) struct Work {
     pub(crate) crossings: Crossings,
 }
 
-/// The costs of so many rows, for each entry. Sums of grid 3 are made of ten.
+/// The costs of so many rows, for each entry. Sums of grid 3 are made of six.
 fn costs(rows: usize) -> usize {
-    2 * rows.max(5)
+    2 * rows.max(3)
 }
 
 impl Work {

@@ -14,11 +14,11 @@ use std::{array, ops::Range};
 
 use fearless_simd::{Simd, SimdBase, SimdSplit, dispatch, u8x64};
 
-use super::block::{Block, Bytes, LANES};
+use super::Matching;
 use crate::{
+    block::{Block, Bytes, LANES},
     compare::{Vector, compare_by},
-    match_cost::{Matching, channels},
-    shape::BLOCK,
+    shape::WIDEST,
 };
 
 /// The nodes of both planes of a patch in row y of a grid.
@@ -105,12 +105,12 @@ impl Matching<'_> {
         cost: impl Fn([u8x64<S>; CHANNELS], [u8x64<S>; CHANNELS]) -> u8x64<S>,
     ) -> [Block; 2] {
         let rows = Rows::<S, u8x64<S>, CHANNELS, ROWS>::new(simd, self, y);
-        let first = SPANS * BLOCK * patch;
+        let first = SPANS * WIDEST * patch;
         let spans: [_; SPANS] = array::from_fn(
             #[inline(always)]
-            |span| self.lanes(&rows, y, first + span * BLOCK),
+            |span| self.lanes(&rows, y, first + span * WIDEST),
         );
-        run(simd, &Squares { rows, spans, cost }, first..first + SPANS * BLOCK, self, to)
+        run(simd, &Squares { rows, spans, cost }, first..first + SPANS * WIDEST, self, to)
     }
 
     /// Loads the lanes of the left image from `first` on. Those beyond the image count as zeros. A row may lack a second span;
@@ -122,26 +122,34 @@ impl Matching<'_> {
         y: usize,
         first: usize,
     ) -> Lanes<V, CHANNELS, ROWS> {
-        let exists = first < self.layout.lanes;
-        let first = if exists { first } else { first - BLOCK };
+        let exists = first < self.layout.lanes();
+        let first = if exists { first } else { first - WIDEST };
         let left =
-            |row: usize, plane: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, plane));
-        let node = |plane: usize| rows.load(self.features.inside(plane), BLOCK + first);
+            |row: usize, parity: usize| channels::<CHANNELS>(|channel| self.features.left(y + row, channel, parity));
         let none = V::splat(rows.simd, 0);
         let mut lanes = Lanes { first: first as i32, left: [[[none; CHANNELS]; ROWS]; 2], exist: [none; 2] };
         // Loops are inlined where `map` is not.
         for plane in 0..2 {
+            let (parity, moved) = self.own(plane);
             for row in 0..ROWS {
-                for (lanes, left) in lanes.left[plane][row].iter_mut().zip(left(row, plane)) {
-                    *lanes = rows.load(left, first);
+                for (lanes, left) in lanes.left[plane][row].iter_mut().zip(left(row, parity)) {
+                    *lanes = rows.load(left, first + moved);
                 }
             }
             if exists {
-                lanes.exist[plane] = node(plane);
+                lanes.exist[plane] = rows.load(self.features.inside(parity), WIDEST + first + moved);
             }
         }
         lanes
     }
+}
+
+/// Calls `lanes` for every channel and collects the results.
+#[inline(always)]
+fn channels<'a, const CHANNELS: usize>(lanes: impl Fn(usize) -> &'a [u8]) -> [&'a [u8]; CHANNELS] {
+    let mut all = [[].as_slice(); CHANNELS];
+    all.iter_mut().enumerate().for_each(|(channel, of)| *of = lanes(channel));
+    all
 }
 
 /// The pixels that the nodes of a patch cover: `SPANS` vectors of lanes of both planes, in `ROWS` rows.
@@ -150,10 +158,13 @@ struct Footprint<const SPANS: usize, const ROWS: usize>;
 /// Rows of the right image.
 struct Rows<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> {
     simd: S,
-    /// By parity of the column, from a block before lane 0 on.
+    /// By parity of the column; see [`crate::features::Features::right`].
     right: [[[&'a [u8]; CHANNELS]; ROWS]; 2],
     inside: [&'a [u8]; 2],
-    nodes: [i32; 2],
+    /// The number of columns of each parity.
+    columns: [i32; 2],
+    /// Columns of the pair before the first node.
+    margin: i32,
     outside: V,
 }
 
@@ -169,13 +180,15 @@ struct Lanes<V, const CHANNELS: usize, const ROWS: usize> {
 impl<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> Rows<'a, S, V, CHANNELS, ROWS> {
     #[inline(always)]
     fn new(simd: S, matching: &'a Matching<'_>, y: usize) -> Self {
-        let Matching { features, layout, plan, .. } = matching;
+        let Matching { features, plan, .. } = matching;
+        let (width, margin) = (plan.pair_size().width as i32, plan.margin() as i32);
         let right = |row: usize, parity: usize| channels(|channel| features.right(y + row, channel, parity));
         Self {
             simd,
             right: [0, 1].map(|parity| array::from_fn(|row| right(row, parity))),
             inside: [0, 1].map(|parity| features.inside(parity)),
-            nodes: [0, 1].map(|parity| layout.nodes(parity) as i32),
+            columns: [(width + 1) / 2, width / 2],
+            margin,
             outside: V::splat(simd, plan.model().profile().out_of_range_cost() as u8),
         }
     }
@@ -195,11 +208,11 @@ impl<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> Rows<'
         disparity: i32,
         cost: &impl Fn([V; CHANNELS], [V; CHANNELS]) -> V,
     ) -> V {
-        // Left column 2i + plane matches right column 2i + plane - d, which is lane i + (plane - d) div 2.
-        let shift = plane as i32 - disparity;
+        // Left column 2i + p, with p = plane + margin, matches right column 2i + p - d, which is lane i + (p - d) div 2.
+        let shift = plane as i32 + self.margin - disparity;
         let (parity, start) = ((shift & 1) as usize, lanes.first + (shift >> 1));
-        let start = if INSIDE { start } else { start.clamp(-(BLOCK as i32), self.nodes[parity]) };
-        let start = (start + BLOCK as i32) as usize;
+        let start = if INSIDE { start } else { start.clamp(-(WIDEST as i32), self.columns[parity]) };
+        let start = (start + WIDEST as i32) as usize;
         let mut sum = V::splat(self.simd, 0);
         for row in 0..ROWS {
             let right = self.right[parity][row].map(
@@ -306,11 +319,10 @@ fn run<S: Simd>(
 
 /// The labels, which ascend, under which all pixels in these lanes are matched with pixels of the image.
 fn inside(matching: &Matching<'_>, lanes: Range<usize>, labels: &[u16]) -> Range<usize> {
-    let nodes = [0, 1].map(|plane| matching.layout.nodes(plane));
-    // The lane of even columns moves by -d div 2, rounded down, and that of odd columns by (1 - d) div 2.
-    let least = 2 * (lanes.end.min(nodes[0]) as i32 - nodes[1] as i32);
-    let most = 2 * lanes.start as i32;
-    let disparity = |label: u16| matching.plan.model().min_disparity() + i32::from(label);
-    let start = labels.partition_point(|&label| disparity(label) < least);
-    start..labels.partition_point(|&label| disparity(label) <= most).max(start)
+    let Matching { plan, .. } = matching;
+    let width = plan.pair_size().width as i32;
+    let [first, end] = [lanes.start, lanes.end].map(|lane| (2 * lane + plan.margin()) as i32);
+    let disparity = |label: u16| plan.model().min_disparity() + i32::from(label);
+    let start = labels.partition_point(|&label| disparity(label) < end.min(width) - width);
+    start..labels.partition_point(|&label| disparity(label) <= first).max(start)
 }
