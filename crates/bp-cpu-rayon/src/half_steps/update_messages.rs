@@ -52,9 +52,11 @@ pub(crate) fn update_messages(level: Level, nodes: &Nodes<'_>, slots: Slots<'_>)
 struct OfBlock<'a> {
     costs: &'a [Block],
     slots: [&'a mut [Block]; 4],
-    /// If values of the second slot are moved, that slot in the next block, and the messages that the block before this one sent
-    /// there. The first lane of the slot belongs to the last node of that block, so it is written one block late.
-    moved: [&'a mut [Block]; 2],
+    /// If values of the second slot are moved, that slot in the next block.
+    after: &'a [Block],
+    /// And what the block before this one sent there: the first lane of the slot belongs to the last node of that block, so it is
+    /// written one block late.
+    before: &'a mut [Block],
     /// See [`Nodes::masks`].
     masks: [&'a [u8]; 2],
 }
@@ -65,17 +67,16 @@ impl Nodes<'_> {
     fn send<S: Simd, const LEVELS: bool, const MOVED: bool>(&self, simd: S, slots: Slots<'_>) {
         let (labels, [same, next, up, down]) = (self.shape.labels, slots.values);
         let room = slots.moving.unwrap_or_default();
-        let nothing: &mut [Block] = &mut [];
         for block in 0..self.shape.blocks {
             let range = self.shape.block(block);
             let (own, after) = next[range.start..].split_at_mut(labels);
-            // Behind the last block are no nodes, so any values will do.
-            let after = if !MOVED { &mut *nothing } else { after.get_mut(..labels).unwrap_or(&mut *nothing) };
             let masks = self.masks.map(|mask| &mask[LANES * block..LANES * (block + 1)]);
             let mut of_block = OfBlock {
                 costs: &self.costs[range.clone()],
                 slots: [&mut same[range.clone()], own, &mut up[range.clone()], &mut down[range]],
-                moved: [after, &mut *room],
+                // Behind the last block are no nodes, so any values will do.
+                after: after.get(..labels).unwrap_or_default(),
+                before: &mut *room,
                 masks,
             };
             let step = self.of_edges::<S, LEVELS>(simd, block, Smoothness::step);
@@ -111,7 +112,7 @@ impl OfBlock<'_> {
     /// Writes the upward envelopes to the slots and returns the least entry of each side's h.
     #[inline(always)]
     fn pass_up<S: Simd, const MOVED: bool>(&mut self, simd: S, step: [Bytes<S>; 4]) -> [Bytes<S>; 4] {
-        let Self { costs, slots: [same, next, up, down], moved: [after, _], masks } = self;
+        let Self { costs, slots: [same, next, up, down], after, masks, .. } = self;
         let masks = masks.map(|mask| Bytes::from_slice(simd, mask));
         let mut envelope = [Bytes::splat(simd, u8::MAX); 4];
         let mut least = envelope;
@@ -148,7 +149,7 @@ impl OfBlock<'_> {
         least: [Bytes<S>; 4],
         truncation: [Bytes<S>; 4],
     ) {
-        let Self { slots: [same, next, up, down], moved: [_, before], .. } = self;
+        let Self { slots: [same, next, up, down], before, .. } = self;
         let mut envelope = [Bytes::splat(simd, u8::MAX); 4];
         let slots = same.iter_mut().zip(next.iter_mut()).zip(up.iter_mut().zip(down.iter_mut()));
         for (label, ((same, next), (up, down))) in slots.enumerate().rev() {
