@@ -54,6 +54,11 @@ impl Adapter {
         Self { raw, info, properties }
     }
 
+    /// Whether it has an extension.
+    pub(crate) fn has_extension(&self, instance: &ash::Instance, name: &CStr) -> bool {
+        has_extension(instance, self.raw, name)
+    }
+
     /// The size limits of a device that supports Vulkan 1.2.
     pub(crate) fn most_bytes(&self, instance: &ash::Instance) -> MostBytes {
         let mut allocation = vk::PhysicalDeviceMaintenance3Properties::default();
@@ -119,7 +124,8 @@ fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {
     }
 }
 
-fn text<E>(text: Result<&CStr, E>) -> String {
+/// A text from a driver.
+pub(crate) fn text<E>(text: Result<&CStr, E>) -> String {
     text.map_or_else(|_| String::new(), |text| text.to_string_lossy().into_owned())
 }
 

@@ -40,6 +40,15 @@ pub(crate) struct Gpu {
 impl Gpu {
     /// Opens a device. The error is the reason as text.
     pub(crate) fn open(instance: Instance, adapter: Adapter) -> Result<Self, String> {
+        Self::open_with(instance, adapter, vk::DeviceCreateInfo::default())
+    }
+
+    /// As [`Gpu::open`], with what `info` asks for besides.
+    pub(crate) fn open_with(
+        instance: Instance,
+        adapter: Adapter,
+        info: vk::DeviceCreateInfo<'_>,
+    ) -> Result<Self, String> {
         if adapter.properties.api_version < vk::API_VERSION_1_2 {
             let (name, api) = (&adapter.info.name, adapter.info.api.as_deref().unwrap_or_default());
             return Err(format!("{name} has {api} where 1.2 is needed; a newer driver may have it"));
@@ -47,7 +56,7 @@ impl Gpu {
         // SAFETY: the device belongs to this instance, here and below.
         let families = unsafe { instance.raw().get_physical_device_queue_family_properties(adapter.raw) };
         let family = best_family(&families).ok_or_else(|| format!("{} does not compute", adapter.info.name))?;
-        let raw = make(&instance, &adapter, family)?;
+        let raw = make(&instance, &adapter, family, info)?;
         Ok(Self {
             // SAFETY: the device was made with one queue of this family.
             queue: Mutex::new(unsafe { raw.get_device_queue(family, 0) }),
@@ -144,11 +153,16 @@ impl Drop for Gpu {
     }
 }
 
-/// Makes a logical device with one queue of this family. The device must support Vulkan 1.2.
-fn make(instance: &Instance, adapter: &Adapter, family: u32) -> Result<ash::Device, String> {
+/// Makes a logical device with one queue of this family. The device must support Vulkan 1.2 and what `info` asks for.
+fn make(
+    instance: &Instance,
+    adapter: &Adapter,
+    family: u32,
+    info: vk::DeviceCreateInfo<'_>,
+) -> Result<ash::Device, String> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
     let mut features = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
-    let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features);
+    let info = info.queue_create_infos(&queues).push_next(&mut features);
     // SAFETY: the device belongs to this instance and has the family. Timeline semaphores are part of Vulkan 1.2.
     let raw = unsafe { instance.raw().create_device(adapter.raw, &info, None) };
     raw.map_err(|error| format!("{} cannot be opened: {error}", adapter.info.name))

@@ -5,6 +5,7 @@
 //! * A prepared program is a `queue` of work over its `resources`: `buffers`, bind groups and `pipelines`, which naga
 //!   translates in `spirv`.
 //! * `commands` records, `timeline` submits and waits, and `timer` reads the device's clock.
+//! * `statistics` asks a driver's compiler about kernels, without running them.
 //! * Every Vulkan handle is an `object` with one owner.
 #![deny(clippy::undocumented_unsafe_blocks)]
 
@@ -23,6 +24,7 @@ mod pipelines;
 mod queue;
 mod resources;
 mod spirv;
+mod statistics;
 mod timeline;
 mod timer;
 pub mod validation;
@@ -32,6 +34,8 @@ use bp_core::{Backend, Device, DeviceInfo, Error};
 use bp_gpu::{Limits, missing};
 use device::VulkanDevice;
 use instance::Instance;
+
+pub use statistics::{Statistics, statistics};
 
 /// The backend.
 #[derive(Clone, Copy, Debug, Default)]

@@ -81,7 +81,8 @@ impl Pipelines {
             return Ok(Arc::clone(compiled));
         }
         let layout = self.layout(wanted.kernel)?;
-        let raw = compile(&self.gpu, self.cache.raw, layout.pipeline.raw, wanted)?;
+        let flags = vk::PipelineCreateFlags::empty();
+        let raw = compile(&self.gpu, self.cache.raw, layout.pipeline.raw, wanted, flags)?;
         let compiled = Arc::new(Compiled { raw, layout, warm: AtomicBool::new(false) });
         self.compiled.insert(wanted.clone(), Arc::clone(&compiled));
         Ok(compiled)
@@ -116,7 +117,8 @@ fn cache_key(gpu: &Gpu) -> String {
     format!("vulkan-{vendor_id:x}-{device_id:x}-{driver_version:x}-{uuid}")
 }
 
-fn lay_out(gpu: &Arc<Gpu>, kernel: Kernel) -> Result<Layout, Error> {
+/// The layout of a kernel's bind groups.
+pub(crate) fn lay_out(gpu: &Arc<Gpu>, kernel: Kernel) -> Result<Layout, Error> {
     let binding = |(binding, kind)| {
         vk::DescriptorSetLayoutBinding::default()
             .binding(binding)
@@ -138,11 +140,13 @@ fn lay_out(gpu: &Arc<Gpu>, kernel: Kernel) -> Result<Layout, Error> {
     Ok(Layout { set, pipeline })
 }
 
-fn compile(
+/// Compiles a kernel.
+pub(crate) fn compile(
     gpu: &Arc<Gpu>,
     cache: vk::PipelineCache,
     layout: vk::PipelineLayout,
     wanted: &Pipeline,
+    flags: vk::PipelineCreateFlags,
 ) -> Result<Owned<vk::Pipeline>, Error> {
     let device = || gpu.name().to_owned();
     let words = spirv::translate(wanted).map_err(|reason| Error::Device { device: device(), reason })?;
@@ -153,7 +157,7 @@ fn compile(
     let name = CString::new(wanted.kernel.name()).unwrap_or_default();
     let stage = vk::PipelineShaderStageCreateInfo::default();
     let stage = stage.stage(vk::ShaderStageFlags::COMPUTE).module(module.raw).name(&name);
-    let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+    let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout).flags(flags);
     // SAFETY: the layout matches what the module declares. Both belong to the device and are alive. Whoever compiles
     // has exclusive access to the cache.
     let made = unsafe { gpu.raw().create_compute_pipelines(cache, &[info], None) };
