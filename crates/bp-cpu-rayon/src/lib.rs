@@ -8,11 +8,11 @@
 //!
 //! Where to start reading:
 //!
-//! * `shape` explains how the values of a grid lie in memory, `layout` and `greys` which edges exist and what level they have.
+//! * `shape` and `block` explain how the values of a grid lie in memory, `layout` and `greys` which edges exist and what level they have.
 //! * `match_cost` (on `features` and `compare`) and `coarsen` compute data costs.
 //! * `half_steps` runs the schedules `sync` and `checkerboard` over whole grids. Its `edges` explains why one message per edge
 //!   is enough.
-//! * `sweep` runs the schedule of that name over one band of rows at a time, in blocks, each with its own list of labels.
+//! * `sweep` runs the schedule of that name over one band of rows at a time, whose blocks have lists of labels of their own.
 //! * Both have the kernels `refine` and those that send messages and select labels. Each file begins with the loop of the
 //!   scalar version or with what differs from it.
 

@@ -9,7 +9,7 @@ use crate::{
     coarsen::{coarsen, coarsen_unstored},
     costs::{self, Costs},
     features::{self, Features},
-    half_steps::{self, Answer, Coarser, Edges, Pass, Rows, select_labels},
+    half_steps::{self, Coarser, Edges, Labels, Last, Pass, Rows},
     layout::{self, Layout},
     match_cost::{Matching, is_stored, match_cost},
     shape::Shape,
@@ -25,9 +25,13 @@ pub(crate) struct RayonSolver {
     costs: Vec<Costs>,
     /// The messages of even grids and of odd ones: only a grid and the next coarser one are needed at the same time.
     messages: [Messages; 2],
+    /// The labels, unless bands are swept.
+    labels: Labels,
     swept: Swept,
     /// Whether grid 0 starts with the messages that it already holds.
     keeps_messages: bool,
+    /// Whether grid 0 lacks the messages that the senders of its last half-step received; see [`Last::DecidesOnly`].
+    lacks_messages: bool,
     seed: Option<Seed>,
     /// The most bytes to allocate.
     limit: u64,
@@ -37,7 +41,7 @@ pub(crate) struct RayonSolver {
 ///
 /// A grid is bipartite. So a synchronous run consists of two independent runs of half-steps: in one the even nodes send
 /// first, in the other the odd nodes. `sync` uses a set for each of them. `checkerboard` is only the first run; its
-/// last half-step writes to the second set, so that the messages its senders received are not lost. `outward` has a set for
+/// last half-step writes to the second set, so that the messages its senders received are not lost, if they are needed. `outward` has a set for
 /// the messages that even nodes receive, and one for those of odd nodes. `sweep` keeps none here, see [`Swept`].
 struct Messages {
     sets: [Edges; 2],
@@ -73,7 +77,8 @@ fn bytes(plan: &Plan, labels: usize) -> u64 {
     let messages = kept.map(|grid| half_steps::bytes(&Shape::new(plan, grid)).saturating_mul(2));
     let layouts = (0..plan.grids()).map(|grid| layout::bytes(plan, grid));
     let (features, answer) = (features::bytes(plan), (size_of::<u16>() * plan.image_size().pixels()) as u64);
-    let others = [features, answer, sweep::bytes(plan, labels)];
+    let decided = if has_sets(plan) { half_steps::labels_bytes(&Shape::new(plan, 0)) } else { 0 };
+    let others = [features, answer, decided, sweep::bytes(plan, labels)];
     costs.chain(messages).chain(layouts).chain(others).fold(0, u64::saturating_add)
 }
 
@@ -89,8 +94,10 @@ impl RayonSolver {
             features: Features::new(plan)?,
             costs: (0..plan.grids()).map(costs).collect::<Result<_, _>>()?,
             messages: [messages(0)?, messages(1)?],
+            labels: if has_sets(plan) { Labels::new(plan)? } else { Labels::none() },
             swept: Swept::new(plan)?,
             keeps_messages: false,
+            lacks_messages: false,
             seed: None,
             limit: u64::MAX,
             plan: plan.clone(),
@@ -119,10 +126,31 @@ impl RayonSolver {
         Some(Coarser { layout, received: received(&self.plan, layout, &self.messages[(grid + 1) % 2]) })
     }
 
-    fn answer(&self) -> Answer<'_> {
-        let layout = &self.layouts[0];
-        let received = received(&self.plan, layout, &self.messages[0]);
-        Answer { level: self.level, layout, stored: &self.costs[0].stored, received }
+    /// What the last step of a grid does. After an even number of half-steps, the next frame of a video starts with messages that
+    /// are there in any case. A frame that starts with messages keeps all, because they could not be computed again.
+    fn last(&self, grid: usize) -> Last {
+        let settings = self.plan.settings();
+        match grid {
+            0 if self.keeps_messages || settings.steps % 2 == 1 || settings.schedule != Schedule::Checkerboard => {
+                Last::Decides
+            }
+            0 => Last::DecidesOnly,
+            _ => Last::Keeps,
+        }
+    }
+
+    /// Passes messages in half-steps or loops.
+    fn pass_messages(&mut self, grid: usize, steps: Range<u32>, last: Last) {
+        let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
+        let mut labels = std::mem::replace(&mut self.labels, Labels::none());
+        let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
+        let coarser = self.coarser(grid);
+        let keeps_messages = grid == 0 && self.keeps_messages;
+        let pass = Pass { level: self.level, plan: &self.plan, layout, costs, coarser, keeps_messages, last };
+        half_steps::run(&pass, steps.start as usize..steps.end as usize, &mut messages.sets, &mut labels);
+        self.messages[grid % 2] = messages;
+        self.labels = labels;
+        self.lacks_messages = last == Last::DecidesOnly;
     }
 }
 
@@ -181,7 +209,7 @@ impl Solver for RayonSolver {
     /// Even nodes send first, in the first set. So the set with the messages they received last must become the first.
     fn keep_messages(&mut self) -> Result<(), Error> {
         let [of_even, _] = received_in(&self.plan);
-        self.messages[0].sets.rotate_left(of_even);
+        self.messages[0].sets.rotate_left(if self.lacks_messages { 0 } else { of_even });
         self.keeps_messages = true;
         Ok(())
     }
@@ -192,32 +220,32 @@ impl Solver for RayonSolver {
             let is_last = steps.end == self.plan.settings().steps;
             return if is_last { self.with_swept(|swept, solver| solver.sweep(grid, swept)) } else { Ok(()) };
         }
-        let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
-        let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
-        let coarser = self.coarser(grid);
-        let keeps_messages = grid == 0 && self.keeps_messages;
-        let pass = Pass { level: self.level, plan: &self.plan, layout, costs, coarser, keeps_messages };
-        half_steps::run(&pass, steps.start as usize..steps.end as usize, &mut messages.sets);
-        self.messages[grid % 2] = messages;
+        self.pass_messages(grid, steps, self.last(grid));
         Ok(())
     }
 
+    /// Only hands the labels out. They are decided in the last step, while messages are in cache.
     fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
             Schedule::Sweep => labels.copy_from_slice(self.swept.labels()),
-            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => select_labels(&self.answer(), labels),
+            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
+                self.labels.hand_out(&self.layouts[0], labels);
+            }
         }
         Ok(())
     }
 
+    /// Passes the messages of grid 0 once more, if some of them were not kept.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
-        match self.plan.settings().schedule {
-            Schedule::Sweep => self.swept.read_messages(&self.grid(0), side, messages),
-            Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
-                self.answer().read_messages(&self.plan, side, messages);
-                Ok(())
-            }
+        if self.plan.settings().schedule == Schedule::Sweep {
+            return self.swept.read_messages(&self.grid(0), side, messages);
         }
+        if self.lacks_messages {
+            self.pass_messages(0, 0..self.plan.settings().steps, Last::Decides);
+        }
+        let received = received(&self.plan, &self.layouts[0], &self.messages[0]);
+        half_steps::read_messages(&self.plan, received, side, messages);
+        Ok(())
     }
 
     fn fused_steps(&self) -> u32 {
@@ -230,10 +258,12 @@ impl Solver for RayonSolver {
     }
 
     /// Refining is part of updating: the first step on a grid reads the coarser grid's messages instead of its own. Over all
-    /// grids, this saves reading the messages of one step on the finest grid.
+    /// grids, this saves reading the messages of one step on the finest grid. Deciding labels is part of it, too.
     fn moved_bytes(&self) -> Option<[u64; Stage::ALL.len()]> {
         let [match_cost, coarsen, _, update_messages, select_labels] = self.plan.moved_bytes()?;
-        Some([match_cost, coarsen, 0, update_messages - self.plan.updates_per_step(0), select_labels])
+        let handed_out = 4 * self.plan.image_size().pixels() as u64;
+        let update_messages = update_messages - self.plan.updates_per_step(0) + select_labels;
+        Some([match_cost, coarsen, 0, update_messages, handed_out])
     }
 
     fn message_updates(&self) -> Option<u64> {
@@ -244,7 +274,7 @@ impl Solver for RayonSolver {
         let costs: u64 = self.costs.iter().map(Costs::bytes).sum();
         let messages: u64 = self.messages.iter().flat_map(|messages| &messages.sets).map(Edges::bytes).sum();
         let layouts: u64 = self.layouts.iter().map(Layout::bytes).sum();
-        self.features.bytes() + costs + messages + layouts + self.swept.bytes()
+        self.features.bytes() + costs + messages + layouts + self.labels.bytes() + self.swept.bytes()
     }
 
     fn limit_bytes(&mut self, bytes: u64) {

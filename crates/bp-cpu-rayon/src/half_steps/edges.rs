@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Plan, Side, memory};
+use bp_core::{Error, Node, Plan, Side, memory};
 use fearless_simd::{Simd, SimdBase};
 
 use crate::{
     block::{Block, Bytes, LANES},
     layout::Layout,
-    shape::Shape,
+    shape::{Column, PlaneRow, Shape},
 };
 
 /// The planes of a row: two with the edges up from the two planes of nodes, one with the edges inside pairs of columns,
@@ -117,6 +117,11 @@ impl<'a> Received<'a> {
         Self { is_moved: by + isize::from(self.is_moved) != 0, ..self }
     }
 
+    /// Whether they lie one lane further on.
+    pub(crate) fn is_moved(&self) -> bool {
+        self.is_moved
+    }
+
     /// The messages of a block of nodes.
     pub(crate) fn block(&self, index: usize) -> OfBlock<'a> {
         let (values, behind) = self.values[self.labels * index..].split_at(self.labels);
@@ -159,6 +164,34 @@ impl<'a> OfBlock<'a> {
     #[inline(always)]
     pub(crate) fn load_in_place<S: Simd>(&self, simd: S, label: usize) -> Bytes<S> {
         self.values[label].load(simd)
+    }
+}
+
+/// The messages that the nodes of a plane in a row received in each slot; see [`Slots`]. `rows` start with that row. `None` if the row
+/// has no neighbours there.
+pub(crate) fn received<'a>(layout: &Layout, rows: &'a [Block], at: PlaneRow) -> [Option<Received<'a>>; 4] {
+    let (len, below) = (layout.plane(), row(layout));
+    let starts = [2 * len, 3 * len, at.plane * len, below + at.plane * len];
+    let [same, next, up, down] =
+        starts.map(|start| Received { values: &rows[start..start + len], labels: layout.labels, is_moved: false });
+    [
+        Some(same),
+        Some(Received { is_moved: at.plane == 1, ..next }),
+        Some(up).filter(|_| layout.joined_above(at.y)),
+        Some(down).filter(|_| layout.joined_above(at.y + 1)),
+    ]
+}
+
+/// Copies the messages received from `side`, `[height][width][labels]`. `received` has those of nodes of each colour.
+pub(crate) fn read_messages(plan: &Plan, received: [Rows<'_>; 2], side: Side, messages: &mut [u8]) {
+    let layout = received[0].layout;
+    let nodes = (0..).flat_map(|y| layout.columns().map(move |column| (column, y)));
+    for ((Column { x, plane, lane }, y), out) in nodes.zip(messages.chunks_exact_mut(layout.labels)) {
+        let there = plan.neighbour(0, Node { x, y }, side).is_some();
+        let received = if there { received[(x + y) % 2].towards(side, plane, y) } else { None };
+        for (label, out) in out.iter_mut().enumerate() {
+            *out = received.map_or(0, |received| received.value(label, lane));
+        }
     }
 }
 

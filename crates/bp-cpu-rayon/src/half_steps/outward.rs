@@ -7,16 +7,27 @@
 use std::ops::Range;
 
 use bp_core::{Node, Side, Smoothness};
+use rayon::prelude::*;
 
 use super::{
     edges::{self, Slots},
+    labels,
     pass::Pass,
     refine::slot,
 };
-use crate::block::{Block, LANES};
+use crate::{
+    block::{Block, LANES},
+    shape::PlaneRow,
+};
 
-/// Runs loops on both sets.
-pub(super) fn run(grid: &Pass<'_>, start: Node, loops: Range<usize>, mut sets: [&mut [Block]; 2]) {
+/// Runs loops on both sets, and then decides labels, if there is room for them.
+pub(super) fn run(
+    grid: &Pass<'_>,
+    start: Node,
+    loops: Range<usize>,
+    mut sets: [&mut [Block]; 2],
+    labels: [&mut [Block]; 2],
+) {
     if loops.start == 0 && !grid.keeps_messages {
         sets.iter_mut().for_each(|set| set.fill(Block::ZERO));
     }
@@ -28,6 +39,11 @@ pub(super) fn run(grid: &Pass<'_>, start: Node, loops: Range<usize>, mut sets: [
             || grid.send_rows(start, 0, (0..start.y).rev(), [even.0, odd.0]),
             || grid.send_rows(start, start.y + 1, start.y + 1..grid.layout.size.height, [even.1, odd.1]),
         );
+    }
+    for (colour, (set, labels)) in sets.iter().zip(labels).enumerate() {
+        labels.par_chunks_exact_mut(labels::row(grid.layout)).enumerate().for_each(|(y, labels)| {
+            grid.decide(PlaneRow { plane: (y + colour) % 2, y }, &set[y * row..], labels);
+        });
     }
 }
 

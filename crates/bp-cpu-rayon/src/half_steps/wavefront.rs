@@ -102,6 +102,11 @@ pub(crate) struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
+    /// Rows of so many blocks, or none.
+    pub(crate) fn new(rows: &'a mut [Block], row: usize) -> Self {
+        Self { row: if rows.is_empty() { 0 } else { row }, rows }
+    }
+
     fn reborrow(&mut self) -> Part<'_> {
         Part { rows: self.rows, row: self.row }
     }
