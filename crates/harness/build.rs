@@ -3,7 +3,8 @@
 use std::process::Command;
 
 fn main() {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    // Asked when it runs: two checkouts that share a target folder share the compiled script.
+    let root = &format!("{}/../..", std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default());
     let sources = ["Cargo.toml", "Cargo.lock", "crates", "shaders", "bench-data"];
     for source in sources {
         println!("cargo::rerun-if-changed={root}/{source}");
