@@ -97,17 +97,8 @@ impl<'a> Rows<'a> {
     /// The messages that the nodes of `plane` in row `y` received from `side`. `None` if the row has no neighbours on that side.
     /// Lanes without a neighbour hold arbitrary values.
     pub(crate) fn towards(&self, side: Side, plane: usize, y: usize) -> Option<Received<'a>> {
-        let (row, index, is_moved) = match (side, plane) {
-            (Side::Up, _) => (y, plane, false),
-            (Side::Down, _) => (y + 1, plane, false),
-            (Side::Right, 0) | (Side::Left, 1) => (y, 2, false),
-            (Side::Left, _) => (y, 3, false),
-            (Side::Right, _) => (y, 3, true),
-        };
-        let joined = matches!(side, Side::Left | Side::Right) || self.layout.joined_above(row);
-        let start = self::row(self.layout) * row + self.layout.plane() * index;
-        let values = &self.values[start..start + self.layout.plane()];
-        joined.then_some(Received { values, labels: self.layout.labels, is_moved })
+        let rows = &self.values[row(self.layout) * y..];
+        received(self.layout, rows, PlaneRow { plane, y })[slot(side, plane)]
     }
 }
 
@@ -164,6 +155,16 @@ impl<'a> OfBlock<'a> {
     #[inline(always)]
     pub(crate) fn load_in_place<S: Simd>(&self, simd: S, label: usize) -> Bytes<S> {
         self.values[label].load(simd)
+    }
+}
+
+/// The slot in which a node of `plane` keeps its edge to `side`.
+pub(crate) fn slot(side: Side, plane: usize) -> usize {
+    match (side, plane) {
+        (Side::Right, 0) | (Side::Left, 1) => 0,
+        (Side::Left | Side::Right, _) => 1,
+        (Side::Up, _) => 2,
+        (Side::Down, _) => 3,
     }
 }
 

@@ -10,10 +10,9 @@ use bp_core::{Node, Side, Smoothness};
 use rayon::prelude::*;
 
 use super::{
-    edges::{self, Slots},
+    edges::{self, Slots, slot},
     labels,
     pass::Pass,
-    refine::slot,
 };
 use crate::{
     block::{Block, LANES},

@@ -12,7 +12,7 @@
 use bp_core::{MessageStart, Plan, Side};
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use super::edges::{Received, Rows};
+use super::edges::{Received, Rows, slot};
 use crate::{
     block::{Block, Bytes, LANES},
     layout::Layout,
@@ -44,16 +44,6 @@ pub(crate) fn refine(
             Some(source) => dispatch!(level, simd => source.expand(simd, layout, slot)),
             None => slot.fill(Block::ZERO),
         }
-    }
-}
-
-/// The slot in which a node of `plane` keeps its edge to `side`.
-pub(crate) fn slot(side: Side, plane: usize) -> usize {
-    match (side, plane) {
-        (Side::Right, 0) | (Side::Left, 1) => 0,
-        (Side::Left | Side::Right, _) => 1,
-        (Side::Up, _) => 2,
-        (Side::Down, _) => 3,
     }
 }
 
