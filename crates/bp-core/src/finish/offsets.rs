@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use self::windows::Windows;
-use super::{IsStopped, go_on};
+use super::{IsStopped, go_on, means};
 use crate::{Error, Size, StereoPair};
 
 /// Disparities are tried in steps of a quarter of a pixel.
@@ -53,11 +53,11 @@ pub(super) fn write_offsets(
     })
 }
 
-/// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows. The
-/// rows that means are taken of need less, except in maps of a few columns, where they are about a kilobyte.
+/// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows, or
+/// rows that means are taken of.
 #[must_use]
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
-    size.height.div_ceil(ROWS).min(threads) as u64 * Windows::bytes(size.width)
+    size.height.div_ceil(ROWS).min(threads) as u64 * Windows::bytes(size.width).max(means::bytes(size.width))
 }
 
 /// Some rows of a map.

@@ -5,7 +5,7 @@ use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
-/// The labels of a slanted surface form steps. Means in 9x9 windows follow the slope, roughly; means of these means follow it
+/// The labels of a slanted surface form steps. Means over 9x9 pixels follow the slope, roughly; means of these means follow it
 /// better. From there, the offset is found at which the images fit best, and means of means are taken again. The range of
 /// disparities stays. docs/algorithms.md compares this with other ways.
 ///
@@ -18,23 +18,12 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
     let mut refined = Ok(());
     let map = map.replaced(|map| {
         let width = pair.size().width;
-        refined = take_means_of_means(width, map, &mut other, is_stopped)
-            .and_then(|()| write_offsets(pair, map, least..=largest, &mut other, is_stopped))
-            .and_then(|()| take_means_of_means(width, &mut other, map, is_stopped));
+        refined = write_means(width, map, &mut other, is_stopped)
+            .and_then(|()| write_offsets(pair, &other, least..=largest, map, is_stopped))
+            .and_then(|()| write_means(width, map, &mut other, is_stopped));
         map.copy_from_slice(&other);
     });
     refined.map(|()| map)
-}
-
-/// Replaces the values of a map by the means of their means.
-fn take_means_of_means(
-    width: usize,
-    map: &mut [f32],
-    means: &mut [f32],
-    is_stopped: IsStopped<'_>,
-) -> Result<(), Error> {
-    write_means(width, map, means, is_stopped)?;
-    write_means(width, means, map, is_stopped)
 }
 
 #[cfg(test)]
