@@ -5,7 +5,7 @@
 // The labels of the coarser grid, in the layout of select_labels.
 @group(0) @binding(2) var<storage, read> labels: array<vec2<u32>>;
 
-const REACH: u32 = 2;
+const REACH: u32 = 1;
 // How many coarse nodes are looked at beyond the parents.
 const MARGIN: u32 = 2;
 

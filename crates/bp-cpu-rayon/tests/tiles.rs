@@ -110,9 +110,9 @@ fn tiles_stay_within_the_limit_whatever_the_label_sets() {
     let device = Rayon.open(0).unwrap();
     let settings = Settings { label_sets: true, ..Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep) };
     let plan = Plan::new(size, Model::new(Profile::Census, labels).unwrap(), settings).unwrap();
-    let limit = device.planned_bytes(&plan) / 3;
     let pair = stepped_pair(size.width, size.height, labels);
-    let within = |share: u64| {
+    let within = |percent: u64, share: u64| {
+        let limit = device.planned_bytes(&plan) * percent / 100;
         let needed = |plan: &Plan| Ok(device.planned_bytes(plan));
         let likely = |plan: &Plan| Ok(device.likely_bytes(plan) / share);
         let tiling = Tiling::within(&plan, limit, &needed, &likely).unwrap();
@@ -121,9 +121,9 @@ fn tiles_stay_within_the_limit_whatever_the_label_sets() {
         assert!(tiled.allocated_bytes() <= limit, "{} of {limit}", tiled.allocated_bytes());
         (tiling, tiled)
     };
-    let (expected, tiled) = within(1);
+    let (expected, tiled) = within(33, 1);
     assert!(expected.certain().is_some() && *tiled.tiling() == expected);
-    let (hoped_for, tiled) = within(3);
+    let (hoped_for, tiled) = within(30, 8);
     let certain = hoped_for.certain().unwrap();
     assert_eq!(tiled.tiling(), certain);
     let mut small = Tiled::new(device.as_ref(), certain.clone()).unwrap();
