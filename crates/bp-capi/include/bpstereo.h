@@ -153,8 +153,8 @@ enum BpstereoStatus bpstereo_compute(const struct BpstereoMatcher *matcher,
                                      ptrdiff_t stride);
 
 /**
- * The last answer without its map, as a JSON object: "times" in seconds, "energy", "settings" and "warnings". Valid until the
- * matcher is used again; empty before the first match, after one that failed, and while the matcher is at work.
+ * The last answer without its map, as a JSON object: "times" in seconds, "energy" (null unless the option "energy" is true),
+ * "settings" and "warnings". Valid until the matcher is used again; empty before the first match, after one that failed, and while the matcher is at work.
  *
  * # Safety
  * `matcher` must be null or come from `bpstereo_open`.

@@ -1,6 +1,8 @@
 //! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
-use std::{array, ops::Range};
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::{Image, Model, Node, Plan, StereoPair, image::grey};
 
@@ -49,8 +51,11 @@ pub const OUTER: Neighbours = [(0, -4), (0, -2), (-4, 0), (-2, 0), (2, 0), (4, 0
 /// The furthest column or row that a code compares.
 const REACH: usize = 4;
 
-/// Writes the codes of the pixels at `columns` and `rows`, `[rows][columns][table]`. It computes each grey value once, in runs
-/// of columns from top to bottom.
+/// Columns whose codes are computed together, and those with their neighbours.
+const COLUMNS: usize = 64;
+const AROUND: usize = COLUMNS + 2 * REACH;
+
+/// Writes the codes of the pixels at `columns` and `rows`, `[rows][columns][table]`.
 pub(crate) fn write_codes<const TABLES: usize>(
     image: &Image,
     tables: [&Neighbours; TABLES],
@@ -58,15 +63,26 @@ pub(crate) fn write_codes<const TABLES: usize>(
     rows: Range<usize>,
     codes: &mut [[u8; TABLES]],
 ) {
-    const COLUMNS: usize = 64;
+    dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || write_codes_in_runs(image, tables, columns, rows, codes),
+    ));
+}
+
+/// Computes each grey value once, in runs of columns from top to bottom.
+#[inline(always)]
+fn write_codes_in_runs<const TABLES: usize>(
+    image: &Image,
+    tables: [&Neighbours; TABLES],
+    columns: Range<usize>,
+    rows: Range<usize>,
+    codes: &mut [[u8; TABLES]],
+) {
     let width = columns.len();
     for (x, first) in columns.zip(0..).step_by(COLUMNS) {
-        let greys = |y: isize| -> [u8; COLUMNS + 2 * REACH] {
-            let row = image.row_near(y);
-            array::from_fn(|i| grey(row[(x + i).saturating_sub(REACH).min(row.len() - 1)]))
-        };
+        let greys = |y: isize| greys_around(image.row_near(y), x);
         // The rows around row y lie at (y + dy) mod 16.
-        let mut around = [[0; COLUMNS + 2 * REACH]; 16];
+        let mut around = [[0; AROUND]; 16];
         let place = |y: isize| (y & 15) as usize;
         let reach = REACH as isize;
         let top = rows.start as isize;
@@ -87,6 +103,21 @@ pub(crate) fn write_codes<const TABLES: usize>(
             }
         }
     }
+}
+
+/// The grey values of [`COLUMNS`] pixels of a row from column x on, and those around. Border columns are repeated outward.
+#[inline(always)]
+fn greys_around(row: &[[u8; 3]], x: usize) -> [u8; AROUND] {
+    let mut greys = [0; AROUND];
+    let inside = x.checked_sub(REACH).and_then(|first| row.get(first..first + AROUND));
+    // A loop takes vectors, `map` of an array does not.
+    if let Some(pixels) = inside {
+        greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel));
+    } else {
+        let column = |i: usize| (x + i).saturating_sub(REACH).min(row.len() - 1);
+        greys.iter_mut().enumerate().for_each(|(i, out)| *out = grey(row[column(i)]));
+    }
+    greys
 }
 
 /// The codes of [`code`] of the pixels at `columns` and `rows`, `[rows][columns]`.

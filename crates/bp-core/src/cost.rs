@@ -1,5 +1,7 @@
 //! Data costs D(p, d) of the profiles, before any normalising or clipping.
 
+use fearless_simd::{Level, Simd, dispatch};
+
 use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, census::Neighbours, features, memory};
 
 /// The per-pixel features that a profile compares, `[height][width]`, of both images.
@@ -79,6 +81,7 @@ impl DataCost {
     /// # Panics
     /// If (x, y) lies outside the image.
     #[must_use]
+    #[inline(always)]
     pub fn at(&self, x: usize, y: usize, label: u16) -> u16 {
         if let Some(seed) = self.seed.filter(|seed| seed.touches(x, y)) {
             return if label.abs_diff(seed.label) <= 1 { 0 } else { self.model.profile().max_cost() };
@@ -87,6 +90,14 @@ impl DataCost {
             Some(column) => self.compare(y * self.size.width + x, y * self.size.width + column),
             None => self.model.profile().out_of_range_cost(),
         }
+    }
+
+    /// The sum of D(p, f_p) over the pixels of row y, which have these labels.
+    pub(crate) fn of_row(&self, y: usize, labels: &[u16]) -> u64 {
+        dispatch!(Level::new(), simd => simd.vectorize(
+            #[inline(always)]
+            || (0..).zip(labels).map(|(x, &label)| u64::from(self.at(x, y, label))).sum(),
+        ))
     }
 
     /// The bytes held.
@@ -102,6 +113,7 @@ impl DataCost {
     }
 
     /// The cost of matching the left pixel at index `l` with the right one at index `r`.
+    #[inline(always)]
     fn compare(&self, l: usize, r: usize) -> u16 {
         match &self.planes {
             Planes::Thesis([left, right]) => features::truncated_difference(left[l], right[r]),

@@ -63,7 +63,7 @@ impl Energy {
         let mut greys = greys(pair.left(), rows.start);
         for (row, y) in rows.enumerate() {
             let labels = labels_of(y);
-            energy.data += (0..).zip(labels).map(|(x, &label)| u64::from(cost.at(x, row, label))).sum::<u64>();
+            energy.data += cost.of_row(row, labels);
             energy.smoothness += smoothness(level, edges, [labels, &labels[1..]], [&greys, &greys[1..]]);
             if y + 1 < size.height {
                 let below = self::greys(pair.left(), y + 1);

@@ -33,6 +33,7 @@ pub(crate) fn census_32(image: &Image, x: usize, y: usize) -> [u8; 4] {
 }
 
 /// The number of bits in which two codes differ.
+#[inline(always)]
 pub(crate) fn hamming_distance<const BYTES: usize>(left: [u8; BYTES], right: [u8; BYTES]) -> u16 {
     left.into_iter().zip(right).map(|(left, right)| (left ^ right).count_ones() as u16).sum()
 }

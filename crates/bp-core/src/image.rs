@@ -160,6 +160,7 @@ impl std::fmt::Debug for Image {
 
 /// The luma of a colour, in integers with the weights of ITU-R BT.601. Equal channels keep their value.
 #[must_use]
+#[inline(always)]
 pub fn grey([r, g, b]: [u8; 3]) -> u8 {
     let sum = 299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b);
     ((sum + 500) / 1000) as u8

@@ -244,6 +244,7 @@ impl Model {
     /// The column of the right image that column `x` of the left image matches under `label`, if it lies in an image
     /// `width` pixels wide.
     #[must_use]
+    #[inline(always)]
     pub fn matching_column(&self, x: usize, label: u16, width: usize) -> Option<usize> {
         let column = x as i64 - i64::from(self.disparity(label));
         usize::try_from(column).ok().filter(|&column| column < width)

@@ -54,8 +54,8 @@ pub(crate) fn match_pair<'py>(
 /// Options, all with a default: `algorithm` ("sweep", or one of the thesis, such as "cfbp"), `quality` ("fast",
 /// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels`
 /// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`,
-/// `confidence`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes). The
-/// library's documentation describes them; `options` shows their values.
+/// `confidence`, `energy`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes).
+/// The library's documentation describes them; `options` shows their values.
 ///
 /// >>> matcher = bpstereo.Matcher(labels=16, confidence=True)
 /// >>> disparity = matcher.compute(left, right)
@@ -143,7 +143,7 @@ impl Matcher {
         Ok(self.part(|answer| Ok(answer.warnings.clone()))?.unwrap_or_default())
     }
 
-    /// The energy of the last labels: "total", "data" and "smoothness".
+    /// The energy of the last labels: "total", "data" and "smoothness". None unless the option `energy` is set.
     #[getter]
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.part(|answer| Ok(pythonize(py, &answer.energy)?))

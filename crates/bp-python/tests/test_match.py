@@ -170,7 +170,7 @@ def test_options_have_the_librarys_forms(pair):
 
 
 def test_a_matcher_tells_what_it_did(pair):
-    matcher = bpstereo.Matcher(labels=16, min_disparity=-4)
+    matcher = bpstereo.Matcher(labels=16, min_disparity=-4, energy=True)
     assert matcher.times is None and matcher.energy is None and matcher.settings is None and matcher.warnings == []
     matcher.compute(*pair)
     times = matcher.times
@@ -195,7 +195,7 @@ def test_problems_of_a_pair_are_warnings(pair):
 
 
 def test_warm_starts_continue(pair):
-    matcher = bpstereo.Matcher(labels=16, algorithm={"name": "cfbp", "loops": {"half_steps": 2}})
+    matcher = bpstereo.Matcher(labels=16, algorithm={"name": "cfbp", "loops": {"half_steps": 2}}, energy=True)
     matcher.compute(*pair)
     cold = matcher.energy["total"]
     matcher.compute(*pair, warm=True)

@@ -203,8 +203,8 @@ pub struct Energy {
 pub struct Answer {
     /// Wall-clock times.
     pub times: Seconds,
-    /// The energy of the labels.
-    pub energy: Energy,
+    /// The energy of the labels, if the options ask for it.
+    pub energy: Option<Energy>,
     /// The settings that were run.
     pub settings: Settings,
     /// Possible problems with the pair or its labels, as sentences.

@@ -71,8 +71,8 @@ pub struct Disparity {
     pub confidence: Option<Vec<f32>>,
     /// Wall-clock times.
     pub times: AnswerTimes,
-    /// The energy of the labels.
-    pub energy: Energy,
+    /// The energy of the labels; `None` unless [`Options::energy`] asks for it.
+    pub energy: Option<Energy>,
     /// The settings that were run.
     pub settings: description::Settings,
     /// The tiles; `None` if the pair was matched as a whole.
@@ -98,7 +98,7 @@ impl From<&Disparity> for description::Answer {
                 finishing: seconds(finishing),
                 total: seconds(answer.times.total()),
             },
-            energy: answer.energy.into(),
+            energy: answer.energy.map(Into::into),
             settings: answer.settings.clone(),
             warnings: answer.warnings.iter().map(ToString::to_string).collect(),
         }
@@ -205,7 +205,8 @@ impl Matcher {
             let planning = time + begun.elapsed();
             let mut finished = ready.solve(options, opened, &pair, start, watch)?;
             finished.times.planning = planning;
-            let energy = Energy::of(&pair, ready.tiled.plan().model(), ready.tiled.labels())?;
+            let energy_of = |labels| Energy::of(&pair, ready.tiled.plan().model(), labels);
+            let energy = options.energy.then(|| energy_of(ready.tiled.labels())).transpose()?;
             Ok::<_, Error>((ready, finished, energy))
         })?;
         watch.check()?;

@@ -57,6 +57,8 @@ pub struct Options {
     pub subpixel: Option<bool>,
     /// Whether each pixel gets a confidence from 0 to 1; matches the right image too.
     pub confidence: bool,
+    /// Whether the energy of the labels is added up.
+    pub energy: bool,
     /// Backend: "rayon", "scalar", "vulkan" or "wgpu", or "NAME:DEVICE".
     pub backend: String,
     /// Device of the backend: its index, a part of its name or the beginning of its UUID; `None` means the first.
@@ -142,6 +144,7 @@ impl Default for Options {
             median: None,
             subpixel: None,
             confidence: false,
+            energy: false,
             backend: devices::DEFAULT.to_owned(),
             device: None,
             threads: None,
@@ -189,6 +192,8 @@ setters! {
     with_subpixel: bool => subpixel = Some;
     /// With [`Options::confidence`].
     with_confidence: bool => confidence = std::convert::identity;
+    /// With [`Options::energy`].
+    with_energy: bool => energy = std::convert::identity;
     /// With [`Options::backend`].
     with_backend: &str => backend = str::to_owned;
     /// With [`Options::threads`].

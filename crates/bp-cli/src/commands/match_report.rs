@@ -42,7 +42,7 @@ pub(super) struct Report {
     planning_ms: f64,
     finishing_ms: f64,
     clocks: Vec<Clocked>,
-    energy: Energy,
+    energy: Option<Energy>,
     errors: Option<ErrorReport>,
     messages_sha256: Option<String>,
     /// Warnings about the images or the labels, as printed to standard error.
@@ -86,7 +86,7 @@ impl Report {
             planning_ms: milliseconds(median.planning),
             finishing_ms: milliseconds(median.finishing),
             clocks: clocks(&median.matching),
-            energy: answer.energy.into(),
+            energy: answer.energy.map(Into::into),
             errors: asked.errors.map(Into::into),
             messages_sha256: asked.messages_sha256,
             warnings: asked.warnings,
@@ -158,8 +158,9 @@ pub(super) fn text(report: &Report) -> String {
             .map(|bytes| ByteSize(bytes).display().iec());
     let all = format!("{peak} with images and answer");
     let _ = writeln!(text, "{:<10}{allocated} allocated, {planned} predicted, {all}", "memory");
-    let Energy { total, data, smoothness } = report.energy;
-    let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
+    if let Some(Energy { total, data, smoothness }) = report.energy {
+        let _ = writeln!(text, "{:<10}{total} = {data} data + {smoothness} smoothness", "energy");
+    }
     if let Some(hash) = &report.messages_sha256 {
         let _ = writeln!(text, "{:<10}sha256 {hash}", "messages");
     }

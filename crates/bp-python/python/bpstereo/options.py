@@ -26,6 +26,7 @@ class Options(TypedDict, total=False):
     median: int | None
     subpixel: bool | None
     confidence: bool
+    energy: bool
     backend: str
     device: str | None
     threads: int | None

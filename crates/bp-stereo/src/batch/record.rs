@@ -40,7 +40,7 @@ pub(super) struct Done {
     pub(super) settings: description::Settings,
     /// `None` if the pair was matched as a whole.
     pub(super) tiles: Option<Tiles>,
-    pub(super) energy: description::Energy,
+    pub(super) energy: Option<description::Energy>,
     pub(super) warnings: Vec<String>,
     pub(super) times: PairTimes,
 }

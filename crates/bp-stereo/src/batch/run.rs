@@ -22,8 +22,8 @@ use super::{
     summary::Failed,
 };
 use crate::{
-    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Rectifying, Start, Stopped, Warning, Watch,
-    description, memory::LISTED, pairs::Pair, reading::Room,
+    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Options, Rectifying, Start, Stopped, Warning,
+    Watch, description, memory::LISTED, pairs::Pair, reading::Room,
 };
 
 /// A pair in memory.
@@ -190,7 +190,9 @@ impl Run<'_> {
         let depth = self.options.also.contains(&super::Also::Depth);
         let whole = self.options.warm_start.map(|_| "warm_start");
         let batch = self.options.matching.max_memory.is_none();
-        Ok(Matcher::new(&self.options.matching)?.beside(Beside {
+        // Records have it.
+        let options = Options { energy: true, ..self.options.matching.clone() };
+        Ok(Matcher::new(&options)?.beside(Beside {
             truth: false,
             depth,
             rectified: self.making.rectifying.is_some(),
@@ -282,7 +284,7 @@ fn done(matcher: &Matcher, pair: &StereoPair, disparity: &Disparity, warnings: V
         device: description::Device::from(matcher.device()),
         settings: disparity.settings.clone(),
         tiles: disparity.tiles.clone(),
-        energy: disparity.energy.into(),
+        energy: disparity.energy.map(Into::into),
         warnings,
         times: PairTimes { solve_ms, ..times },
     }
