@@ -1,5 +1,5 @@
-//! How visible the borders of bands and of coarse nodes are in maps of `sweep`: prints each scene, and the means that
-//! docs/algorithms.md shows.
+//! How visible the borders of bands and of coarse nodes are in maps of `sweep`, with all labels and with label sets: prints each
+//! scene, and the means that docs/algorithms.md shows.
 //!
 //! `cargo run --release -p bp-cpu-rayon --example seams -- DATA`, where DATA has the Middlebury pairs of 2006 at half size and
 //! those of version 3 at a quarter of their size.
@@ -8,7 +8,7 @@ use std::{error::Error, path::Path};
 
 use bp_core::{
     Algorithm, Backend, Device, DisparityMap, Driver, Energy, GroundTruth, Image, Model, Plan, Profile, Schedule,
-    StereoPair,
+    Settings, StereoPair,
 };
 use bp_testkit::jumps;
 
@@ -32,25 +32,37 @@ const VERSION_3: [(&str, usize); 8] = [
 /// Every so many rows or columns.
 const PERIODS: [usize; 4] = [16, 32, 64, 128];
 
+/// The profile, and whether with label sets.
+const PLANS: [(Profile, bool); 2] = [(Profile::Census, false), (Profile::Census16, true)];
+
 fn main() -> Result<()> {
     let data = std::env::args().nth(1).ok_or("usage: seams DATA")?;
-    let data = Path::new(&data);
     let device = bp_cpu_rayon::Rayon.open(0)?;
     let periods = PERIODS.map(|period| format!(" every {period} |")).concat();
-    println!("| scene | rows:{periods} columns:{periods} bad-1.0 non-occluded | bad-1.0 all | RMSE | energy |");
-    println!("|---|{}", "---:|".repeat(12));
+    for (profile, label_sets) in PLANS {
+        println!("Profile {}, label sets {}:\n", profile.name(), if label_sets { "on" } else { "off" });
+        println!("| scene | rows:{periods} columns:{periods} bad-1.0 non-occluded | bad-1.0 all | RMSE | energy |");
+        println!("|---|{}", "---:|".repeat(12));
+        print_scenes(&Plans { device: device.as_ref(), profile, label_sets }, Path::new(&data))?;
+        println!();
+    }
+    Ok(())
+}
+
+/// Prints each scene and the means.
+fn print_scenes(plans: &Plans<'_>, data: &Path) -> Result<()> {
     let mut sums = vec![];
     for name in HALF {
         let file = |name: &str| data.join("middlebury2006").join(name);
         let (truth, right) = (map(&file(name).join("disp1.png"))?, map(&file(name).join("disp5.png"))?);
         let pair = pair(&file(name).join("view1.png"), &file(name).join("view5.png"))?;
         let truth = GroundTruth::with_right(truth, &right)?;
-        sums.push(row(name, &solve(device.as_ref(), &pair, 112)?, Some(&truth))?);
+        sums.push(row(name, &plans.solve(&pair, 112)?, Some(&truth))?);
     }
     for (name, labels) in VERSION_3 {
         let folder = data.join("middlebury-v3-quarter").join(name);
         let pair = pair(&folder.join("im0.png"), &folder.join("im1.png"))?;
-        sums.push(row(name, &solve(device.as_ref(), &pair, labels)?, None)?);
+        sums.push(row(name, &plans.solve(&pair, labels)?, None)?);
     }
     let mean = |of: &[Vec<f64>], i: usize| of.iter().map(|row| row[i]).sum::<f64>() / of.len() as f64;
     let (half, all) = (&sums[..HALF.len()], &sums);
@@ -66,13 +78,23 @@ struct Solved {
     energy: f64,
 }
 
-fn solve(device: &dyn Device, pair: &StereoPair, labels: usize) -> Result<Solved> {
-    let model = Model::new(Profile::Census, labels)?;
-    let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
-    let mut driver = Driver::new(device, Plan::new(pair.size(), model, settings)?)?;
-    driver.solve(pair)?;
-    let energy = Energy::of(pair, &model, driver.labels())?.total() as f64;
-    Ok(Solved { map: driver.disparities(), labels: driver.labels().to_vec(), energy })
+/// What all pairs are matched by.
+struct Plans<'a> {
+    device: &'a dyn Device,
+    profile: Profile,
+    label_sets: bool,
+}
+
+impl Plans<'_> {
+    fn solve(&self, pair: &StereoPair, labels: usize) -> Result<Solved> {
+        let model = Model::new(self.profile, labels)?;
+        let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
+        let settings = Settings { label_sets: self.label_sets, ..settings };
+        let mut driver = Driver::new(self.device, Plan::new(pair.size(), model, settings)?)?;
+        driver.solve(pair)?;
+        let energy = Energy::of(pair, &model, driver.labels())?.total() as f64;
+        Ok(Solved { map: driver.disparities(), labels: driver.labels().to_vec(), energy })
+    }
 }
 
 /// Prints a row, and returns its numbers.
