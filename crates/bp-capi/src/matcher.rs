@@ -154,7 +154,8 @@ unsafe fn pair(left: &BpstereoImage, right: &BpstereoImage) -> Result<StereoPair
 }
 
 /// The last answer without its map, as a JSON object: "times" in seconds, "energy" (null unless the option "energy" is true),
-/// "settings" and "warnings". Valid until the matcher is used again; empty before the first match, after one that failed, and while the matcher is at work.
+/// "settings" and "warnings". Valid until the matcher is used again; empty before the first match, after one that failed,
+/// and while the matcher is at work.
 ///
 /// # Safety
 /// `matcher` must be null or come from `bpstereo_open`.

@@ -42,7 +42,7 @@ impl MatchArgs {
             median: finish.median,
             subpixel: finish.whole_pixels.then_some(false),
             confidence: finish.confidence.is_some() || self.many.also.contains(&Also::Confidence),
-            energy: true,
+            energy: false,
             backend: plan.backend.clone(),
             device: plan.device.clone(),
             threads: plan.threads.map(usize::from),

@@ -71,6 +71,8 @@ struct Job<'a> {
 
 fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let (mut options, outputs, making) = (args.options()?, args.outputs(), args.making()?);
+    // The report shows it.
+    options.energy = true;
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;

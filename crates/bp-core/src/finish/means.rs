@@ -32,7 +32,7 @@ const PARTS: f32 = 32.0;
 /// Writes means of means of the disparities around each pixel, over 9x9 pixels. Only those count that differ from the one
 /// in the middle by no more than [`AGREE`]. Both maps are `[height][width]`.
 ///
-/// Disparities up to [`MOST`] are rounded to 1/32 px before each pass and added up as integers, which takes a third of the time.
+/// Disparities up to [`MOST`] are rounded to 1/32 px before each pass and added up as integers, which takes less time.
 pub(super) fn write_means(
     width: usize,
     map: &[f32],
