@@ -16,6 +16,7 @@ mod padded;
 mod pass;
 mod refine;
 mod room;
+mod routes;
 mod seams;
 mod send;
 mod swept;

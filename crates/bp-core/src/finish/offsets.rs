@@ -80,7 +80,7 @@ impl Part<'_> {
             }
             let Some(y) = coming.checked_sub(REACH).filter(|y| self.rows.contains(y)) else { continue };
             let refined = &mut refined[(y - self.rows.start) * width..][..width];
-            dispatch!(level, simd => windows.refine(simd, row_of(y), &self.limits, refined));
+            dispatch!(level, simd => windows.refine(simd, y, row_of(y), &self.limits, refined));
             if let Some(last) = y.checked_sub(REACH) {
                 dispatch!(level, simd => windows.leave(simd, last));
             }

@@ -13,6 +13,9 @@ const MIN_ROWS: usize = 16;
 /// Columns that are added up together, unless a block has more.
 const TOGETHER: usize = 2048;
 
+/// So many 8-bit values add up in 16 bits.
+const FIT: usize = 257;
+
 /// The factor by which both sides are divided.
 pub(super) fn factor(size: Size) -> usize {
     size.width.max(size.height).div_ceil(LONGEST_SIDE)
@@ -35,19 +38,32 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
         for (part, means) in means.chunks_mut(together).enumerate() {
             let first = part * together * factor;
             let last = width.min(first + means.len() * factor);
+            let mut totals = vec![[0_u32; 3]; means.len()];
             // Rows are added up first, because that takes vectors.
-            let mut sums = vec![0; (last - first) * 3];
+            let mut sums = vec![0_u16; (last - first) * 3];
             for y in ys.clone() {
                 let line = image.pixels()[y * width + first..y * width + last].as_flattened();
-                sums.iter_mut().zip(line).for_each(|(sum, &value)| *sum += u32::from(value));
+                sums.iter_mut().zip(line).for_each(|(sum, &value)| *sum += u16::from(value));
+                if (y + 1 - ys.start) % FIT == 0 || y + 1 == ys.end {
+                    add_blocks(&mut sums, factor, &mut totals);
+                }
             }
-            for (mean, block) in means.iter_mut().zip(sums.as_chunks::<3>().0.chunks(factor)) {
-                let sum = block.iter().fold([0; 3], |sum, column| [0, 1, 2].map(|i| sum[i] + column[i]));
-                *mean = grey(sum.map(|sum| ((sum + count / 2) / count) as u8));
+            for (mean, total) in means.iter_mut().zip(totals) {
+                *mean = grey(total.map(|sum| ((sum + count / 2) / count) as u8));
             }
         }
     });
     Image::from_grey(columns, rows, &means)
+}
+
+/// Adds the sums of each block's columns to its total, and clears them.
+fn add_blocks(sums: &mut [u16], factor: usize, totals: &mut [[u32; 3]]) {
+    for (total, block) in totals.iter_mut().zip(sums.as_chunks::<3>().0.chunks(factor)) {
+        for column in block {
+            total.iter_mut().zip(column).for_each(|(total, &sum)| *total += u32::from(sum));
+        }
+    }
+    sums.fill(0);
 }
 
 #[cfg(test)]

@@ -128,10 +128,16 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) const NONE: Self = Self { entries: [0; 2], costs: [[0; EdgeLevels::COUNT]; 2] };
 
-    /// The entry, if the value is that of an entry, over edges of the first level.
+    /// The entry, if the value is that of an entry.
     #[inline(always)]
     pub(crate) fn exact(self) -> Option<usize> {
-        (self.entries[0] == self.entries[1] && self.costs[0][0] == 0).then_some(usize::from(self.entries[0]))
+        let is_exact = self.entries[0] == self.entries[1] && self.costs[0] == Steps::default();
+        is_exact.then_some(usize::from(self.entries[0]))
+    }
+
+    /// The entry below.
+    pub(crate) fn below(self) -> u16 {
+        self.entries[0]
     }
 
     /// Both entries and what the smoothness costs from them over edges of this level.
@@ -156,6 +162,9 @@ pub(crate) fn sources(from: &[u16], to: &[u16], edges: &EdgeLevels) -> impl Iter
     to.iter().map(move |&label| {
         while above + 1 < from.len() && from[above] < label {
             above += 1;
+        }
+        if from[above] == label {
+            return Source { entries: [above as u16; 2], ..Source::NONE };
         }
         let below = if from[above] > label { above.saturating_sub(1) } else { above };
         let costs = |entry: usize| smoothness.map(|smoothness| cost_of(smoothness, from[entry].abs_diff(label).into()));

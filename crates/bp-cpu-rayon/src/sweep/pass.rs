@@ -9,10 +9,11 @@ use fearless_simd::{Simd, dispatch};
 
 use super::{
     Sweep, Work,
-    lists::{Lists, Source},
+    lists::Lists,
     messages::{Messages, Place},
     padded::Padded,
     refine::At,
+    routes::Route,
     send::{self, Slots, to_sides},
 };
 use crate::{
@@ -217,12 +218,11 @@ impl Pass<'_> {
         let (left, right) = next[self.lists.range(before).start..self.lists.range(patch).end]
             .split_at_mut(self.lists.range(before).len());
         let end = LANES as isize - 1;
+        let crossings = &self.work.crossings;
         if plane == 1 {
-            let sources = self.work.crossings.of(self.lists.range(patch));
-            carry(level, truncation, sources.iter().map(|sources| sources[0]), (left, end), (right, -1));
+            carry(level, truncation, crossings.of(self.lists, patch, 0), (left, end), (right, -1));
         } else {
-            let sources = self.work.crossings.of(self.lists.range(before));
-            carry(level, truncation, sources.iter().map(|sources| sources[1]), (right, -1), (left, end));
+            carry(level, truncation, crossings.of(self.lists, before, 1), (right, -1), (left, end));
         }
     }
 }
@@ -231,12 +231,15 @@ impl Pass<'_> {
 fn carry(
     level: usize,
     truncation: u8,
-    sources: impl Iterator<Item = Source>,
+    route: Route<'_>,
     (from, from_lane): (&mut [Padded], isize),
     (to, to_lane): (&mut [Padded], isize),
 ) {
-    for (source, out) in sources.zip(to) {
-        *out.lane_mut(to_lane) = source.value(level, truncation, |entry| from[entry].lane(from_lane));
+    for (entry, out) in route.nearest().zip(to.iter_mut()) {
+        *out.lane_mut(to_lane) = from[entry].lane(from_lane);
+    }
+    for (entry, source) in route.between() {
+        *to[entry].lane_mut(to_lane) = source.value(level, truncation, |entry| from[entry].lane(from_lane));
     }
 }
 

@@ -11,9 +11,10 @@ use fearless_simd::{Simd, SimdBase, SimdCombine, SimdInt, u8x16};
 
 use super::{
     Band,
-    lists::{Lists, Source, sources},
+    lists::Lists,
     messages::{Around, Held, Place},
     padded::Padded,
+    routes::{self, Route, Routes},
 };
 use crate::{
     block::{Block, Bytes, LANES},
@@ -36,16 +37,17 @@ const BELOW: usize = 2;
 #[derive(Default)]
 pub(crate) struct CoarseRows {
     values: Vec<Padded>,
-    /// For each entry its sources in the list of the coarser patch, and in those to its left and right.
-    sources: Vec<[Source; 3]>,
-    /// The coarse rows that are held, and the band that the sources belong to.
+    /// To the lists of the coarser patch, and of those to its left and right.
+    routes: [Routes; 3],
+    /// The coarse rows that are held, and the band that the routes belong to.
     rows: [Option<usize>; ROWS],
     band: Option<usize>,
 }
 
 /// The bytes for so many entries.
 pub(crate) fn bytes(entries: usize) -> u64 {
-    (entries as u64).saturating_mul((ROWS * SIDES * size_of::<Padded>() + size_of::<[Source; 3]>()) as u64)
+    let values = (entries as u64).saturating_mul((ROWS * SIDES * size_of::<Padded>()) as u64);
+    values.saturating_add(3 * routes::bytes(entries))
 }
 
 /// The messages of the next coarser grid.
@@ -70,7 +72,7 @@ impl CoarseRows {
     /// Makes room for so many entries.
     pub(crate) fn fit(&mut self, entries: usize) -> Result<(), Error> {
         memory::grow("messages", &mut self.values, (ROWS * SIDES).saturating_mul(entries), Padded::ZERO)?;
-        memory::grow("label sets", &mut self.sources, entries, [Source::NONE; 3])
+        self.routes.iter_mut().try_for_each(|routes| routes.fit(entries))
     }
 
     /// Forgets everything, before other rows of a grid.
@@ -80,7 +82,7 @@ impl CoarseRows {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.values) + memory::bytes(&self.sources)
+        memory::bytes(&self.values) + self.routes.iter().map(Routes::bytes).sum::<u64>()
     }
 
     /// Reads the coarse rows that a finer row is interpolated between.
@@ -99,37 +101,36 @@ impl CoarseRows {
     fn read_row<S: Simd>(&mut self, simd: S, coarser: Coarser<'_>, lists: &Lists, y: usize) {
         let index = y / BAND_ROWS;
         let band = &coarser.bands[index];
+        if self.band != Some(index) {
+            self.find_routes(coarser.edges, band, lists);
+            self.band = Some(index);
+        }
+        let (width, truncation) = (coarser.layout.size.width, coarser.edges.usual().truncation);
         for patch in 0..lists.patches() {
-            if self.band != Some(index) {
-                self.find_sources(coarser, band, lists, patch);
-            }
-            let width = coarser.layout.size.width;
-            let truncation = coarser.edges.usual().truncation;
             let reading = Reading { band, width, row: y % BAND_ROWS, y, patch };
+            let range = lists.range(patch);
+            let routes = self.routes.each_ref().map(|routes| routes.of(range.clone()));
             for side in 0..SIDES {
-                let range = lists.range(patch);
                 let start = ((y % ROWS) * SIDES + side) * lists.entries();
                 let values = &mut self.values[start + range.start..start + range.end];
-                let sources = &self.sources[range];
                 match side {
-                    LEFT => reading.read::<_, LEFT>(simd, truncation, sources, values),
-                    RIGHT => reading.read::<_, RIGHT>(simd, truncation, sources, values),
-                    _ => reading.read::<_, BELOW>(simd, truncation, sources, values),
+                    LEFT => reading.read::<_, LEFT>(simd, truncation, routes, values),
+                    RIGHT => reading.read::<_, RIGHT>(simd, truncation, routes, values),
+                    _ => reading.read::<_, BELOW>(simd, truncation, routes, values),
                 }
             }
         }
-        self.band = Some(index);
     }
 
-    fn find_sources(&mut self, coarser: Coarser<'_>, band: &Band, lists: &Lists, patch: usize) {
-        let own = patch / 2;
-        let labels = lists.list(patch).labels;
-        let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
-        for (index, from) in patches.into_iter().enumerate() {
-            let Some(from) = from else { continue };
-            let sources = sources(band.lists.list(from).labels, labels, coarser.edges);
-            let all = self.sources[lists.range(patch)].iter_mut().zip(sources);
-            all.for_each(|(sources, source)| sources[index] = source);
+    fn find_routes(&mut self, edges: &EdgeLevels, band: &Band, lists: &Lists) {
+        for patch in 0..lists.patches() {
+            let own = patch / 2;
+            let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
+            for (routes, from) in self.routes.iter_mut().zip(patches) {
+                if let Some(from) = from {
+                    routes.find(lists.range(patch), lists.list(patch).labels, band.lists.list(from).labels, edges);
+                }
+            }
         }
     }
 
@@ -202,23 +203,19 @@ impl Reading<'_> {
     /// Reads the messages from one side, in the order of columns. Those of columns that other patches hold are arbitrary at
     /// first.
     #[inline(always)]
-    fn read<S: Simd, const SIDE: usize>(
-        &self,
-        simd: S,
-        truncation: u8,
-        sources: &[[Source; 3]],
-        values: &mut [Padded],
-    ) {
+    fn read<S: Simd, const SIDE: usize>(&self, simd: S, truncation: u8, routes: [Route<'_>; 3], values: &mut [Padded]) {
         let columns = Columns::<S, SIDE>::new(simd, self);
         let most = Bytes::splat(simd, truncation);
-        for ([source, ..], out) in sources.iter().zip(values.iter_mut()) {
-            // Without a special case for entries that both lists have: they are many, but the branch costs more.
+        for (entry, out) in routes[0].nearest().zip(values.iter_mut()) {
+            out.store::<S, 0>(columns.of(entry));
+        }
+        for (entry, source) in routes[0].between() {
             let [(below, cost), (above, cost_above)] = source.nearest(0);
             let below = columns.of(below).saturating_add(Bytes::splat(simd, cost));
             let above = columns.of(above).saturating_add(Bytes::splat(simd, cost_above));
-            out.store::<S, 0>(below.min(above).min(most));
+            values[entry].store::<S, 0>(below.min(above).min(most));
         }
-        self.read_borders::<SIDE>(truncation, sources, values);
+        self.read_borders::<SIDE>(truncation, routes, values);
     }
 
     /// The messages that the nodes of the coarser patch hold.
@@ -231,7 +228,7 @@ impl Reading<'_> {
     /// Reads the columns that the coarse patches on the left and right hold. Where there is no such column, that at the border takes
     /// its place in messages from below, and others are zeros.
     #[inline(always)]
-    fn read_borders<const SIDE: usize>(&self, truncation: u8, sources: &[[Source; 3]], values: &mut [Padded]) {
+    fn read_borders<const SIDE: usize>(&self, truncation: u8, routes: [Route<'_>; 3], values: &mut [Padded]) {
         let first = LANES * self.patch;
         // Of messages from the side, only the sides' own columns can lie in another patch.
         let columns: [isize; 2] = match (SIDE, self.y % 2) {
@@ -244,7 +241,7 @@ impl Reading<'_> {
         for &column in wanted {
             let holder = usize::try_from(first as isize + column).ok().and_then(|x| self.holder::<SIDE>(x));
             match holder {
-                Some(x) => self.read_column::<SIDE>(truncation, sources, x, column, values),
+                Some(x) => self.read_column::<SIDE>(truncation, routes, x, column, values),
                 None => values.iter_mut().for_each(|out| *out.lane_mut(column) = 0),
             }
         }
@@ -290,7 +287,7 @@ impl Reading<'_> {
     fn read_column<const SIDE: usize>(
         &self,
         truncation: u8,
-        sources: &[[Source; 3]],
+        routes: [Route<'_>; 3],
         x: usize,
         lane: isize,
         values: &mut [Padded],
@@ -305,18 +302,27 @@ impl Reading<'_> {
         let (entries, range) = (lists.entries(), lists.range(patch));
         let inside = self.row * entries + range.start..self.row * entries + range.end;
         let (plane, from) = (x % 2, x / 2 % LANES);
-        let out = sources.iter().map(|sources| sources[index]).zip(values.iter_mut().map(|out| out.lane_mut(lane)));
         let in_pair = (SIDE == LEFT) == (plane == 1);
         if SIDE == BELOW {
             let below = &messages.vertical[(2 * self.row + 2 + plane) * entries..][range];
-            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| below[entry].0[from]));
+            write_lane(truncation, routes[index], values, lane, |entry| below[entry].0[from]);
         } else if in_pair {
             let same = &messages.same[inside];
-            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| same[entry].0[from]));
+            write_lane(truncation, routes[index], values, lane, |entry| same[entry].0[from]);
         } else {
             let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
-            out.for_each(|(source, out)| *out = source.value(0, truncation, |entry| next[entry].lane(from)));
+            write_lane(truncation, routes[index], values, lane, |entry| next[entry].lane(from));
         }
+    }
+}
+
+/// Writes the messages of one node, given by entry of its list, to a lane.
+fn write_lane(truncation: u8, route: Route<'_>, values: &mut [Padded], lane: isize, message: impl Fn(usize) -> u8) {
+    for (entry, out) in route.nearest().zip(values.iter_mut()) {
+        *out.lane_mut(lane) = message(entry);
+    }
+    for (entry, source) in route.between() {
+        *values[entry].lane_mut(lane) = source.value(0, truncation, &message);
     }
 }
 

@@ -1,26 +1,67 @@
 //! Grey values between pixels, and where disparities lead.
 
+use fearless_simd::{Select, Simd, SimdBase, SimdCvtTruncate, SimdFloat, SimdInto, f32x8, i16x8, i32x8};
+
 use super::{MIDDLE, STEPS, TRIED};
 
 /// The grey value of a whole pixel, in the units of [`interpolate`].
 pub(super) const UNIT: i16 = 8;
 
+/// Columns that are compared together.
+pub(super) const LANES: usize = 8;
+
 /// Writes where the tried disparities of every pixel of a row begin in the right image's row in steps; -1 if one of them
-/// lies outside.
+/// lies outside. `first` has columns up to a multiple of [`LANES`].
 #[inline(always)]
-pub(super) fn first_steps(disparities: &[f32], first: &mut [i32]) {
-    let last = (STEPS * (disparities.len() - 1) + 1) as i32 - TRIED as i32;
-    for (x, (first, &disparity)) in first.iter_mut().zip(disparities).enumerate() {
-        let at = (STEPS * x) as i32 - MIDDLE as i32 - nearest_step(disparity);
-        *first = if at >= 0 && at <= last { at } else { -1 };
+pub(super) fn first_steps<S: Simd>(simd: S, disparities: &[f32], first: &mut [i32]) {
+    let (width, (first, _)) = (disparities.len(), first.as_chunks_mut::<LANES>());
+    for (x, (first, disparities)) in first.iter_mut().zip(disparities.chunks(LANES)).enumerate() {
+        let mut all = [0.0; LANES];
+        all[..disparities.len()].copy_from_slice(disparities);
+        *first = first_steps_from(simd, LANES * x, width, all);
     }
 }
 
-/// A disparity in steps, rounded. Those that lead out of any image, and unknown ones, stay beyond all steps of a row.
+/// The first steps of the pixels from column x on.
 #[inline(always)]
-fn nearest_step(disparity: f32) -> i32 {
+fn first_steps_from<S: Simd>(simd: S, x: usize, width: usize, disparities: [f32; LANES]) -> [i32; LANES] {
+    // Disparities that lead out of any image, and unknown ones, stay beyond all steps of a row.
     const BEYOND: f32 = (1 << 29) as f32;
-    (STEPS as f32 * disparity + 0.5).floor().clamp(-BEYOND, BEYOND) as i32
+    let nearest = (f32x8::from(disparities.simd_into(simd)) * STEPS as f32 + 0.5).floor();
+    let nearest = nearest.max(f32x8::splat(simd, -BEYOND)).min(f32x8::splat(simd, BEYOND));
+    let columns = i32x8::from_fn(simd, |lane| (STEPS * (x + lane)) as i32 - MIDDLE as i32);
+    let at = columns - i32x8::truncate_from(nearest);
+    let [none, last] = [-1, (STEPS * (width - 1) + 1) as i32 - TRIED as i32].map(|value| i32x8::splat(simd, value));
+    let inside = at.simd_gt(none) & at.simd_le(last);
+    inside.select(at, none).into()
+}
+
+/// The grey values of some pixels of the left image less those of the right one at their tried disparities, `[tried][lane]`; 0
+/// where there is no first step. At least [`LANES`] steps follow each first one.
+#[inline(always)]
+pub(super) fn differences<S: Simd>(simd: S, left: &[i16], first: &[i32; LANES], right: &[i16]) -> [i16x8<S>; TRIED] {
+    let left = i16x8::from_slice(simd, left);
+    // Consecutive steps of each pixel, `[lane][step]`.
+    let mut steps = [left; LANES];
+    for (steps, &first) in steps.iter_mut().zip(first) {
+        *steps = i16x8::from_slice(simd, &right[first.max(0) as usize..][..LANES]);
+    }
+    // Each round interleaves the first half of the rows with the second. Three make columns of rows.
+    for _ in 0..LANES.ilog2() {
+        let mut interleaved = steps;
+        for row in 0..LANES / 2 {
+            let (low, high) = steps[row].interleave(steps[row + LANES / 2]);
+            (interleaved[2 * row], interleaved[2 * row + 1]) = (low, high);
+        }
+        steps = interleaved;
+    }
+    let exists = i16x8::from_fn(simd, |lane| if first[lane] < 0 { 0 } else { -1 });
+    let mut differences = [left; TRIED];
+    for (tried, difference) in differences.iter_mut().enumerate() {
+        // A larger disparity lies farther left.
+        *difference = (left - steps[TRIED - 1 - tried]) & exists;
+    }
+    differences
 }
 
 /// Writes the grey values of a row in steps, in [`UNIT`]s rounded up. `greys` has one more column on the left and two on the right.

@@ -2,12 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, SimdBase};
 
 use super::{
     REACH, SIDE, STEPS, TRIED,
     best::write_best,
-    compared::{UNIT, first_steps, interpolate},
+    compared::{LANES, UNIT, differences, first_steps, interpolate},
 };
 use crate::{Error, StereoPair, image::grey, memory};
 
@@ -17,13 +17,17 @@ const BORDER: [usize; 2] = [1, 2];
 /// The differences in the rows of windows whose centres lie in one row.
 pub(super) struct Windows {
     width: usize,
+    /// The width, rounded up to a multiple of [`LANES`].
+    columns: usize,
     /// How many rows there are.
     rows: usize,
-    /// The grey values of a row of the left image, and of the right one, whose borders are repeated outward by [`BORDER`].
-    greys: [Vec<u8>; 2],
+    /// The grey values of a row of the left image, in [`UNIT`]s.
+    left: Vec<i16>,
+    /// Those of the right image, whose borders are repeated outward by [`BORDER`].
+    greys: Vec<u8>,
     /// The right image's row in steps.
     right: Vec<i16>,
-    /// See [`first_steps`].
+    /// See [`first_steps`]; `[row mod 7][column]`.
     first: Vec<i32>,
     /// Grey differences in [`UNIT`]s, `[row mod 7][step][column]`. Rows have [`REACH`] more columns on both sides, with zeros.
     differences: Vec<i16>,
@@ -36,30 +40,30 @@ pub(super) struct Windows {
 
 impl Windows {
     pub(super) fn new(width: usize) -> Result<Self, Error> {
-        let (what, columns) = ("grey differences", TRIED * (width + 2 * REACH));
+        let (what, columns) = ("grey differences", width.next_multiple_of(LANES));
+        let all = all(columns);
         Ok(Self {
             width,
+            columns,
             rows: 0,
-            greys: [memory::filled(what, width, 0)?, memory::filled(what, BORDER[0] + width + BORDER[1], 0)?],
-            right: memory::filled(what, STEPS * width, 0)?,
-            first: memory::filled(what, width, 0)?,
-            differences: memory::filled(what, SIDE * columns, 0)?,
-            sums: memory::filled(what, columns, 0)?,
-            squares: memory::filled(what, columns, 0)?,
+            left: memory::filled(what, columns, 0)?,
+            greys: memory::filled(what, BORDER[0] + width + BORDER[1], 0)?,
+            right: memory::filled(what, STEPS * columns, 0)?,
+            first: memory::filled(what, SIDE * columns, 0)?,
+            differences: memory::filled(what, SIDE * all, 0)?,
+            sums: memory::filled(what, all, 0)?,
+            squares: memory::filled(what, all, 0)?,
             variances: memory::filled(what, TRIED * width, 0.0)?,
         })
     }
 
     /// The bytes that they take for rows of this width.
     pub(super) fn bytes(width: usize) -> u64 {
+        let columns = width.next_multiple_of(LANES);
         let of = |len: usize, bytes: usize| len as u64 * bytes as u64;
-        let (columns, steps) = (TRIED * (width + 2 * REACH), STEPS * width);
-        let (greys, first, sums) = (of(2 * width + BORDER[0] + BORDER[1], 1), of(width, 4), of(2 * columns, 4));
-        greys + first + sums + of(steps + SIDE * columns, 2) + of(TRIED * width, 4)
-    }
-
-    fn columns(&self) -> usize {
-        TRIED * (self.width + 2 * REACH)
+        let (first, sums) = (of(SIDE * columns, 4), of(2 * all(columns), 4));
+        let in_16_bits = of((1 + STEPS) * columns + SIDE * all(columns), 2);
+        of(BORDER[0] + width + BORDER[1], 1) + in_16_bits + first + sums + of(TRIED * width, 4)
     }
 
     /// Adds row y, which has these disparities.
@@ -70,9 +74,9 @@ impl Windows {
             #[inline(always)]
             || {
                 self.read_greys(pair, y);
-                interpolate(&self.greys[1], &mut self.right);
-                first_steps(disparities, &mut self.first);
-                self.compare(y);
+                interpolate(&self.greys, &mut self.right[..STEPS * self.width]);
+                first_steps(simd, disparities, &mut self.first[(y % SIDE) * self.columns..][..self.columns]);
+                self.compare(simd, y);
                 self.add::<1>(y);
             },
         );
@@ -91,37 +95,33 @@ impl Windows {
     /// Reads the grey values of row y.
     #[inline(always)]
     fn read_greys(&mut self, pair: &StereoPair, y: usize) {
-        let [left, right] = &mut self.greys;
-        let inside = BORDER[0]..BORDER[0] + self.width;
-        for (greys, image) in [(&mut left[..], pair.left()), (&mut right[inside.clone()], pair.right())] {
-            let pixels = &image.pixels()[y * self.width..][..self.width];
-            greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel));
-        }
-        let [first, last] = [right[inside.start], right[inside.end - 1]];
-        right[..inside.start].fill(first);
-        right[inside.end..].fill(last);
+        let [left, right] = [pair.left(), pair.right()].map(|image| &image.pixels()[y * self.width..][..self.width]);
+        self.left.iter_mut().zip(left).for_each(|(out, &pixel)| *out = UNIT * i16::from(grey(pixel)));
+        let (before, greys) = self.greys.split_at_mut(BORDER[0]);
+        let (greys, after) = greys.split_at_mut(self.width);
+        greys.iter_mut().zip(right).for_each(|(out, &pixel)| *out = grey(pixel));
+        before.fill(greys[0]);
+        after.fill(greys[self.width - 1]);
     }
 
     /// Writes the differences of row y.
     #[inline(always)]
-    fn compare(&mut self, y: usize) {
-        let (columns, wide) = (self.columns(), self.width + 2 * REACH);
-        let row = &mut self.differences[(y % SIDE) * columns..][..columns];
-        for (x, (&grey, &first)) in self.greys[0].iter().zip(&self.first).enumerate() {
-            let grey = UNIT * i16::from(grey);
-            let tried = usize::try_from(first).ok().and_then(|first| self.right.get(first..first + TRIED));
-            for step in 0..TRIED {
-                // A larger disparity lies farther left.
-                let difference = tried.map_or(0, |tried| grey - tried[TRIED - 1 - step]);
-                row[step * wide + REACH + x] = difference;
+    fn compare<S: Simd>(&mut self, simd: S, y: usize) {
+        let (all, wide) = (all(self.columns), wide(self.columns));
+        let row = &mut self.differences[(y % SIDE) * all..][..all];
+        let (first, _) = self.first[(y % SIDE) * self.columns..][..self.columns].as_chunks::<LANES>();
+        for ((x, first), left) in (REACH..).step_by(LANES).zip(first).zip(self.left.chunks_exact(LANES)) {
+            let differences = differences(simd, left, first, &self.right);
+            for (tried, difference) in differences.iter().enumerate() {
+                difference.store_slice(&mut row[tried * wide + x..][..LANES]);
             }
         }
     }
 
     #[inline(always)]
     fn add<const SIGN: i32>(&mut self, y: usize) {
-        let columns = self.columns();
-        let row = &self.differences[(y % SIDE) * columns..][..columns];
+        let all = all(self.columns);
+        let row = &self.differences[(y % SIDE) * all..][..all];
         for ((&difference, sum), square) in row.iter().zip(&mut self.sums).zip(&mut self.squares) {
             let difference = i32::from(difference);
             *sum += SIGN * difference;
@@ -129,11 +129,12 @@ impl Windows {
         }
     }
 
-    /// Writes the refined disparities of the row in the middle.
+    /// Writes the refined disparities of row y, which is in the middle.
     #[inline(always)]
     pub(super) fn refine<S: Simd>(
         &mut self,
         simd: S,
+        y: usize,
         disparities: &[f32],
         limits: &RangeInclusive<f32>,
         refined: &mut [f32],
@@ -142,21 +143,23 @@ impl Windows {
             #[inline(always)]
             || {
                 self.write_variances();
-                first_steps(disparities, &mut self.first);
-                write_best(&self.variances, &self.first, disparities, limits, refined);
+                let first = &self.first[(y % SIDE) * self.columns..][..self.width];
+                write_best(&self.variances, first, disparities, limits, refined);
             },
         );
     }
 
     #[inline(always)]
     fn write_variances(&mut self) {
-        let (width, wide, rows) = (self.width, self.width + 2 * REACH, self.rows as f32);
+        let (width, wide, rows) = (self.width, wide(self.columns), self.rows as f32);
+        // A product takes less time than a quotient.
+        let shared = 1.0 / (rows * SIDE as f32);
         for (step, variances) in self.variances.chunks_exact_mut(width).enumerate() {
             let [sums, squares] = [&self.sums, &self.squares].map(|all| &all[step * wide..][..wide]);
             let windows = sums.windows(SIDE).zip(squares.windows(SIDE));
             for (variance, (sums, squares)) in variances.iter_mut().zip(windows) {
                 let [sum, square] = [sums, squares].map(|values| values.iter().sum::<i32>() as f32);
-                *variance = square - sum * sum / (rows * SIDE as f32);
+                *variance = square - sum * sum * shared;
             }
             // The windows at the borders have fewer columns.
             for x in (0..REACH.min(width)).chain(width.saturating_sub(REACH).max(REACH.min(width))..width) {
@@ -166,4 +169,14 @@ impl Windows {
             }
         }
     }
+}
+
+/// A row of sums for one tried disparity: columns, and [`REACH`] more on both sides.
+fn wide(columns: usize) -> usize {
+    columns + 2 * REACH
+}
+
+/// Such rows for all of them.
+fn all(columns: usize) -> usize {
+    TRIED * wide(columns)
 }
