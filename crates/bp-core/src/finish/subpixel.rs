@@ -14,16 +14,12 @@ use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
 pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range() else { return Ok(map) };
-    let mut other = memory::filled("a map", map.values().len(), 0.0)?;
-    let mut refined = Ok(());
-    let map = map.replaced(|map| {
-        let width = pair.size().width;
-        refined = write_means(width, map, &mut other, is_stopped)
-            .and_then(|()| write_offsets(pair, &other, least..=largest, map, is_stopped))
-            .and_then(|()| write_means(width, map, &mut other, is_stopped));
-        map.copy_from_slice(&other);
-    });
-    refined.map(|()| map)
+    let (size, mut map) = (map.size(), map.into_values());
+    let mut other = memory::filled("a map", map.len(), 0.0)?;
+    write_means(size.width, &map, &mut other, is_stopped)?;
+    write_offsets(pair, &other, least..=largest, &mut map, is_stopped)?;
+    write_means(size.width, &map, &mut other, is_stopped)?;
+    DisparityMap::new(size, other)
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
     let (size, level) = (small.size(), Level::new());
     debug_assert!(size.width <= LONGEST_SIDE);
     let codes = |image| census::codes(image, 0..size.width, 0..size.height);
-    let codes = [codes(small.left()), codes(small.right())];
+    let codes: [Vec<u8>; 2] = rayon::join(|| codes(small.left()), || codes(small.right())).into();
     let mut disparities = memory::filled("coarse matches", size.pixels(), DisparityMap::UNKNOWN)?;
     // Parts of equal height keep all threads busy to the end.
     let rows = size.height.div_ceil(size.height.div_ceil(ROWS));

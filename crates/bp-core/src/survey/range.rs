@@ -104,7 +104,8 @@ impl SeenDisparities {
 
 /// The least and the largest value, when one in `strays` at either end does not count.
 fn ends(mut values: Vec<i32>, strays: usize) -> Option<[i32; 2]> {
-    values.sort_unstable();
     let strays = values.len() / strays;
-    Some([*values.get(strays)?, *values.get(values.len().checked_sub(strays + 1)?)?])
+    let last = values.len().checked_sub(strays + 1)?;
+    let least = *values.select_nth_unstable(strays).1;
+    Some([least, *values.select_nth_unstable(last).1])
 }
