@@ -9,7 +9,7 @@ use super::coarse::{Found, Matches};
 use crate::{Image, StereoPair, image::grey};
 
 /// One point is chosen from each square of this many small pixels a side.
-const CELL: usize = 8;
+const CELL: usize = 6;
 
 /// Points that one thread matches together.
 const TOGETHER: usize = 64;
