@@ -1,6 +1,6 @@
 //! Grey values between pixels, and where disparities lead.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdCvtTruncate, SimdFloat, SimdInto, f32x8, i16x8, i32x8};
+use fearless_simd::{Select, Simd, SimdBase, SimdCvtTruncate, SimdFloat, f32x8, i16x8, i32x8};
 
 use super::{MIDDLE, STEPS, TRIED};
 
@@ -27,7 +27,7 @@ pub(super) fn first_steps<S: Simd>(simd: S, disparities: &[f32], first: &mut [i3
 fn first_steps_from<S: Simd>(simd: S, x: usize, width: usize, disparities: [f32; LANES]) -> [i32; LANES] {
     // Disparities that lead out of any image, and unknown ones, stay beyond all steps of a row.
     const BEYOND: f32 = (1 << 29) as f32;
-    let nearest = (f32x8::from(disparities.simd_into(simd)) * STEPS as f32 + 0.5).floor();
+    let nearest = (f32x8::load_array(simd, disparities) * STEPS as f32 + 0.5).floor();
     let nearest = nearest.max(f32x8::splat(simd, -BEYOND)).min(f32x8::splat(simd, BEYOND));
     let columns = i32x8::from_fn(simd, |lane| (STEPS * (x + lane)) as i32 - MIDDLE as i32);
     let at = columns - i32x8::truncate_from(nearest);
