@@ -47,5 +47,5 @@ impl Crossings {
 
 /// The bytes of the [`Crossings`] of so many entries.
 pub(crate) fn bytes(entries: usize) -> u64 {
-    2 * routes::bytes(entries)
+    routes::bytes(entries).saturating_mul(2)
 }

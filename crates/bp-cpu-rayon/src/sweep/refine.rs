@@ -47,7 +47,7 @@ pub(crate) struct CoarseRows {
 /// The bytes for so many entries.
 pub(crate) fn bytes(entries: usize) -> u64 {
     let values = (entries as u64).saturating_mul((ROWS * SIDES * size_of::<Padded>()) as u64);
-    values.saturating_add(3 * routes::bytes(entries))
+    values.saturating_add(routes::bytes(entries).saturating_mul(3))
 }
 
 /// The messages of the next coarser grid.
