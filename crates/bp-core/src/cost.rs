@@ -187,6 +187,7 @@ mod tests {
 
     /// Matching an image in tiles relies on this.
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn costs_of_a_strip_are_those_of_the_whole_image() {
         let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);
         let view = |first| Image::from_rgb(5, 9, (first..first + 45).map(noise).collect()).unwrap();

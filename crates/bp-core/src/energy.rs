@@ -151,6 +151,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn rows_that_are_added_up_apart_give_the_sum_of_single_pixels() {
         let noise = |i: usize| [7919, 104_729, 31].map(|factor| (i * i * factor / 7 % 251) as u8);
         for (width, height) in [(1, 1), (1, 70), (7, 2 * ROWS), (5, 2 * ROWS + 1), (150, 3)] {

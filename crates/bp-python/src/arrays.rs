@@ -172,8 +172,18 @@ pub(crate) fn target<'py>(object: &Bound<'py, PyAny>, size: Size) -> PyResult<Bo
 /// Writes a map into an array of its size, with NaN where it is unknown.
 pub(crate) fn fill(array: &Bound<'_, PyArray2<f32>>, map: &DisparityMap) -> PyResult<()> {
     let mut array = array.try_readwrite()?;
-    for (to, &value) in array.as_array_mut().iter_mut().zip(map.values()) {
-        *to = if value.is_finite() { value } else { f32::NAN };
+    let mut view = array.as_array_mut();
+    let width = map.size().width.max(1);
+    for (mut to, values) in view.rows_mut().into_iter().zip(map.values().chunks_exact(width)) {
+        match to.as_slice_mut() {
+            Some(to) => to.iter_mut().zip(values).for_each(written),
+            None => to.iter_mut().zip(values).for_each(written),
+        }
     }
     Ok(())
+}
+
+/// Writes one value of a map.
+fn written((to, &value): (&mut f32, &f32)) {
+    *to = if value.is_finite() { value } else { f32::NAN };
 }

@@ -1,31 +1,25 @@
 //! Long work, during which Python's signals and callbacks are attended to.
 
 use std::{
-    panic::resume_unwind,
-    sync::{
-        Mutex, PoisonError,
-        mpsc::{RecvTimeoutError, channel},
-    },
-    thread,
+    sync::{Mutex, PoisonError},
     time::Duration,
 };
 
-use bp_stereo::{Error, Event, Stop, Watch};
-use pyo3::{exceptions::PyOSError, prelude::*};
+use bp_stereo::{Ending, Error, Event, Stop, Watch};
+use pyo3::prelude::*;
 
 use crate::errors::raised;
 
 /// The time between two checks for Ctrl-C, and between two calls of `progress`.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Does `work` on a thread of its own, so that this one can call `progress(done, total)` and notice Ctrl-C. If either
-/// raises an exception, the work stops at its next step. Other Python threads run meanwhile.
-pub(crate) fn attended<T: Send>(
+/// Does `work` on other threads, while this one calls `progress(done, total)` and notices Ctrl-C in what `work` gets to attend to
+/// it. If either raises an exception, the work stops at its next step. Other Python threads run meanwhile.
+pub(crate) fn attended<T>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&Watch<'_>) -> Result<T, Error> + Send,
+    work: impl FnOnce(&Watch<'_>, &mut dyn FnMut(&mut Ending)) -> Result<T, Error>,
 ) -> PyResult<T> {
-    let (ending, mut end) = channel::<()>();
     // Keeps only the newest counts, so that a slow callback does not delay the answer.
     let (stop, counts) = (Stop::default(), Mutex::new(None));
     let tell = |event: Event<'_>| {
@@ -38,17 +32,10 @@ pub(crate) fn attended<T: Send>(
         let news = counts.lock().unwrap_or_else(PoisonError::into_inner).take();
         progress.zip(news).map_or(Ok(()), |(progress, news)| progress.call1(news).map(drop))
     };
-    thread::scope(|scope| {
-        let watch = Watch::new(&tell, &stop);
-        let worker = thread::Builder::new().name("bpstereo".to_owned()).spawn_scoped(scope, move || {
-            let _ending = ending;
-            work(&watch)
-        });
-        let worker = worker.map_err(|error| PyOSError::new_err(format!("cannot start a thread: {error}")))?;
-        let mut outcome = Ok(());
+    let mut outcome = Ok(());
+    let mut attend = |ending: &mut Ending| {
         loop {
-            let end = &mut end;
-            let is_done = py.detach(move || end.recv_timeout(PATIENCE)) == Err(RecvTimeoutError::Disconnected);
+            let is_done = py.detach(|| ending.wait(PATIENCE));
             if outcome.is_ok() {
                 outcome = look();
                 if outcome.is_err() {
@@ -59,7 +46,7 @@ pub(crate) fn attended<T: Send>(
                 break;
             }
         }
-        let done = py.detach(|| worker.join()).unwrap_or_else(|panic| resume_unwind(panic));
-        outcome.and_then(|()| done.map_err(raised))
-    })
+    };
+    let done = work(&Watch::new(&tell, &stop), &mut attend);
+    outcome.and_then(|()| done.map_err(raised))
 }

@@ -111,7 +111,7 @@ impl Matcher {
         out.map_or(Ok(()), |out| target(out, pair.size()).map(drop))?;
         state.reopen_after_fork(py)?;
         let (matcher, start) = (&mut state.matcher, if warm { Start::Warm } else { Start::Cold });
-        let solved = attended(py, progress, |watch| matcher.compute_watched(&pair, start, watch))?;
+        let solved = attended(py, progress, |watch, attend| matcher.compute_attended(&pair, start, watch, attend))?;
         let described = description::Answer::from(&solved);
         let Disparity { map, confidence, .. } = solved;
         let confidence = confidence.map(|values| plane(py, pair.size(), values)).transpose()?.map(Bound::unbind);

@@ -60,7 +60,7 @@ pub use rectifying::Rectifying;
 pub use system::{Memory, thread_pool};
 pub use tiles::Tiles;
 pub use warning::{Beyond, Unused, Warning};
-pub use watch::{Event, Stop, Stopped, Watch};
+pub use watch::{Ending, Event, Stop, Stopped, Watch};
 
 /// Compiles the examples of the project's pages.
 #[cfg(doctest)]

@@ -3,6 +3,7 @@
 use std::{
     borrow::Cow,
     fmt,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -13,18 +14,19 @@ use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Align, AnswerTimes, Beside, Error, Options, Tiles, Warning, Watch, description,
+    Align, AnswerTimes, Beside, Ending, Error, Options, Tiles, Warning, Watch, description,
     devices::{self, Opened},
     finishing::{Finished, finished},
     memory::{self, Fitted},
     plan::{self, labels, quarter_of_width},
     system, warning,
+    watch::ending,
 };
 
 /// Matches pairs on one device. See the [crate's front page](crate) for an example.
 pub struct Matcher {
     options: Options,
-    pool: ThreadPool,
+    pool: Arc<ThreadPool>,
     opened: Opened,
     beside: Beside,
     prepared: Option<Prepared>,
@@ -113,7 +115,7 @@ impl Matcher {
     /// cannot be opened, [`Error::System`] if threads cannot be started.
     pub fn new(options: &Options) -> Result<Self, Error> {
         options.check()?;
-        let pool = system::thread_pool(options.threads)?;
+        let pool = Arc::new(system::thread_pool(options.threads)?);
         let opened = pool.install(|| devices::open(&options.backend, options.device.as_deref()))?;
         Ok(Self { options: options.clone(), pool, opened, beside: Beside::default(), prepared: None })
     }
@@ -156,9 +158,40 @@ impl Matcher {
     /// # Errors
     /// Those of [`Self::plan`] and [`Self::run`].
     pub fn compute_watched(&mut self, pair: &StereoPair, start: Start, watch: &Watch<'_>) -> Result<Disparity, Error> {
-        watch.check()?;
-        let planned = self.plan(pair)?;
-        self.run(pair, planned, start, watch)
+        // Once for both steps: handing work to another thread and back may take longer than a small pair.
+        Arc::clone(&self.pool).install(|| {
+            watch.check()?;
+            let planned = self.plan(pair)?;
+            self.run(pair, planned, start, watch)
+        })
+    }
+
+    /// Matches a pair on the matcher's own threads. Meanwhile this thread runs `attend`, which may look after its caller's events.
+    /// Returns when both are done.
+    ///
+    /// # Errors
+    /// Those of [`Self::compute_watched`].
+    ///
+    /// # Panics
+    /// If the work or `attend` panics.
+    pub fn compute_attended(
+        &mut self,
+        pair: &StereoPair,
+        start: Start,
+        watch: &Watch<'_>,
+        attend: impl FnOnce(&mut Ending),
+    ) -> Result<Disparity, Error> {
+        let pool = Arc::clone(&self.pool);
+        let (running, mut ending) = ending();
+        let mut solved = Err(Error::Stopped);
+        pool.in_place_scope(|scope| {
+            scope.spawn(|_| {
+                solved = self.compute_watched(pair, start, watch);
+                drop(running);
+            });
+            attend(&mut ending);
+        });
+        solved
     }
 
     /// Plans a pair. A quick survey of it finds possible problems, how rows differ, and the labels if they are
@@ -314,5 +347,35 @@ impl Prepared {
             tiled.free_tiles();
             Ok((times, tiled.disparities()))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{thread, time::Duration};
+
+    use super::*;
+    use crate::Stop;
+
+    #[test]
+    fn the_caller_attends_while_its_pair_is_matched_and_may_stop_it() -> Result<(), Error> {
+        let values: Vec<_> = (0..90 * 60_usize).map(|index| (index * index % 251) as u8).collect();
+        let image = Image::from_grey(90, 60, &values)?;
+        let pair = StereoPair::new(image.clone(), image)?;
+        let mut matcher = Matcher::new(&Options::default().with_labels(16))?;
+        let mut attended_by = None;
+        let attended = matcher.compute_attended(&pair, Start::Cold, &Watch::default(), |ending| {
+            attended_by = Some(thread::current().id());
+            while !ending.wait(Duration::from_millis(1)) {}
+        })?;
+        assert_eq!(attended_by, Some(thread::current().id()));
+        assert_eq!(attended.map, matcher.compute(pair.left(), pair.right())?.map);
+
+        let stop = Stop::default();
+        let wait = |_: crate::Event<'_>| while !stop.is_stopped() {};
+        let stopped =
+            matcher.compute_attended(&pair, Start::Cold, &Watch::new(&wait, &stop), |_| assert!(!stop.stop()));
+        assert_eq!(stopped.err(), Some(Error::Stopped));
+        Ok(())
     }
 }

@@ -7,7 +7,7 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
-        mpsc::{RecvTimeoutError, sync_channel},
+        mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel},
     },
     thread,
     time::Duration,
@@ -138,6 +138,23 @@ impl<'a> Watch<'a> {
     /// [`Stopped`].
     pub fn check(&self) -> Result<(), Stopped> {
         if self.is_stopped() { Err(Stopped) } else { Ok(()) }
+    }
+}
+
+/// The end of work on other threads; see [`crate::Matcher::compute_attended`].
+#[derive(Debug)]
+pub struct Ending(Receiver<()>);
+
+/// What the work drops when it ends, and what waits for that.
+pub(crate) fn ending() -> (Sender<()>, Ending) {
+    let (running, end) = channel();
+    (running, Ending(end))
+}
+
+impl Ending {
+    /// Waits for the end, but not longer than `patience`. Returns whether the work has ended.
+    pub fn wait(&mut self, patience: Duration) -> bool {
+        self.0.recv_timeout(patience) == Err(RecvTimeoutError::Disconnected)
     }
 }
 

@@ -326,6 +326,7 @@ mod tests {
 
     /// The bytes of a match would otherwise depend on the machine.
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn all_vector_lengths_give_the_same_numbers() {
         let wave = |x: usize, y: usize| ((x * x * 5 + y * y * 3 + 17 * x * y) as f32 / 90.0).sin();
         let view = |shift: usize, gain: f32| -> Image {

@@ -302,6 +302,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn vectors_compute_what_single_pixels_do() {
         for (width, height) in [(1, 1), (3, 12), (31, 2), (40, 9), (73, 11), (130, 5), (9, 2 * ROWS + 1)] {
             let value = |i: usize| match i * i * 29 % 101 {
@@ -319,6 +320,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn means_in_parts_are_hardly_less_exact() {
         let value = |i: usize| (i % 97) as f32 * 0.0193 + (i * i * 29 % 101) as f32 / 400.0;
         let map: Vec<f32> = (0..97 * 40).map(value).collect();

@@ -111,6 +111,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn medians_are_those_of_the_definition() {
         for (width, height) in [(1, 1), (2, 3), (17, 5), (40, 11)] {
             let noise = |i: usize| ((i * 7919 + i * i * 31) % 23) as f32 / 2.0 - 3.0;

@@ -66,6 +66,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn a_slanted_plane_is_right_to_a_fiftieth_of_a_pixel() {
         for slope in [0.0, 0.013, 0.05, -0.03] {
             let errors = errors(slope, 0.0);
@@ -76,12 +77,14 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn a_brighter_image_changes_hardly_anything() {
         assert!((rms(&errors(0.05, 30.0)) - rms(&errors(0.05, 0.0))).abs() < 0.01);
     }
 
     /// Whole labels put all pixels into two of the tenths.
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn all_fractions_occur_nearly_as_often() {
         let plane = |x: usize, y: usize| 10.0 + 0.05 * x as f32 + 0.0071 * y as f32;
         let labels = (0..SIZE.pixels()).map(|i| plane(i % SIZE.width, i / SIZE.width).round()).collect();
@@ -107,6 +110,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn a_blank_area_keeps_its_disparity() {
         let size = Size { width: 40, height: 20 };
         let blank = || Image::from_grey(size.width, size.height, &vec![9; size.pixels()]).unwrap();

@@ -243,6 +243,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn less_memory_means_smaller_tiles_then_an_error_that_names_the_least() {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let whole = plan.bytes();
@@ -264,6 +265,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn tiles_that_probably_fit_are_larger_and_know_those_that_certainly_do() {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let bytes = plan.bytes() / 5;
@@ -276,6 +278,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn other_schedules_are_tiled_both_ways() {
         for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
             let plan = plan((1500, 3000), 16, algorithm);
@@ -298,6 +301,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn tiles_share_the_image_and_see_all_that_labels_match() {
         for (min_disparity, left, right) in
             [(0, 64 + 16, 64), (-40, 64, 64 + 40), (100, 64 + 115, 64), (-9999, 64, 9999)]
