@@ -75,6 +75,17 @@ def test_the_command_lines_of_both_pipelines_give_maps_as_mgm_does(scene, algori
     assert {path.name for path in scene.iterdir()} == names
 
 
+def test_what_the_right_image_does_not_show_is_unknown_unless_the_check_is_off(scene):
+    """As s2p 1.0b25 calls mgm: without TESTLRRL, which mgm takes for 1."""
+    known = {}
+    for check in ("", "0"):
+        done = run(scene, CALLS["asp"].format(low=-12, high=3, left="left.tif", right="right.tif", map="disp.tif"), {"TESTLRRL": check})
+        assert done.returncode == 0, done.stderr
+        known[check] = numpy.isfinite(load(scene / "disp.tif")[4:])
+    assert known[""][:, :5].mean() < 0.2 and known[""].mean() > 0.75
+    assert known["0"].all()
+
+
 def test_images_of_different_sizes_are_matched_within_the_left_one(scene):
     save(scene / "right.tif", load(scene / "right.tif")[:50, :90].copy())
     done = run(scene, "-r -12 -R 3 left.tif right.tif disp.tif")

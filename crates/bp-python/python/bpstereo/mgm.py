@@ -60,19 +60,21 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def options(environment: dict[str, str]) -> dict[str, Any]:
-    """The options of `Matcher` that mgm's environment variables mean.
+    """The options of `Matcher` that mgm's environment variables mean. Like mgm, checks left against right unless told not to.
 
-    >>> options({"TESTLRRL": "1", "MEDIAN": "1", "REMOVESMALLCC": "25", "OMP_NUM_THREADS": "4"})
+    >>> options({"MEDIAN": "1", "REMOVESMALLCC": "25", "OMP_NUM_THREADS": "4"})
     {'check': True, 'fill': False, 'median': 3, 'speckle': 25, 'threads': 4}
+    >>> options({"TESTLRRL": "0"})
+    {}
     """
-    def number(name: str) -> int:
-        value = environment.get(name, "").strip() or "0"
+    def number(name: str, default: int = 0) -> int:
+        value = environment.get(name, "").strip() or str(default)
         try:
             return int(float(value))
         except ValueError:
             raise ValueError(f"{name}={value}: a number is needed") from None
     meant: dict[str, Any] = {}
-    if number("TESTLRRL"):
+    if number("TESTLRRL", default=1):
         meant |= {"check": True, "fill": False}
     if number("MEDIAN"):
         meant["median"] = 2 * min(number("MEDIAN"), 3) + 1
