@@ -6,7 +6,14 @@ use bp_core::{Device, Error, Plan, Solver};
 use bp_gpu::{GpuSolver, Limits, Program};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
-use crate::{clock::Clock, gpu::Gpu, instance, pipelines::Pipelines, queue::WgpuQueue, vulkan};
+use crate::{
+    clock::Clock,
+    gpu::{Gpu, caught},
+    instance,
+    pipelines::Pipelines,
+    queue::WgpuQueue,
+    vulkan,
+};
 
 /// An open adapter.
 pub(crate) struct WgpuDevice {
@@ -27,7 +34,8 @@ impl WgpuDevice {
             memory_hints: MemoryHints::MemoryUsage,
             ..DeviceDescriptor::default()
         };
-        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        // wgpu panics if it cannot allocate what a new device needs.
+        let opened = caught(|| pollster::block_on(adapter.request_device(&descriptor)))?;
         let (device, queue) = opened.map_err(|error| error.to_string())?;
         let mut limits = limits(adapter);
         change(&mut limits);

@@ -44,8 +44,7 @@ impl Gpu {
         let filters = [ErrorFilter::Validation, ErrorFilter::Internal, ErrorFilter::OutOfMemory];
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
         // wgpu panics if it notices during a wait that the device is lost. Any panic may leave its state inconsistent.
-        let result = catch_unwind(AssertUnwindSafe(work));
-        let result = result.unwrap_or_else(|panic| Err(self.ended(self.lost(message(panic.as_ref())))));
+        let result = caught(work).unwrap_or_else(|panic| Err(self.ended(self.lost(panic))));
         // Check for lack of memory first: wgpu reports a buffer that it could not allocate as invalid at every use.
         let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
         let error = errors.fold(None, Option::or);
@@ -104,6 +103,11 @@ impl Drop for Gpu {
             mem::forget((self.device.clone(), self.queue.clone()));
         }
     }
+}
+
+/// Runs `work`. The error is the message of its panic.
+pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(panic.as_ref()))
 }
 
 /// The message of a panic.
