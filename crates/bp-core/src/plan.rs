@@ -316,7 +316,6 @@ mod tests {
 
     /// Counted by hand: 555 rows are 18 bands with 17 seams, each crossed by 620 columns.
     #[test]
-    #[cfg_attr(miri, ignore = "takes minutes")]
     fn loops_send_nothing_across_seams_and_preparing_them_is_counted() {
         let one_grid = |cut| {
             let settings = Settings { grids: 1, cut, ..plan(Algorithm::Sweep, Schedule::Sweep).settings };
@@ -346,7 +345,6 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(miri, ignore = "takes minutes")]
     fn sums_are_kept_where_costs_may_be_clipped() {
         let plan = plan(Algorithm::Cfbp, Schedule::Sync);
         let kept: Vec<_> = (0..9).map(|grid| (plan.keeps_sums(grid), plan.sum_bytes(grid))).collect();

@@ -173,8 +173,7 @@ pub(crate) fn target<'py>(object: &Bound<'py, PyAny>, size: Size) -> PyResult<Bo
 pub(crate) fn fill(array: &Bound<'_, PyArray2<f32>>, map: &DisparityMap) -> PyResult<()> {
     let mut array = array.try_readwrite()?;
     let mut view = array.as_array_mut();
-    let width = map.size().width.max(1);
-    for (mut to, values) in view.rows_mut().into_iter().zip(map.values().chunks_exact(width)) {
+    for (mut to, values) in view.rows_mut().into_iter().zip(map.values().chunks_exact(map.size().width)) {
         match to.as_slice_mut() {
             Some(to) => to.iter_mut().zip(values).for_each(written),
             None => to.iter_mut().zip(values).for_each(written),
