@@ -228,7 +228,8 @@ impl StereoPair {
     /// show the same point.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        Self { left: self.right.mirrored(), right: self.left.mirrored() }
+        let (left, right) = rayon::join(|| self.right.mirrored(), || self.left.mirrored());
+        Self { left, right }
     }
 
     /// The size of both images.

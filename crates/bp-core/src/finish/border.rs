@@ -1,5 +1,7 @@
 //! Filling the left border, which the right camera does not see.
 
+use rayon::prelude::*;
+
 use super::check::AGREE;
 use crate::{DisparityMap, Error, memory};
 
@@ -31,10 +33,10 @@ pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
     let Some((least, largest)) = map.range() else { return Ok(map) };
     let (width, height) = (map.size().width, map.size().height);
     let mut anchors = memory::filled("anchors", height, None)?;
-    for (y, anchor) in anchors.iter_mut().enumerate() {
+    anchors.par_iter_mut().enumerate().for_each(|(y, anchor)| {
         let x = map.values()[y * width..][..width].iter().position(|value| value.is_finite());
         *anchor = x.filter(|&x| x > 0).map(|x| (x, slope(&map, x, y)));
-    }
+    });
     Ok(map.replaced(|values| {
         for (row, anchor) in values.chunks_exact_mut(width).zip(anchors) {
             let Some((x, slope)) = anchor else { continue };

@@ -1,5 +1,8 @@
 //! The left-right check.
 
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
 use crate::{DisparityMap, Error, metrics::check_size};
 
 /// Two disparities agree, and belong to one surface, if they differ by no more than this many pixels.
@@ -13,20 +16,30 @@ pub const AGREE: f32 = 1.0;
 /// [`Error::WrongSize`] if the maps differ in size.
 pub fn check_left_right(left: DisparityMap, right: &DisparityMap) -> Result<DisparityMap, Error> {
     check_size("the right image's map", right.size(), left.size())?;
-    let width = left.size().width;
+    let (width, level) = (left.size().width, Level::new());
     Ok(left.replaced(|values| {
-        for (row, right) in values.chunks_exact_mut(width).zip(right.values().chunks_exact(width)) {
+        let rows = values.par_chunks_exact_mut(width).zip(right.values().par_chunks_exact(width));
+        rows.for_each(|(row, right)| dispatch!(level, simd => check_row(simd, row, right)));
+    }))
+}
+
+#[inline(always)]
+fn check_row<S: Simd>(simd: S, row: &mut [f32], right: &[f32]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
             for (x, disparity) in row.iter_mut().enumerate() {
                 if difference(x, *disparity, right).is_none_or(|difference| difference > AGREE) {
                     *disparity = DisparityMap::UNKNOWN;
                 }
             }
-        }
-    }))
+        },
+    );
 }
 
 /// The difference between the disparity of column `x` and that of its match in the right map's row; `None` if either
 /// is unknown or the match lies outside.
+#[inline(always)]
 pub(super) fn difference(x: usize, disparity: f32, right: &[f32]) -> Option<f32> {
     let column = (x as f32 - disparity + 0.5).floor();
     // This comes before the conversion to an index, because unknown disparities are infinite.

@@ -1,15 +1,21 @@
 //! How far a map can be trusted.
 
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
 use super::{
     IsStopped,
     check::{AGREE, difference},
     go_on,
     window::{Frame, Framed, window},
 };
-use crate::{DisparityMap, Error, metrics::check_size};
+use crate::{DisparityMap, Error, memory, metrics::check_size};
 
 /// How far the window reaches from its centre.
 const REACH: usize = 4;
+
+/// The pixels of a window.
+const PIXELS: f32 = ((2 * REACH + 1) * (2 * REACH + 1)) as f32;
 
 /// The share of pixels that are right to one pixel where the mean worth is 0, 1/4, 1/2, 3/4 and 1: least squares over the
 /// thesis's six pairs at half size. `scripts/evaluate-confidence` checks this on others.
@@ -28,26 +34,61 @@ const PROBABILITIES: [f32; 5] = [0.22, 0.53, 0.7, 0.93, 1.0];
 pub fn confidence(left: &DisparityMap, right: &DisparityMap, is_stopped: IsStopped<'_>) -> Result<Vec<f32>, Error> {
     check_size("the right image's map", right.size(), left.size())?;
     let size = left.size();
-    let rows = left.values().chunks_exact(size.width).zip(right.values().chunks_exact(size.width));
-    let worths: Vec<f32> =
-        rows.flat_map(|(left, right)| left.iter().enumerate().map(|(x, &d)| worth(x, d, right))).collect();
+    let (width, level) = (size.width, Level::new());
+    let mut worths = memory::filled("worths", size.pixels(), 0.0)?;
+    let rows = left.values().par_chunks_exact(width).zip(right.values().par_chunks_exact(width));
+    rows.zip(worths.par_chunks_exact_mut(width)).for_each(|((left, right), worths)| {
+        dispatch!(level, simd => write_worths(simd, left, right, worths));
+    });
     let disparities = Framed::new(size, left.values(), REACH, Frame::Unknown)?;
-    let worths = Framed::new(size, &worths, REACH, Frame::Unknown)?;
-    let mut sums = vec![0.0; size.pixels()];
-    for (y, (sums, row)) in sums.chunks_exact_mut(size.width).zip(left.values().chunks_exact(size.width)).enumerate() {
+    let framed = Framed::new(size, &worths, REACH, Frame::Unknown)?;
+    // Their memory is used for the sums.
+    let mut sums = worths;
+    let rows = sums.par_chunks_exact_mut(width).zip(left.values().par_chunks_exact(width)).enumerate();
+    rows.try_for_each(|(y, (sums, row))| {
         go_on(is_stopped)?;
-        for (dx, dy) in window(REACH) {
-            add_worth(row, disparities.row(y, dx, dy), worths.row(y, dx, dy), sums);
-        }
-        for (sum, disparity) in sums.iter_mut().zip(row) {
-            let share = *sum / window(REACH).count() as f32;
-            *sum = if disparity.is_finite() { probability(share) } else { 0.0 };
-        }
-    }
+        let near = window(REACH).map(|(dx, dy)| (disparities.row(y, dx, dy), framed.row(y, dx, dy)));
+        dispatch!(level, simd => write_probabilities(simd, row, near, sums));
+        Ok(())
+    })?;
     Ok(sums)
 }
 
+#[inline(always)]
+fn write_worths<S: Simd>(simd: S, left: &[f32], right: &[f32], worths: &mut [f32]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (x, (worth, &disparity)) in worths.iter_mut().zip(left).enumerate() {
+                *worth = worth_of(x, disparity, right);
+            }
+        },
+    );
+}
+
+/// Writes the probabilities of a row. `near` are the shifted rows of disparities and worths in the window.
+#[inline(always)]
+fn write_probabilities<'a, S: Simd>(
+    simd: S,
+    row: &[f32],
+    near: impl Iterator<Item = (&'a [f32], &'a [f32])>,
+    sums: &mut [f32],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            sums.fill(0.0);
+            near.for_each(|(disparities, worths)| add_worth(row, disparities, worths, sums));
+            for (sum, disparity) in sums.iter_mut().zip(row) {
+                let share = *sum / PIXELS;
+                *sum = if disparity.is_finite() { probability(share) } else { 0.0 };
+            }
+        },
+    );
+}
+
 /// The probability for a mean worth from 0 to 1.
+#[inline(always)]
 fn probability(share: f32) -> f32 {
     let steps = (PROBABILITIES.len() - 1) as f32;
     let first = (share * steps).min(steps - 1.0) as usize;
@@ -56,7 +97,8 @@ fn probability(share: f32) -> f32 {
 }
 
 /// The worth of a single pixel.
-fn worth(x: usize, disparity: f32, right: &[f32]) -> f32 {
+#[inline(always)]
+fn worth_of(x: usize, disparity: f32, right: &[f32]) -> f32 {
     match difference(x, disparity, right) {
         Some(0.0) => 1.0,
         Some(difference) if difference <= AGREE => 0.5,
@@ -65,6 +107,7 @@ fn worth(x: usize, disparity: f32, right: &[f32]) -> f32 {
 }
 
 /// Adds the worth of neighbours with a similar disparity.
+#[inline(always)]
 fn add_worth(row: &[f32], neighbours: &[f32], worths: &[f32], sums: &mut [f32]) {
     for (((&own, &other), &worth), sum) in row.iter().zip(neighbours).zip(worths).zip(sums) {
         *sum += if (other - own).abs() <= AGREE { worth } else { 0.0 };

@@ -1,5 +1,7 @@
 //! Filling unknown pixels.
 
+use rayon::prelude::*;
+
 use crate::DisparityMap;
 
 /// Fills every unknown pixel with the smaller of the nearest known disparities to its left and right, because a pixel
@@ -9,7 +11,7 @@ use crate::DisparityMap;
 pub fn fill(map: DisparityMap) -> DisparityMap {
     let width = map.size().width;
     map.replaced(|values| {
-        values.chunks_exact_mut(width).for_each(fill_row);
+        values.par_chunks_exact_mut(width).for_each(fill_row);
         let height = values.len() / width;
         for y in 1..height {
             take_over(values, width, y - 1, y);

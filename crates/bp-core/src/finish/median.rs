@@ -1,5 +1,10 @@
 //! The median filter.
 
+use std::array;
+
+use fearless_simd::{Level, Select, Simd, SimdBase, dispatch, f32x16};
+use rayon::prelude::*;
+
 use super::{
     IsStopped, go_on,
     window::{Frame, Framed},
@@ -12,74 +17,105 @@ pub const MEDIANS: [usize; 3] = [3, 5, 7];
 /// How many columns are sorted together.
 const LANES: usize = 16;
 
-/// One value from each of [`LANES`] windows.
-type Lanes = [f32; LANES];
-
 /// Replaces every known disparity by the median of the known ones in the `side` x `side` window around it. The border
 /// repeats outward. The median of an even number of values is the smaller of the two in the middle.
 ///
 /// # Errors
 /// [`Error::Plan`] if `side` is not one of [`MEDIANS`], [`Error::OutOfMemory`], [`Error::Stopped`].
 pub fn median(map: &DisparityMap, side: usize, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
-    if !MEDIANS.contains(&side) {
-        return Err(Error::Plan("a median is over windows of 3, 5 or 7 pixels"));
+    match side {
+        3 => medians::<3, 9>(map, is_stopped),
+        5 => medians::<5, 25>(map, is_stopped),
+        7 => medians::<7, 49>(map, is_stopped),
+        _ => Err(Error::Plan("a median is over windows of 3, 5 or 7 pixels")),
     }
-    let size = map.size();
-    let framed = Framed::new(size, map.values(), side / 2, Frame::Repeated)?;
+}
+
+/// Medians of windows of `VALUES` values, which are `SIDE` x `SIDE`.
+fn medians<const SIDE: usize, const VALUES: usize>(
+    map: &DisparityMap,
+    is_stopped: IsStopped<'_>,
+) -> Result<DisparityMap, Error> {
+    let (size, level) = (map.size(), Level::new());
+    let framed = Framed::new(size, map.values(), SIDE / 2, Frame::Repeated)?;
     let mut medians = map.values().to_vec();
-    for (y, row) in medians.chunks_exact_mut(size.width).enumerate() {
+    medians.par_chunks_exact_mut(size.width).enumerate().try_for_each(|(y, row)| {
         go_on(is_stopped)?;
-        let windows: Vec<&[f32]> = (0..side * side).map(|index| framed.row(y, index % side, index / side)).collect();
-        for (index, medians) in row.chunks_mut(LANES).enumerate() {
-            chunk(&windows, index * LANES, medians);
-        }
-    }
+        let windows = array::from_fn(|index| framed.row(y, index % SIDE, index / SIDE));
+        dispatch!(level, simd => write_row::<_, VALUES>(simd, &windows, row));
+        Ok(())
+    })?;
     DisparityMap::new(size, medians)
 }
 
-/// The medians of the windows from column `start` on. `windows` holds a shifted row for every position in the window.
-fn chunk(windows: &[&[f32]], start: usize, medians: &mut [f32]) {
-    let mut values = [[0.0; LANES]; MEDIANS[MEDIANS.len() - 1] * MEDIANS[MEDIANS.len() - 1]];
-    let values = &mut values[..windows.len()];
-    let mut known = true;
+/// Writes the medians of a row. `windows` holds a shifted row for every position in the window.
+#[inline(always)]
+fn write_row<S: Simd, const VALUES: usize>(simd: S, windows: &[&[f32]; VALUES], row: &mut [f32]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (index, medians) in row.chunks_mut(LANES).enumerate() {
+                write_chunk(simd, windows, index * LANES, medians);
+            }
+        },
+    );
+}
+
+/// Writes the medians of the windows from column `start` on.
+#[inline(always)]
+fn write_chunk<S: Simd, const VALUES: usize>(simd: S, windows: &[&[f32]; VALUES], start: usize, medians: &mut [f32]) {
+    let mut values = [f32x16::splat(simd, 0.0); VALUES];
+    let mut largest = values[0];
     for (values, row) in values.iter_mut().zip(windows) {
-        let row = &row[start..start + medians.len()];
-        values[..row.len()].copy_from_slice(row);
-        known &= row.iter().all(|value| value.is_finite());
+        *values = f32x16::load_array(simd, chunk(&row[start..]));
+        largest = largest.max(*values);
     }
-    if known {
-        medians.copy_from_slice(&middle(values)[..medians.len()]);
+    let largest: [f32; LANES] = largest.into();
+    if largest.contains(&DisparityMap::UNKNOWN) {
+        let near = |lane: usize| windows.iter().map(move |row| row[start + lane]);
+        medians.iter_mut().enumerate().for_each(|(lane, median)| *median = of_known(near(lane), *median));
     } else {
-        medians.iter_mut().enumerate().for_each(|(lane, median)| *median = of_known(values, lane, *median));
+        let middle: [f32; LANES] = middle(values).into();
+        medians.copy_from_slice(&middle[..medians.len()]);
     }
+}
+
+/// The first values of a row; zeros beyond its end.
+#[inline(always)]
+fn chunk(row: &[f32]) -> [f32; LANES] {
+    let mut values = [0.0; LANES];
+    match row.first_chunk() {
+        Some(row) => values = *row,
+        None => values[..row.len()].copy_from_slice(row),
+    }
+    values
 }
 
 /// The medians of an odd number of values. Each round moves the least and greatest values to the ends and drops them.
-fn middle(mut values: &mut [Lanes]) -> Lanes {
-    while let [first, inner @ .., last] = values {
-        sort(first, last);
-        for value in &mut *inner {
-            sort(first, value);
-            sort(value, last);
+#[inline(always)]
+fn middle<S: Simd, const VALUES: usize>(mut values: [f32x16<S>; VALUES]) -> f32x16<S> {
+    for first in 0..VALUES / 2 {
+        let last = VALUES - 1 - first;
+        sort(&mut values, first, last);
+        for value in first + 1..last {
+            sort(&mut values, first, value);
+            sort(&mut values, value, last);
         }
-        if inner.is_empty() {
-            return *first;
-        }
-        values = inner;
     }
-    values.first().copied().unwrap_or([DisparityMap::UNKNOWN; LANES])
+    values[VALUES / 2]
 }
 
-fn sort(low: &mut Lanes, high: &mut Lanes) {
-    for (low, high) in low.iter_mut().zip(high) {
-        // Not f32::min, which also handles NaN and is slower.
-        (*low, *high) = if *low < *high { (*low, *high) } else { (*high, *low) };
-    }
+/// Not `min` and `max`, whose answers for 0 and -0 depend on the machine.
+#[inline(always)]
+fn sort<S: Simd>(values: &mut [f32x16<S>], low: usize, high: usize) {
+    let (a, b) = (values[low], values[high]);
+    let ascend = a.simd_lt(b);
+    (values[low], values[high]) = (ascend.select(a, b), ascend.select(b, a));
 }
 
 /// The median of the known values in one window. An unknown pixel stays unknown.
-fn of_known(values: &[Lanes], lane: usize, own: f32) -> f32 {
-    let mut known: Vec<f32> = values.iter().map(|values| values[lane]).filter(|value| value.is_finite()).collect();
+fn of_known(values: impl Iterator<Item = f32>, own: f32) -> f32 {
+    let mut known: Vec<f32> = values.filter(|value| value.is_finite()).collect();
     if known.is_empty() || !own.is_finite() {
         return own;
     }
