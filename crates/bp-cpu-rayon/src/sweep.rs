@@ -88,7 +88,7 @@ pub(crate) struct Sweep<'a> {
     /// The labels of the next coarser grid, if they determine label sets.
     coarser_labels: &'a [u16],
     windows: &'a Windows,
-    gaps: [Gap; 4],
+    gaps: [Option<Gap>; 4],
     /// The message entries computed so far.
     updates: &'a AtomicU64,
 }

@@ -18,7 +18,19 @@ pub(crate) enum CostSource<'a> {
 }
 
 impl CostSource<'_> {
-    /// Writes the costs of both planes of a patch in row y, for these labels.
+    /// The costs of a plane of a patch in row y, if they are stored as they are needed: for all labels.
+    #[inline(always)]
+    pub(crate) fn ready(&self, sweep: &Sweep<'_>, patch: usize, plane: usize, y: usize) -> Option<&[Block]> {
+        match self {
+            Self::Stored(stored) if !sweep.plan.has_label_sets(sweep.grid) => {
+                let first = (2 * y + plane) * sweep.layout.plane();
+                Some(&stored.stored[first..][sweep.layout.block(patch)])
+            }
+            Self::Stored(_) | Self::Computed(_) => None,
+        }
+    }
+
+    /// Writes the costs of both planes of a patch in row y, for these labels, if they are not [`Self::ready`].
     #[inline(always)]
     pub(crate) fn fill<S: Simd>(
         &self,
@@ -36,11 +48,7 @@ impl CostSource<'_> {
             Self::Stored(stored) => {
                 for (plane, costs) in costs.into_iter().enumerate() {
                     let first = (2 * y + plane) * sweep.layout.plane() + sweep.layout.block(patch).start;
-                    if sweep.plan.has_label_sets(sweep.grid) {
-                        restricted(simd, sweep, stored, first, labels, costs);
-                    } else {
-                        copy(&stored.stored[first..], labels, costs);
-                    }
+                    restricted(simd, sweep, stored, first, labels, costs);
                 }
             }
         }

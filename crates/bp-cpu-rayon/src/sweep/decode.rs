@@ -78,8 +78,9 @@ impl Pass<'_> {
         row: &[u16],
     ) -> [Labels; 2] {
         let plane = if ODD { 1 - y % 2 } else { y % 2 };
-        let (entries, range, at) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
-        let messages = self.messages.at(Place { entries, row: at, plane, range: &range });
+        let (entries, range) = (self.lists.entries(), self.lists.range(patch));
+        let place = Place { entries, row: y - self.rows.start, plane, range: &range };
+        let messages = self.messages.at(&place);
         let first = (2 * LANES * patch + plane) as isize;
         let [left, right] = if ODD { [first - 1, first + 1].map(|x| every_second(row, x)) } else { [[0; LANES]; 2] };
         // By slot: the neighbour in the same pair of columns, that in the next pair, and that above.
@@ -88,7 +89,7 @@ impl Pass<'_> {
         let undecided = Undecided {
             plane,
             list: self.lists.list(patch),
-            costs: &self.work.costs[(2 * at + plane) * entries..][range.clone()],
+            costs: self.work.costs(self.sweep, patch, y, &place),
             same: messages.same,
             next: messages.next,
             below: messages.below,

@@ -38,8 +38,8 @@ impl Messages {
     }
 
     /// The edges of the nodes of `plane` in a row, for these entries of all. Rows are counted from the first one.
-    pub(crate) fn around(&mut self, at: Place<'_>) -> Around<'_> {
-        let Place { entries, row, plane, range } = at;
+    pub(crate) fn around(&mut self, at: &Place<'_>) -> Around<'_> {
+        let &Place { entries, row, plane, range } = at;
         let inside = row * entries + range.start..row * entries + range.end;
         let (above, below) = self.vertical.split_at_mut(2 * (row + 1) * entries);
         Around {
@@ -51,8 +51,8 @@ impl Messages {
     }
 
     /// The same, to be read.
-    pub(crate) fn at(&self, at: Place<'_>) -> Held<'_> {
-        let Place { entries, row, plane, range } = at;
+    pub(crate) fn at(&self, at: &Place<'_>) -> Held<'_> {
+        let &Place { entries, row, plane, range } = at;
         let inside = row * entries + range.start..row * entries + range.end;
         Held {
             same: &self.same[inside.clone()],

@@ -138,15 +138,17 @@ impl Pass<'_> {
     #[inline(always)]
     fn first_visit<S: Simd>(&mut self, simd: S, patch: usize, y: usize, start: Start) {
         let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
-        let (even, odd) = self.work.costs[2 * row * entries..2 * (row + 1) * entries].split_at_mut(entries);
-        let costs = [&mut even[range.clone()], &mut odd[range.clone()]];
-        self.sweep.costs.fill(simd, self.sweep, patch, y, self.lists.list(patch).labels, costs);
+        if self.sweep.costs.ready(self.sweep, patch, 0, y).is_none() {
+            let (even, odd) = self.work.costs[2 * row * entries..2 * (row + 1) * entries].split_at_mut(entries);
+            let costs = [&mut even[range.clone()], &mut odd[range.clone()]];
+            self.sweep.costs.fill(simd, self.sweep, patch, y, self.lists.list(patch).labels, costs);
+        }
         let last = y + 1 == self.rows.end;
         let below = !last || start == Start::Refined;
         let joined = self.sweep.layout.joined_above(y + 1);
         for plane in 0..2 {
             let sides = plane == y % 2;
-            let mut around = self.messages.around(Place { entries, row, plane, range: &range });
+            let mut around = self.messages.around(&Place { entries, row, plane, range: &range });
             if let Some(coarser) = self.sweep.coarser {
                 let coarser_height = coarser.layout.size.height;
                 let at = At { lists: self.lists, patch, plane, y, coarser_height };
@@ -167,11 +169,12 @@ impl Pass<'_> {
     fn send<S: Simd>(&mut self, simd: S, way: Way, at: Nodes<'_>, sends: Sends) {
         let Nodes { patch, plane, y, greys } = at;
         let (entries, range, row) = (self.lists.entries(), self.lists.range(patch), y - self.rows.start);
-        let around = self.messages.around(Place { entries, row, plane, range: &range });
+        let place = Place { entries, row, plane, range: &range };
+        let around = self.messages.around(&place);
         let nodes = send::Nodes {
             plane,
             list: self.lists.list(patch),
-            costs: &self.work.costs[(2 * row + plane) * entries..][range.clone()],
+            costs: self.work.costs(self.sweep, patch, y, &place),
             edges: self.sweep.plan.model().edges(),
             greys: greys.map(|around| (around, LANES * patch)),
         };
@@ -196,7 +199,7 @@ impl Pass<'_> {
         let range = self.lists.range(patch);
         let inside = (y - self.rows.start) * entries;
         let inside = inside + range.start..inside + range.end;
-        for &Gap { edge, .. } in self.sweep.gaps.iter().filter(|gap| gap.patch == patch) {
+        for &Gap { edge, .. } in self.sweep.gaps.iter().flatten().filter(|gap| gap.patch == patch) {
             match edge {
                 Edge::Same(lane) => self.messages.same[inside.clone()].iter_mut().for_each(|block| block.0[lane] = 0),
                 Edge::Next(lane) => {
@@ -258,15 +261,14 @@ enum Edge {
 }
 
 /// The edges that do not exist in a row of this width: those at both borders, and one at a cut before column `cut`.
-pub(crate) fn gaps(width: usize, cut: Option<usize>) -> [Gap; 4] {
+pub(crate) fn gaps(width: usize, cut: Option<usize>) -> [Option<Gap>; 4] {
     let after = |x: usize| {
         let (patch, lane) = (x / (2 * LANES), x / 2 % LANES);
         Gap { patch, edge: if x.is_multiple_of(2) { Edge::Same(lane) } else { Edge::Next(lane as isize) } }
     };
-    let left = Gap { patch: 0, edge: Edge::Next(-1) };
+    let before_patch = |patch: usize| Gap { patch, edge: Edge::Next(-1) };
     let cut = cut.filter(|&x| x > 0);
     // The edge between two patches belongs to both.
-    let to_cut = cut.filter(|x| x.is_multiple_of(2 * LANES));
-    let to_cut = to_cut.map_or(left, |x| Gap { patch: x / (2 * LANES), edge: Edge::Next(-1) });
-    [left, after(width - 1), cut.map_or(left, |x| after(x - 1)), to_cut]
+    let between = cut.filter(|x| x.is_multiple_of(2 * LANES)).map(|x| before_patch(x / (2 * LANES)));
+    [Some(before_patch(0)), Some(after(width - 1)), cut.map(|x| after(x - 1)), between]
 }

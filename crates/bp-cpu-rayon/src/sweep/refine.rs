@@ -222,7 +222,7 @@ impl Reading<'_> {
     fn held(&self, plane: usize) -> Held<'_> {
         let Band { lists, messages } = self.band;
         let range = lists.range(self.patch / 2);
-        messages.at(Place { entries: lists.entries(), row: self.row, plane, range: &range })
+        messages.at(&Place { entries: lists.entries(), row: self.row, plane, range: &range })
     }
 
     /// Reads the columns that the coarse patches on the left and right hold. Where there is no such column, that at the border takes
@@ -246,17 +246,15 @@ impl Reading<'_> {
             }
         }
         let last = self.width as isize - 1 - first as isize;
-        for out in values {
-            if SIDE == BELOW && first == 0 {
-                *out.lane_mut(-1) = out.lane(0);
-            }
-            if SIDE == BELOW && (-1..LANES as isize).contains(&last) {
-                *out.lane_mut(last + 1) = out.lane(last);
-            }
-            // Zeros for all labels, where nothing was received: by the even node at the border, or next to it by none.
-            for column in self.without_message::<SIDE>().filter(|column| (0..LANES as isize).contains(column)) {
-                *out.lane_mut(column) = 0;
-            }
+        if SIDE == BELOW && first == 0 {
+            values.iter_mut().for_each(|out| *out.lane_mut(-1) = out.lane(0));
+        }
+        if SIDE == BELOW && (-1..LANES as isize).contains(&last) {
+            values.iter_mut().for_each(|out| *out.lane_mut(last + 1) = out.lane(last));
+        }
+        // Zeros for all labels, where nothing was received: by the even node at the border, or next to it by none.
+        for column in self.without_message::<SIDE>().filter(|column| (0..LANES as isize).contains(column)) {
+            values.iter_mut().for_each(|out| *out.lane_mut(column) = 0);
         }
     }
 

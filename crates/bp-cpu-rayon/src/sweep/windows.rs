@@ -5,9 +5,10 @@ use std::sync::{Mutex, PoisonError};
 use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
 
 use super::{
+    Sweep,
     crossings::{self, Crossings},
     lists::{self, Lists},
-    messages::{self, Messages},
+    messages::{self, Messages, Place},
     refine::{self, CoarseRows},
 };
 use crate::block::Block;
@@ -41,6 +42,13 @@ impl Work {
         memory::grow("data cost", &mut self.costs, costs(rows).saturating_mul(entries), Block::ZERO)?;
         self.coarse_rows.fit(entries)?;
         self.crossings.fit(entries)
+    }
+
+    /// The costs of a plane of a patch, which is in row y.
+    #[inline(always)]
+    pub(crate) fn costs<'a>(&'a self, sweep: &'a Sweep<'_>, patch: usize, y: usize, at: &Place<'_>) -> &'a [Block] {
+        let computed = || &self.costs[(2 * at.row + at.plane) * at.entries..][at.range.clone()];
+        sweep.costs.ready(sweep, patch, at.plane, y).unwrap_or_else(computed)
     }
 
     fn bytes(&self) -> u64 {
