@@ -87,10 +87,12 @@ fn moved(pair: &StereoPair, point: &Point) -> Option<Moved> {
     let area = Area::of(pair.right(), point);
     let mut found = start;
     let mut squares = f32::INFINITY;
+    let mut window = [[0.0; WIDTH]; HEIGHT];
     for _ in 0..STEPS {
-        let differences = patch.differences(&area.window(found)?);
-        squares = dot(&differences, &differences);
-        let [across, slant, down] = patch.step(&differences);
+        area.read(found, &mut window)?;
+        let step;
+        (squares, step) = patch.compare(&mut window);
+        let [across, slant, down] = step;
         found = Match { x: found.x + across, slant: found.slant + slant, y: found.y + down };
         if (found.x - start.x).abs().max((found.y - start.y).abs()) > FARTHEST || found.slant.abs() > STEEPEST {
             return None;
@@ -146,8 +148,11 @@ impl Patch {
                 slopes[2][j][i] = (wide[j + 2][at] - wide[j][at]) / 2.0;
             }
         }
-        let greys = centred(greys);
-        let slopes = slopes.map(centred);
+        centre(&mut greys);
+        slopes.iter_mut().for_each(
+            #[inline(always)]
+            |slopes| centre(slopes),
+        );
         let mut matrix = [[0.0; 3]; 3];
         for (row, a) in matrix.iter_mut().zip(&slopes) {
             for (sum, b) in row.iter_mut().zip(&slopes) {
@@ -160,30 +165,32 @@ impl Patch {
         is_determined.then(|| Self { squares: dot(&greys, &greys), greys, slopes, inverse })
     }
 
-    /// The grey values less those of another window, whose mean and contrast are made equal.
+    /// Compares the grey values with those of another window, whose mean and contrast are made equal: the sum of the squared
+    /// differences, and the step to the match in x, slant and y, if the grey values were planes.
     #[inline(always)]
-    fn differences(&self, other: &Window) -> Window {
+    fn compare(&self, other: &mut Window) -> (f32, [f32; 3]) {
+        centre(other);
         let gain = (self.squares / dot(other, other).max(f32::MIN_POSITIVE)).sqrt();
-        let mut differences = self.greys;
-        for (row, other) in differences.iter_mut().zip(other) {
-            for (value, other) in row.iter_mut().zip(other) {
-                *value -= gain * other;
+        // All four sums of products at once.
+        let mut sums = [[0.0; WIDTH]; 4];
+        for j in 0..HEIGHT {
+            for i in 0..WIDTH {
+                let difference = self.greys[j][i] - gain * other[j][i];
+                sums[0][i] += difference * difference;
+                sums[1][i] += self.slopes[0][j][i] * difference;
+                sums[2][i] += self.slopes[1][j][i] * difference;
+                sums[3][i] += self.slopes[2][j][i] * difference;
             }
         }
-        differences
-    }
-
-    /// The step to the match in x, slant and y, if the grey values were planes.
-    #[inline(always)]
-    fn step(&self, differences: &Window) -> [f32; 3] {
-        let [a, b, c] = [0, 1, 2].map(
+        let [squares, a, b, c] = sums.map(
             #[inline(always)]
-            |i: usize| dot(&self.slopes[i], differences),
+            |sums| sums.iter().sum::<f32>(),
         );
-        self.inverse.map(
+        let step = self.inverse.map(
             #[inline(always)]
             |[x, y, z]| x * a + y * b + z * c,
-        )
+        );
+        (squares, step)
     }
 }
 
@@ -222,21 +229,19 @@ fn dot(a: &Window, b: &Window) -> f32 {
     sums.iter().sum()
 }
 
+/// Subtracts the mean.
 #[inline(always)]
-fn centred(mut window: Window) -> Window {
+fn centre(window: &mut Window) {
     let mut sums = [0.0; WIDTH];
-    for row in &window {
+    for row in &*window {
         for i in 0..WIDTH {
             sums[i] += row[i];
         }
     }
     let mean = sums.iter().sum::<f32>() / (WIDTH * HEIGHT) as f32;
-    for row in &mut window {
-        for value in row {
-            *value -= mean;
-        }
+    for value in window.as_flattened_mut() {
+        *value -= mean;
     }
-    window
 }
 
 /// The grey values of the right image around a point.
@@ -260,14 +265,13 @@ impl Area {
         Self { size, first, values }
     }
 
-    /// The grey values less their mean where a window matches, by cubic interpolation (Keys 1981); `None` if it leaves the image.
+    /// Reads the grey values where a window matches, by cubic interpolation (Keys 1981); `None` if it leaves the image.
     #[inline(always)]
-    fn window(&self, Match { x, slant, y }: Match) -> Option<Window> {
+    fn read(&self, Match { x, slant, y }: Match, window: &mut Window) -> Option<()> {
         let [left, top] = before(x.floor() as usize, y.floor() as usize, self.size)?;
         let [left, top] = [left.checked_sub(self.first[0])?, top.checked_sub(self.first[1])?];
         let greys = self.values.get(top..top + HEIGHT + 3)?;
         let down = weights(y - y.floor());
-        let mut window = [[0.0; WIDTH]; HEIGHT];
         for (j, row) in window.iter_mut().enumerate() {
             let near = [0, 1, 2, 3].map(
                 #[inline(always)]
@@ -286,7 +290,7 @@ impl Area {
                     across[0] * line[i] + across[1] * line[i + 1] + across[2] * line[i + 2] + across[3] * line[i + 3];
             }
         }
-        Some(centred(window))
+        Some(())
     }
 }
 

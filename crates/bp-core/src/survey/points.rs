@@ -95,51 +95,83 @@ fn points<S: Simd>(simd: S, pair: &StereoPair, places: &[Place], factor: usize, 
         #[inline(always)]
         || {
             let mut points = Vec::with_capacity(places.len());
-            let (mut window, mut strips) = (Codes::default(), Codes::default());
+            let mut compared = Compared::default();
             for &place in places {
-                points.extend(point(pair, place, factor, reach, [&mut window, &mut strips]));
+                points.extend(compared.point(pair, place, factor, reach));
             }
             points
         },
     )
 }
 
-/// Compares the window of a place with those within `factor` columns and `reach` rows; `None` if one leaves its image.
-#[inline(always)]
-fn point(
-    pair: &StereoPair,
-    Place { x, y, column }: Place,
-    factor: usize,
-    reach: usize,
-    [window, strips]: [&mut Codes; 2],
-) -> Option<Point> {
-    let (half_width, half_height) = (WINDOW_WIDTH / 2, WINDOW_HEIGHT / 2);
-    let (left, top) = (x.checked_sub(half_width)?, y.checked_sub(half_height + reach)?);
-    let first = usize::try_from(column - (half_width + factor) as i64).ok()?;
-    let middle = top + reach..top + reach + WINDOW_HEIGHT;
-    window.read(pair.left(), left..left + WINDOW_WIDTH, middle)?;
-    strips.read(pair.right(), first..first + 2 * factor + WINDOW_WIDTH, top..top + 2 * reach + WINDOW_HEIGHT)?;
-    let mut costs = vec![u32::MAX; 2 * reach + 1];
-    let mut best = (u32::MAX, 0, 0, 0);
-    for (down, cost) in costs.iter_mut().enumerate() {
-        for across in 0..=2 * factor {
-            let mut differing = 0;
-            for row in 0..WINDOW_HEIGHT {
-                differing += (strips.word(down + row, across) ^ window.word(row, 0)).count_ones();
-            }
-            *cost = differing.min(*cost);
-            best = best.min((differing, reach.abs_diff(down), down, across));
-        }
-    }
-    let (_, _, down, across) = best;
-    Some(Point { x, y, column: first + half_width + across, row: y + down - reach, costs })
+/// What is compared for one place.
+#[derive(Default)]
+struct Compared {
+    window: Codes,
+    /// The part of the right image with all windows that are compared.
+    strips: Codes,
+    /// Eight columns of all rows of it.
+    words: Vec<u64>,
+    /// How much the window there differs, by the row that it begins in.
+    differing: Vec<u64>,
 }
+
+impl Compared {
+    /// Compares the window of a place with those within `factor` columns and `reach` rows; `None` if one leaves its image.
+    #[inline(always)]
+    fn point(
+        &mut self,
+        pair: &StereoPair,
+        Place { x, y, column }: Place,
+        factor: usize,
+        reach: usize,
+    ) -> Option<Point> {
+        let Self { window, strips, words, differing } = self;
+        let (half_width, half_height) = (WINDOW_WIDTH / 2, WINDOW_HEIGHT / 2);
+        let (left, top) = (x.checked_sub(half_width)?, y.checked_sub(half_height + reach)?);
+        let first = usize::try_from(column - (half_width + factor) as i64).ok()?;
+        let middle = top + reach..top + reach + WINDOW_HEIGHT;
+        window.read(pair.left(), left..left + WINDOW_WIDTH, middle)?;
+        let rows = 2 * reach + WINDOW_HEIGHT;
+        strips.read(pair.right(), first..first + 2 * factor + WINDOW_WIDTH, top..top + rows)?;
+        let mut costs = vec![u32::MAX; 2 * reach + 1];
+        let mut best = (u32::MAX, 0, 0, 0);
+        for across in 0..=2 * factor {
+            words.clear();
+            words.extend((0..rows).map(|row| strips.word(row, across)));
+            differing.clear();
+            differing.resize(costs.len(), 0);
+            // Rows of windows at once, which takes vectors.
+            for row in 0..WINDOW_HEIGHT {
+                let own = window.word(row, 0);
+                let others = words[row..].iter().map(|word| u64::from((word ^ own).count_ones()));
+                differing.iter_mut().zip(others).for_each(|(differing, other)| *differing += other);
+            }
+            for (down, (cost, &differing)) in costs.iter_mut().zip(&*differing).enumerate() {
+                let differing = differing as u32;
+                *cost = differing.min(*cost);
+                best = best.min((differing, reach.abs_diff(down), down, across));
+            }
+        }
+        let (_, _, down, across) = best;
+        Some(Point { x, y, column: first + half_width + across, row: y + down - reach, costs })
+    }
+}
+
+/// Grey values that are read together, and the codes that they make.
+const GREYS: usize = 32;
+const CODES: usize = GREYS - 2;
+
+/// [`GREYS`] values, and two more that mean nothing.
+type Run = [u8; GREYS + 2];
 
 /// The census codes of a rectangle; see [`crate::census::code`].
 #[derive(Default)]
 struct Codes {
+    /// The columns of the rectangle, rounded up to whole runs.
     columns: usize,
-    greys: Vec<u8>,
+    /// A run of each row, and of those above and below the rectangle.
+    greys: Vec<Run>,
     codes: Vec<u8>,
 }
 
@@ -147,23 +179,22 @@ impl Codes {
     /// Reads the codes at some columns and rows; `None` if they leave the image.
     #[inline(always)]
     fn read(&mut self, image: &Image, columns: Range<usize>, rows: Range<usize>) -> Option<()> {
-        let (size, wide) = (image.size(), columns.len() + 2);
+        let size = image.size();
         if columns.start == 0 || rows.start == 0 || columns.end >= size.width || rows.end >= size.height {
             return None;
         }
-        self.columns = columns.len();
-        self.greys.resize(wide * (rows.len() + 2), 0);
-        for (row, greys) in (rows.start - 1..).zip(self.greys.chunks_exact_mut(wide)) {
-            let pixels = &image.pixels()[row * size.width..][columns.start - 1..=columns.end];
-            for (out, &pixel) in greys.iter_mut().zip(pixels) {
-                *out = grey(pixel);
+        self.columns = columns.len().next_multiple_of(CODES);
+        self.greys.resize(rows.len() + 2, [0; GREYS + 2]);
+        self.codes.resize(self.columns * rows.len(), 0);
+        for first in (0..self.columns).step_by(CODES) {
+            let start = columns.start - 1 + first;
+            for (row, greys) in (rows.start - 1..).zip(&mut self.greys) {
+                *greys = run_of_greys(&image.pixels()[row * size.width + start..]);
             }
-        }
-        self.codes.clear();
-        self.codes.resize(columns.len() * rows.len(), 0);
-        for (rows, codes) in self.greys.windows(3 * wide).step_by(wide).zip(self.codes.chunks_exact_mut(columns.len()))
-        {
-            write_codes(rows, codes);
+            let codes = self.codes.chunks_exact_mut(self.columns);
+            for (rows, codes) in self.greys.windows(3).zip(codes) {
+                codes[first..first + CODES].copy_from_slice(&run_of_codes([&rows[0], &rows[1], &rows[2]])[..CODES]);
+            }
         }
         Some(())
     }
@@ -176,15 +207,26 @@ impl Codes {
     }
 }
 
-/// Writes the codes of the middle one of three rows.
+/// The grey values of some pixels; zeros beyond the last one.
 #[inline(always)]
-fn write_codes(rows: &[u8], codes: &mut [u8]) {
-    let wide = codes.len() + 2;
-    let centres = &rows[wide + 1..][..codes.len()];
+fn run_of_greys(pixels: &[[u8; 3]]) -> Run {
+    let mut greys = [0; GREYS + 2];
+    // A known number of pixels takes vectors.
+    match pixels.first_chunk::<GREYS>() {
+        Some(pixels) => greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+        None => greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+    }
+    greys
+}
+
+/// The codes of the middle one of three rows, without its ends. The last two mean nothing.
+#[inline(always)]
+fn run_of_codes(rows: [&Run; 3]) -> [u8; GREYS] {
+    let mut codes = [0; GREYS];
     for (bit, (dx, dy)) in (0..8).zip([(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)]) {
-        let others = &rows[dy * wide + dx..][..codes.len()];
-        for ((code, other), centre) in codes.iter_mut().zip(others).zip(centres) {
+        for ((code, other), centre) in codes.iter_mut().zip(&rows[dy][dx..dx + GREYS]).zip(&rows[1][1..]) {
             *code |= u8::from(other > centre) << bit;
         }
     }
+    codes
 }
