@@ -149,10 +149,9 @@ impl Patch {
             }
         }
         centre(&mut greys);
-        slopes.iter_mut().for_each(
-            #[inline(always)]
-            |slopes| centre(slopes),
-        );
+        for slopes in &mut slopes {
+            centre(slopes);
+        }
         let mut matrix = [[0.0; 3]; 3];
         for (row, a) in matrix.iter_mut().zip(&slopes) {
             for (sum, b) in row.iter_mut().zip(&slopes) {
@@ -173,9 +172,9 @@ impl Patch {
         let gain = (self.squares / dot(other, other).max(f32::MIN_POSITIVE)).sqrt();
         // All four sums of products at once.
         let mut sums = [[0.0; WIDTH]; 4];
-        for j in 0..HEIGHT {
+        for (j, other) in other.iter().enumerate() {
             for i in 0..WIDTH {
-                let difference = self.greys[j][i] - gain * other[j][i];
+                let difference = self.greys[j][i] - gain * other[i];
                 sums[0][i] += difference * difference;
                 sums[1][i] += self.slopes[0][j][i] * difference;
                 sums[2][i] += self.slopes[1][j][i] * difference;

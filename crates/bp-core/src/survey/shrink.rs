@@ -67,7 +67,7 @@ fn write_means(image: &Image, factor: usize, row: usize, means: &mut [u8]) {
             }
         }
         for (mean, total) in means.iter_mut().zip(totals.as_chunks().0.iter().step_by(factor)) {
-            *mean = grey(total.map(|sum| ((u64::from(sum) + count / 2) * inverse >> SHIFT) as u8));
+            *mean = grey(total.map(|sum| (((u64::from(sum) + count / 2) * inverse) >> SHIFT) as u8));
         }
     }
 }
@@ -92,7 +92,7 @@ mod tests {
             let inverse = (1 << SHIFT) / count + 1;
             let sums = (0..255).flat_map(|mean| [mean * count, mean * count + count / 2, mean * count + count - 1]);
             for rounded in sums.map(|sum| sum + count / 2) {
-                assert_eq!(rounded * inverse >> SHIFT, rounded / count, "{rounded} by {count}");
+                assert_eq!((rounded * inverse) >> SHIFT, rounded / count, "{rounded} by {count}");
             }
         }
     }

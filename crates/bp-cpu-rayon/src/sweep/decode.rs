@@ -167,7 +167,7 @@ impl Undecided<'_> {
         let mut entry = 0;
         while entry < self.list.labels.len() {
             let from = usize::from(self.list.labels[entry]);
-            let end = entry + self.list.labels[entry..].partition_point(|&label| usize::from(label) < from + CHUNK);
+            let end = self.chunk_end(entry);
             let before = best;
             let nearest = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &mut best);
             let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
@@ -179,6 +179,16 @@ impl Undecided<'_> {
             entry = end;
         }
         labels
+    }
+
+    /// The end of the chunk that begins with an entry.
+    #[inline(always)]
+    fn chunk_end(&self, entry: usize) -> usize {
+        let labels = &self.list.labels[entry..];
+        let inside = |label: u16| label - labels[0] < CHUNK as u16;
+        // Mostly all of them.
+        let all = labels.last().is_none_or(|&last| inside(last));
+        entry + if all { labels.len() } else { labels.partition_point(|&label| inside(label)) }
     }
 
     /// Compares these entries with the best so far, and returns for each node the label of the best of them, counted from [`FAR`]

@@ -129,21 +129,50 @@ fn ahead_of<S: Simd, const LEVELS: bool, const NEXT: isize>(simd: S, nodes: &Nod
     let (same, next) = (&slots.same[..len], &slots.next[..len]);
     let (behind, ahead) = (&slots.behind[..len], &mut slots.ahead[..len]);
     let levels = nodes.levels::<S, LEVELS>(simd);
-    let mut envelope = Bytes::<S>::splat(simd, u8::MAX);
-    let mut least = envelope;
+    let mut envelope = Envelope::new(simd);
+    let mut least = Bytes::<S>::splat(simd, u8::MAX);
     for entry in 0..len {
         let sides = same[entry].load(simd) + next[entry].load::<S, NEXT>(simd);
         let h = costs[entry].load(simd).saturating_add(sides).saturating_add(behind[entry].load(simd));
-        envelope = envelope.saturating_add(of_edges::<S, LEVELS>(simd, levels[2], steps[entry])).min(h);
-        least = least.min(envelope);
-        ahead[entry].store(envelope);
+        let reached = envelope.rise(of_edges::<S, LEVELS>(simd, levels[2], steps[entry]), h);
+        least = least.min(reached);
+        ahead[entry].store(reached);
     }
     let truncation = nodes.truncations::<S, LEVELS>(simd, levels);
-    envelope = Bytes::splat(simd, u8::MAX);
+    envelope = Envelope::new(simd);
     for entry in (0..len).rev() {
         let step = of_edges::<S, LEVELS>(simd, levels[2], steps[entry + 1]);
-        envelope = envelope.saturating_add(step).min(ahead[entry].load(simd));
-        ahead[entry].store((envelope - least).min(truncation[2]));
+        let reached = envelope.rise(step, ahead[entry].load(simd));
+        ahead[entry].store((reached - least).min(truncation[2]));
+    }
+}
+
+/// The lower envelope of values, each some step after the one before: `min(envelope + step, value)`.
+///
+/// A single envelope is a chain of operations that takes longer than everything else in its loop. So each call starts from the
+/// envelope of the call before the last, and two chains run at the same time.
+struct Envelope<S: Simd> {
+    /// The last two, the older one first.
+    reached: [Bytes<S>; 2],
+    step: Bytes<S>,
+    value: Bytes<S>,
+}
+
+impl<S: Simd> Envelope<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let none = Bytes::splat(simd, u8::MAX);
+        Self { reached: [none; 2], step: none, value: none }
+    }
+
+    /// The envelope at the next value.
+    #[inline(always)]
+    fn rise(&mut self, step: Bytes<S>, value: Bytes<S>) -> Bytes<S> {
+        let from_values = self.value.saturating_add(step).min(value);
+        let from_envelope = self.reached[0].saturating_add(self.step.saturating_add(step));
+        self.reached = [self.reached[1], from_envelope.min(from_values)];
+        (self.step, self.value) = (step, value);
+        self.reached[1]
     }
 }
 
