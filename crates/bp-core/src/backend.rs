@@ -172,12 +172,13 @@ pub trait Solver: Send {
     /// Errors of the device.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error>;
 
-    /// Writes the label with the lowest belief of every pixel, `[height][width]`; the smallest label wins a tie. Under
-    /// [`crate::Schedule::Sweep`] labels are decided one after another, as described there.
+    /// Writes the label with the lowest belief of every node of `grid`, `[height][width]`; the smallest label wins a tie. Under
+    /// [`crate::Schedule::Sweep`] labels are decided one after another, as described there. `grid` is the one whose messages
+    /// were updated last: 0, or [`Plan::halved`].
     ///
     /// # Errors
     /// Errors of the device.
-    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error>;
+    fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error>;
 
     /// Copies the last message that every node of grid 0 received from `side`, `[height][width][labels]`. Writes zeros
     /// where no message comes from that side, or where the edge holds the opposite message under

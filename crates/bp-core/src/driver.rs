@@ -1,7 +1,7 @@
 //! The driver: runs a prepared plan on one pair after another, calls the kernels in order, and measures their times.
 
 use std::{
-    ops::{AddAssign, ControlFlow},
+    ops::{AddAssign, ControlFlow, Range},
     time::{Duration, Instant},
 };
 
@@ -49,8 +49,8 @@ pub struct Driver {
     plan: Plan,
     solver: Box<dyn Solver>,
     labels: Vec<u16>,
-    /// Whether the last solve finished.
-    has_answer: bool,
+    /// Whether the last solve finished, with messages on grid 0.
+    has_messages: bool,
 }
 
 impl Driver {
@@ -64,7 +64,7 @@ impl Driver {
         let (size, labels, bytes) = (plan.image_size(), plan.model().labels(), solver.allocated_bytes());
         log::debug!("prepared for {size} pixels and {labels} labels in {:?}, {bytes} bytes", start.elapsed());
         let labels = memory::filled("labels", plan.image_size().pixels(), 0)?;
-        Ok(Self { plan, solver, labels, has_answer: false })
+        Ok(Self { plan, solver, labels, has_messages: false })
     }
 
     /// The plan.
@@ -118,7 +118,17 @@ impl Driver {
     /// # Errors
     /// As [`Driver::solve`], and [`Error::Stopped`].
     pub fn solve_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
-        self.solve_from(pair, Start::Cold, observer)
+        self.solve_run(pair, Run::Cold, observer)
+    }
+
+    /// As [`Driver::solve_observed`], but at half the resolution, if grid 1 decides labels in any case ([`Plan::halved`]): the
+    /// finest grid, which is most of the work, is left out, and each label of grid 1 counts for all pixels that its node covers.
+    /// Disparities are as fine as ever. No messages are left.
+    ///
+    /// # Errors
+    /// As [`Driver::solve_observed`].
+    pub fn solve_halved_observed(&mut self, pair: &StereoPair, observer: &mut Observer<'_>) -> Result<Times, Error> {
+        self.solve_run(pair, Run::Halved, observer)
     }
 
     /// Matches the next frame of a video, starting from the messages of the previous frame. The last messages of grid 0
@@ -133,7 +143,7 @@ impl Driver {
         if self.plan.settings().schedule == Schedule::Sweep {
             return Err(Error::Plan("a warm start needs messages that are kept: the schedule sync or checkerboard"));
         }
-        self.solve_from(pair, if self.has_answer { Start::Warm } else { Start::Cold }, observer)
+        self.solve_run(pair, if self.has_messages { Run::Warm } else { Run::Cold }, observer)
     }
 
     /// [`Driver::solve_observed`] with a given seed instead of the plan's own.
@@ -146,38 +156,43 @@ impl Driver {
         seed: Option<Seed>,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
-        self.solve_with(pair, |_, _| seed, Start::Cold, observer)
+        self.solve_with(pair, |_, _| seed, Run::Cold, observer)
     }
 
-    fn solve_from(&mut self, pair: &StereoPair, from: Start, observer: &mut Observer<'_>) -> Result<Times, Error> {
-        self.solve_with(pair, census::seed, from, observer)
+    fn solve_run(&mut self, pair: &StereoPair, run: Run, observer: &mut Observer<'_>) -> Result<Times, Error> {
+        self.solve_with(pair, census::seed, run, observer)
     }
 
     fn solve_with(
         &mut self,
         pair: &StereoPair,
         seed: impl FnOnce(&StereoPair, &Plan) -> Option<Seed>,
-        from: Start,
+        run: Run,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         if pair.size() != self.plan.pair_size() {
             let (found, expected) = (pair.size(), self.plan.pair_size());
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
-        self.has_answer = false;
+        self.has_messages = false;
         let Self { plan, solver, labels, .. } = self;
         let mut times = Times::default();
         let start = Instant::now();
         let seed = seed(pair, plan);
         timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
-        for grid in 1..from.grids(plan) {
+        let grids = run.grids(plan);
+        for grid in 1..grids.end {
             timed(&mut times, Stage::Coarsen, || solver.coarsen(grid))?;
         }
-        pass_messages(plan, solver.as_mut(), from, &mut times, observer)?;
-        timed(&mut times, Stage::SelectLabels, || solver.select_labels(labels))?;
+        pass_messages(plan, solver.as_mut(), run, &mut times, observer)?;
+        let nodes = plan.size(grids.start).pixels();
+        timed(&mut times, Stage::SelectLabels, || solver.select_labels(grids.start, &mut labels[..nodes]))?;
+        if grids.start > 0 {
+            spread(plan, grids.start, labels);
+        }
         times.total = start.elapsed();
         times.device = solver.device_times();
-        self.has_answer = true;
+        self.has_messages = grids.start == 0;
         log::debug!("solved in {:?}", times.total);
         Ok(times)
     }
@@ -205,21 +220,35 @@ impl Driver {
     }
 }
 
-/// The messages that a solve starts with.
+/// The way of a solve.
 #[derive(Clone, Copy)]
-enum Start {
-    /// Zeros on the coarsest grid.
+enum Run {
+    /// Starts with zeros on the coarsest grid.
     Cold,
-    /// The messages that grid 0 already holds.
+    /// Starts with the messages that grid 0 already holds.
     Warm,
+    /// As [`Self::Cold`], without the finest grid; see [`Plan::halved`].
+    Halved,
 }
 
-impl Start {
-    /// The number of grids on which messages are passed.
-    fn grids(self, plan: &Plan) -> usize {
+impl Run {
+    /// The grids on which messages are passed.
+    fn grids(self, plan: &Plan) -> Range<usize> {
         match self {
-            Self::Cold => plan.grids(),
-            Self::Warm => 1,
+            Self::Cold => 0..plan.grids(),
+            Self::Warm => 0..1,
+            Self::Halved => plan.halved()..plan.grids(),
+        }
+    }
+}
+
+/// Spreads the labels of a coarser grid, which come first, over the image. Every label moves towards the end, so those not moved
+/// yet are still in place if the last one is moved first.
+fn spread(plan: &Plan, grid: usize, labels: &mut [u16]) {
+    let (coarse, fine) = (plan.size(grid), plan.image_size());
+    for y in (0..fine.height).rev() {
+        for x in (0..fine.width).rev() {
+            labels[y * fine.width + x] = labels[(y >> grid) * coarse.width + (x >> grid)];
         }
     }
 }
@@ -227,17 +256,17 @@ impl Start {
 fn pass_messages(
     plan: &Plan,
     solver: &mut dyn Solver,
-    from: Start,
+    run: Run,
     times: &mut Times,
     observer: &mut Observer<'_>,
 ) -> Result<(), Error> {
-    let grids = from.grids(plan);
+    let grids = run.grids(plan);
     let mut progress =
-        Progress { done: 0, total: (0..grids).map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add) };
-    for grid in (0..grids).rev() {
-        timed(times, Stage::Refine, || match from {
-            Start::Cold => solver.refine(grid),
-            Start::Warm => solver.keep_messages(),
+        Progress { done: 0, total: grids.clone().map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add) };
+    for grid in grids.rev() {
+        timed(times, Stage::Refine, || match run {
+            Run::Cold | Run::Halved => solver.refine(grid),
+            Run::Warm => solver.keep_messages(),
         })?;
         progress.done += plan.seam_updates(grid);
         let mut steps = 0..plan.settings().steps;
@@ -259,4 +288,25 @@ fn timed(times: &mut Times, stage: Stage, run: impl FnOnce() -> Result<(), Error
     run()?;
     times.wall[stage as usize] += start.elapsed();
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Algorithm, Model, Profile, Settings, Size};
+
+    #[test]
+    fn each_pixel_has_the_label_of_the_node_that_covers_it() {
+        for (width, height) in [(5, 3), (4, 4), (1, 5), (3, 1)] {
+            let size = Size { width, height };
+            let settings = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);
+            let settings = Settings { grids: 2, ..settings };
+            let plan = Plan::new(size, Model::new(Profile::Census, 8).unwrap(), settings).unwrap();
+            let nodes = plan.size(1);
+            let mut labels: Vec<u16> = (0..size.pixels() as u16).collect();
+            spread(&plan, 1, &mut labels);
+            let covering = |pixel: usize| (pixel / width / 2 * nodes.width + pixel % width / 2) as u16;
+            assert_eq!(labels, (0..size.pixels()).map(covering).collect::<Vec<_>>(), "{size}");
+        }
+    }
 }

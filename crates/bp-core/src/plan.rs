@@ -187,6 +187,13 @@ impl Plan {
         grid.checked_sub(1).is_none_or(|finer| self.has_label_sets(finer))
     }
 
+    /// The grid that answers a solve at half the resolution: 1 if its labels are decided in any case, otherwise 0. See
+    /// [`crate::Driver::solve_halved_observed`].
+    #[must_use]
+    pub fn halved(&self) -> usize {
+        usize::from(self.has_label_sets(0))
+    }
+
     /// The most labels that determine the label sets of a grid: those of grid 1. The labels of coarser grids lie in the same
     /// place before.
     #[must_use]

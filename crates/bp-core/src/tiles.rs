@@ -10,6 +10,21 @@ pub use tiling::{HALO, Needed, Tiling};
 
 use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side, StereoPair, Times, memory};
 
+/// A way to solve tiles.
+#[derive(Clone, Copy)]
+struct Way {
+    solve: fn(&mut Driver, &StereoPair, &mut Observer<'_>) -> Result<Times, Error>,
+    /// The message entries of a tile, and of all tiles.
+    updates: fn(&Plan) -> u64,
+    all_updates: fn(&Tiling) -> u64,
+}
+
+const WHOLLY: Way =
+    Way { solve: Driver::solve_observed, updates: Plan::message_updates, all_updates: Tiling::message_updates };
+
+const HALVED: Way =
+    Way { solve: Driver::solve_halved_observed, updates: Plan::halved_updates, all_updates: Tiling::halved_updates };
+
 /// A tiled plan prepared on a device, ready to match one pair of its size after another. A plan with a single tile runs
 /// as in [`Driver`], without a copy of the pair.
 pub struct Tiled {
@@ -74,33 +89,57 @@ impl Tiled {
         pair: &StereoPair,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
+        self.solve_by(WHOLLY, device, pair, observer)
+    }
+
+    /// As [`Tiled::solve_observed`], at half the resolution; see [`Driver::solve_halved_observed`].
+    ///
+    /// # Errors
+    /// As [`Tiled::solve_observed`].
+    pub fn solve_halved_observed(
+        &mut self,
+        device: &dyn Device,
+        pair: &StereoPair,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
+        self.solve_by(HALVED, device, pair, observer)
+    }
+
+    fn solve_by(
+        &mut self,
+        way: Way,
+        device: &dyn Device,
+        pair: &StereoPair,
+        observer: &mut Observer<'_>,
+    ) -> Result<Times, Error> {
         let (found, expected) = (pair.size(), self.plan().image_size());
         if found != expected {
             return Err(Error::WrongSize { what: "the pair", found, expected });
         }
         let start = Instant::now();
-        let mut times = self.solve_tiles(device, pair, observer);
+        let mut times = self.solve_tiles(way, device, pair, observer);
         if let (Err(Error::OutOfMemory { .. }), Some(certain)) = (&times, self.tiling.certain().cloned()) {
             log::debug!("label sets need more memory than is usual: {:?} tiles instead", certain.counts());
             (self.tiling, self.driver) = (certain, None);
-            times = self.solve_tiles(device, pair, observer);
+            times = self.solve_tiles(way, device, pair, observer);
         }
         times.map(|times| Times { total: start.elapsed(), ..times })
     }
 
     fn solve_tiles(
         &mut self,
+        way: Way,
         device: &dyn Device,
         pair: &StereoPair,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         self.updates = 0;
-        let (mut times, mut done, total) = (Times::default(), 0, self.tiling.message_updates());
+        let (mut times, mut done, total) = (Times::default(), 0, (way.all_updates)(&self.tiling));
         for tile in self.tiling.tiles() {
             let mut driver = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
-            let solved = self.solve_tile(&mut driver, pair, &tile, observe);
-            done += driver.plan().message_updates();
+            let solved = self.solve_tile(way, &mut driver, pair, &tile, observe);
+            done += (way.updates)(driver.plan());
             // With label sets, a solve may allocate.
             self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
             self.updates += driver.message_updates();
@@ -140,15 +179,16 @@ impl Tiled {
 
     fn solve_tile(
         &mut self,
+        way: Way,
         driver: &mut Driver,
         pair: &StereoPair,
         tile: &Tile,
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         if self.tiling.is_whole() {
-            return driver.solve_observed(pair, observer);
+            return (way.solve)(driver, pair, observer);
         }
-        let times = driver.solve_observed(&tile.pair(pair), observer)?;
+        let times = (way.solve)(driver, &tile.pair(pair), observer)?;
         let rows = driver.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
         for (labels, y) in rows.filter(|(_, y)| tile.rows.kept.contains(y)) {
             let Span { all, kept } = &tile.columns;

@@ -225,9 +225,9 @@ impl Solver for RayonSolver {
     }
 
     /// Only hands the labels out. They are decided in the last step, while messages are in cache.
-    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
+    fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => labels.copy_from_slice(self.swept.labels()),
+            Schedule::Sweep => labels.copy_from_slice(self.swept.labels(grid)),
             Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
                 self.labels.hand_out(&self.layouts[0], labels);
             }

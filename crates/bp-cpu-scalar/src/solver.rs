@@ -86,7 +86,11 @@ impl Solver for ScalarSolver {
         Ok(())
     }
 
-    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
+    fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error> {
+        if grid > 0 {
+            labels.copy_from_slice(&self.coarser[..labels.len()]);
+            return Ok(());
+        }
         let grid = on_grid(&self.plan, 0, &self.costs, &self.greys);
         select_labels(&grid, &self.messages[0], &self.seams, labels, &mut self.h);
         Ok(())

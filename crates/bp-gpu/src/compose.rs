@@ -131,7 +131,7 @@ impl Composer<'_> {
         for (grid, step) in grids.flat_map(|grid| (0..periods).map(move |step| (grid, step))) {
             self.step(recorder.part(), grid, step);
         }
-        self.select_labels(recorder.part());
+        (0..=self.plan.halved()).for_each(|grid| self.select_labels(recorder.part(), grid));
         let (segments, parts) = recorder.finish(&self.bind_groups, &self.buffers.list);
         let parameters = self.parameter_blocks();
         let mut buffers = self.buffers.list.clone();

@@ -126,7 +126,8 @@ pub(crate) enum Part {
     Refine(usize),
     /// One step on a grid.
     UpdateMessages(usize, u32),
-    SelectLabels,
+    /// The labels of grid 0, or of [`bp_core::Plan::halved`].
+    SelectLabels(usize),
 }
 
 impl Program {
@@ -153,7 +154,7 @@ impl Program {
             Part::Coarsen(grid) => grid,
             Part::Refine(grid) => grids + grid,
             Part::UpdateMessages(grid, step) => 2 * grids + periods * grid + step as usize % periods,
-            Part::SelectLabels => (2 + periods) * grids,
+            Part::SelectLabels(grid) => (2 + periods) * grids + grid,
         };
         self.parts[index].clone()
     }

@@ -98,9 +98,9 @@ impl Solver for GpuSolver {
         self.run(Stage::UpdateMessages, steps.map(|step| Part::UpdateMessages(grid, step)))
     }
 
-    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
-        self.run(Stage::SelectLabels, [Part::SelectLabels].into_iter())?;
-        let size = self.plan.image_size();
+    fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error> {
+        self.run(Stage::SelectLabels, [Part::SelectLabels(grid)].into_iter())?;
+        let size = self.plan.size(grid);
         self.queue.finish(&mut |download| answer::read_labels(size, download, labels))?;
         let between = self.queue.times();
         self.times = (between.len() == self.stages.len()).then(|| {
@@ -216,7 +216,7 @@ mod tests {
             solver.refine(grid).unwrap();
             solver.update_messages(grid, 0..plan.settings().steps).unwrap();
         }
-        solver.select_labels(&mut vec![0; plan.image_size().pixels()]).unwrap();
+        solver.select_labels(0, &mut vec![0; plan.image_size().pixels()]).unwrap();
         (submitted.lock().unwrap().clone(), most)
     }
 

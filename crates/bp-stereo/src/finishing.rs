@@ -37,23 +37,32 @@ pub(crate) struct Finished {
     pub(crate) times: AnswerTimes,
 }
 
+/// The image that a map belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum View {
+    Left,
+    /// Matched as the left image of the mirrored pair.
+    Right,
+}
+
 /// Matches the left image with `solve`, and the right one if needed. Then finishes the left image's map. The left image
 /// is matched last, so that its labels and messages remain available.
 pub(crate) fn finished(
     options: &Options,
     pair: &StereoPair,
     is_stopped: IsStopped<'_>,
-    mut solve: impl FnMut(&StereoPair) -> Result<(Times, DisparityMap), Error>,
+    mut solve: impl FnMut(&StereoPair, View) -> Result<(Times, DisparityMap), Error>,
 ) -> Result<Finished, Error> {
     let start = Instant::now();
     let mut matching = Times::default();
-    let mut matched = |pair: &StereoPair| -> Result<DisparityMap, Error> {
-        let (times, map) = solve(pair)?;
+    let mut matched = |pair: &StereoPair, view| -> Result<DisparityMap, Error> {
+        let (times, map) = solve(pair, view)?;
         matching += times;
         Ok(map)
     };
-    let right = options.needs_right().then(|| matched(&pair.mirrored())).transpose()?.map(DisparityMap::mirrored);
-    let left = matched(pair)?;
+    let right = options.needs_right().then(|| matched(&pair.mirrored(), View::Right)).transpose()?;
+    let right = right.map(DisparityMap::mirrored);
+    let left = matched(pair, View::Left)?;
     let trust = right.as_ref().filter(|_| options.confidence);
     let mut confidence = trust.map(|right| finish::confidence(&left, right, is_stopped)).transpose()?;
     let finish: Finish = options.finish();

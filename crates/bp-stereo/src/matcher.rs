@@ -8,7 +8,7 @@ use std::{
 };
 
 use bp_core::{
-    Alignment, DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, Times, survey::Survey,
+    Alignment, DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, survey::Survey,
 };
 use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 use crate::{
     Align, AnswerTimes, Beside, Ending, Error, Options, Tiles, Warning, Watch, description,
     devices::{self, Opened},
-    finishing::{Finished, finished},
+    finishing::{Finished, View, finished},
     memory::{self, Fitted},
     plan::{self, labels, quarter_of_width},
     system, warning,
@@ -332,17 +332,21 @@ impl Prepared {
         watch: &Watch<'_>,
     ) -> Result<Finished, Error> {
         let (tiled, device) = (&mut self.tiled, opened.device.as_ref());
-        let updates = tiled.tiling().message_updates();
-        let total = updates.saturating_mul(if options.needs_right() { 2 } else { 1 });
+        let tiling = tiled.tiling();
+        let (updates, halved) = (tiling.message_updates(), tiling.halved_updates());
+        // What the right image's map is compared with is right or wrong by whole pixels, so half the resolution is enough.
+        let of_right = if start == Start::Cold { halved } else { updates };
+        let total = updates.saturating_add(if options.needs_right() { of_right } else { 0 });
         let mut done = 0_u64;
-        finished(options, pair, &|| watch.is_stopped(), |pair: &StereoPair| -> Result<(Times, DisparityMap), Error> {
+        finished(options, pair, &|| watch.is_stopped(), |pair, view| {
             let observer =
                 &mut |progress: Progress| watch.progress(done.saturating_add(progress.done).min(total), total);
-            let times = match start {
-                Start::Cold => tiled.solve_observed(device, pair, observer)?,
-                Start::Warm => tiled.solve_warm_observed(device, pair, observer)?,
+            let times = match (start, view) {
+                (Start::Cold, View::Right) => tiled.solve_halved_observed(device, pair, observer)?,
+                (Start::Cold, View::Left) => tiled.solve_observed(device, pair, observer)?,
+                (Start::Warm, _) => tiled.solve_warm_observed(device, pair, observer)?,
             };
-            done = done.saturating_add(updates);
+            done = done.saturating_add(if view == View::Right { of_right } else { updates });
             // Freeing the tiles makes room for the map.
             tiled.free_tiles();
             Ok((times, tiled.disparities()))

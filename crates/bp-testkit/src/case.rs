@@ -1,5 +1,7 @@
 //! A problem for a backend, and the backend's answer.
 
+use std::ops::ControlFlow;
+
 use bp_core::{Device, Driver, Error, Model, Plan, Settings, Side, StereoPair};
 
 /// A pair and a plan for it.
@@ -50,4 +52,14 @@ pub fn solve(device: &dyn Device, case: &Case) -> Result<Answer, Error> {
     let mut driver = Driver::new(device, case.plan.clone())?;
     driver.solve(&case.pair)?;
     Answer::of(&mut driver)
+}
+
+/// Solves a case at half the resolution. The answer has no messages.
+///
+/// # Errors
+/// Those of the device.
+pub(crate) fn solve_halved(device: &dyn Device, case: &Case) -> Result<Answer, Error> {
+    let mut driver = Driver::new(device, case.plan.clone())?;
+    driver.solve_halved_observed(&case.pair, &mut |_| ControlFlow::Continue(()))?;
+    Ok(Answer { labels: driver.labels().to_vec(), messages: Default::default() })
 }

@@ -137,9 +137,9 @@ impl Solver for State {
         Ok(())
     }
 
-    fn select_labels(&mut self, labels: &mut [u16]) -> Result<(), Error> {
+    fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
-            labels.copy_from_slice(&self.grids[0].decided);
+            labels.copy_from_slice(&self.grids[grid].decided);
             return Ok(());
         }
         let Grid { costs, received, .. } = &self.grids[0];

@@ -5,7 +5,9 @@ use std::ops::ControlFlow;
 use bp_core::{Algorithm, Device, Driver, Error, Model, Plan, Profile, Schedule, Settings};
 
 use crate::{
-    Answer, Case, Difference, Fault, cases,
+    Answer, Case, Difference, Fault,
+    case::solve_halved,
+    cases,
     cases::outward_cases,
     difference::{SCRATCH_BYTES, same},
     noise_pair,
@@ -57,7 +59,12 @@ pub fn conform_outward(reference: &dyn Device, tested: &dyn Device) -> Result<()
 pub fn compare(reference: &dyn Device, tested: &dyn Device, case: &Case) -> Result<(), Difference> {
     let failed = |error: Error| Difference::new(error.into(), &case.plan);
     let expected = solve(reference, case).map_err(failed)?;
-    same(&expected, &solve(tested, case).map_err(failed)?, case)
+    same(&expected, &solve(tested, case).map_err(failed)?, case)?;
+    if case.plan.halved() == 0 {
+        return Ok(());
+    }
+    let halved = |device| solve_halved(device, case).map_err(failed);
+    same(&halved(reference)?, &halved(tested)?, case)
 }
 
 /// Checks that devices give the reference's labels and messages for the random cases of these seeds. Each case runs on
@@ -112,10 +119,10 @@ fn short_cases() -> impl Iterator<Item = Case> {
     swept.chain(all)
 }
 
-/// Checks that a driver answers like a fresh one, both after another pair and after a stopped solve.
+/// Checks that a driver answers like a fresh one after another pair, after a stopped solve, and after one at half the resolution.
 fn forgets(device: &dyn Device, case: &Case) -> Result<(), Difference> {
     let other = noise_pair(case.pair.size().width, case.pair.size().height, 2);
-    let again = || -> Result<[Answer; 2], Fault> {
+    let again = || -> Result<[Answer; 3], Fault> {
         let mut driver = Driver::new(device, case.plan.clone())?;
         driver.solve(&other)?;
         driver.solve(&case.pair)?;
@@ -125,7 +132,10 @@ fn forgets(device: &dyn Device, case: &Case) -> Result<(), Difference> {
             return Err(Fault::NotStopped);
         }
         driver.solve(&case.pair)?;
-        Ok([reused, Answer::of(&mut driver)?])
+        let after_stop = Answer::of(&mut driver)?;
+        driver.solve_halved_observed(&other, &mut |_| ControlFlow::Continue(()))?;
+        driver.solve(&case.pair)?;
+        Ok([reused, after_stop, Answer::of(&mut driver)?])
     };
     let expected = solve(device, case).map_err(|error| Difference::new(error.into(), &case.plan))?;
     let found = again().map_err(|fault| Difference::new(fault, &case.plan))?;

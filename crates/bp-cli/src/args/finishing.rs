@@ -13,8 +13,8 @@ use super::{named, switch};
 pub(crate) struct FinishArgs {
     /// Match the right image too, and drop pixels on which the two maps disagree.
     ///
-    /// The maps disagree, by more than one pixel, at occluded pixels and at most wrong ones. The check doubles the
-    /// time. Dropped pixels are filled, unless --fill off is given.
+    /// The maps disagree, by more than one pixel, at occluded pixels and at most wrong ones. The check takes
+    /// half as long again as the match. Dropped pixels are filled, unless --fill off is given.
     #[arg(long, value_parser = named(&[()], |()| "left-right"))]
     pub(crate) check: Option<()>,
     /// Drop surfaces with fewer than N pixels.

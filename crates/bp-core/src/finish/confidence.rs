@@ -47,8 +47,12 @@ pub fn confidence(left: &DisparityMap, right: &DisparityMap, is_stopped: IsStopp
     let rows = sums.par_chunks_exact_mut(width).zip(left.values().par_chunks_exact(width)).enumerate();
     rows.try_for_each(|(y, (sums, row))| {
         go_on(is_stopped)?;
-        let near = window(REACH).map(|(dx, dy)| (disparities.row(y, dx, dy), framed.row(y, dx, dy)));
-        dispatch!(level, simd => write_probabilities(simd, row, near, sums));
+        sums.fill(0.0);
+        for (dx, dy) in window(REACH) {
+            let (near, worths) = (disparities.row(y, dx, dy), framed.row(y, dx, dy));
+            dispatch!(level, simd => add_worths(simd, row, near, worths, sums));
+        }
+        dispatch!(level, simd => write_probabilities(simd, row, sums));
         Ok(())
     })?;
     Ok(sums)
@@ -66,19 +70,12 @@ fn write_worths<S: Simd>(simd: S, left: &[f32], right: &[f32], worths: &mut [f32
     );
 }
 
-/// Writes the probabilities of a row. `near` are the shifted rows of disparities and worths in the window.
+/// Writes the probabilities of a row, given the sums of the worths in the windows.
 #[inline(always)]
-fn write_probabilities<'a, S: Simd>(
-    simd: S,
-    row: &[f32],
-    near: impl Iterator<Item = (&'a [f32], &'a [f32])>,
-    sums: &mut [f32],
-) {
+fn write_probabilities<S: Simd>(simd: S, row: &[f32], sums: &mut [f32]) {
     simd.vectorize(
         #[inline(always)]
         || {
-            sums.fill(0.0);
-            near.for_each(|(disparities, worths)| add_worth(row, disparities, worths, sums));
             for (sum, disparity) in sums.iter_mut().zip(row) {
                 let share = *sum / PIXELS;
                 *sum = if disparity.is_finite() { probability(share) } else { 0.0 };
@@ -106,12 +103,17 @@ fn worth_of(x: usize, disparity: f32, right: &[f32]) -> f32 {
     }
 }
 
-/// Adds the worth of neighbours with a similar disparity.
+/// Adds the worths of neighbours with a similar disparity.
 #[inline(always)]
-fn add_worth(row: &[f32], neighbours: &[f32], worths: &[f32], sums: &mut [f32]) {
-    for (((&own, &other), &worth), sum) in row.iter().zip(neighbours).zip(worths).zip(sums) {
-        *sum += if (other - own).abs() <= AGREE { worth } else { 0.0 };
-    }
+fn add_worths<S: Simd>(simd: S, row: &[f32], neighbours: &[f32], worths: &[f32], sums: &mut [f32]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (((&own, &other), &worth), sum) in row.iter().zip(neighbours).zip(worths).zip(sums) {
+                *sum += if (other - own).abs() <= AGREE { worth } else { 0.0 };
+            }
+        },
+    );
 }
 
 #[cfg(test)]

@@ -57,7 +57,17 @@ impl Plan {
     /// The message entries that the whole plan computes.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
-        (0..self.grids()).map(|grid| self.grid_updates(grid)).fold(0, u64::saturating_add)
+        self.updates_from(0)
+    }
+
+    /// The message entries that a solve at half the resolution computes; see [`Plan::halved`].
+    #[must_use]
+    pub fn halved_updates(&self) -> u64 {
+        self.updates_from(self.halved())
+    }
+
+    fn updates_from(&self, finest: usize) -> u64 {
+        (finest..self.grids()).map(|grid| self.grid_updates(grid)).fold(0, u64::saturating_add)
     }
 
     /// The message entries that are computed on a grid.

@@ -144,8 +144,18 @@ impl Tiling {
     /// The message entries that all tiles compute.
     #[must_use]
     pub fn message_updates(&self) -> u64 {
+        self.sum_of_updates(Plan::message_updates)
+    }
+
+    /// The message entries that all tiles compute at half the resolution; see [`Plan::halved`].
+    #[must_use]
+    pub fn halved_updates(&self) -> u64 {
+        self.sum_of_updates(Plan::halved_updates)
+    }
+
+    fn sum_of_updates(&self, updates: impl Fn(&Plan) -> u64) -> u64 {
         let plans = self.tiles().into_iter().filter_map(|tile| tile.plan(&self.plan).ok());
-        plans.fold(0, |sum: u64, plan| sum.saturating_add(plan.message_updates()))
+        plans.fold(0, |sum: u64, plan| sum.saturating_add(updates(&plan)))
     }
 
     /// The most bytes that [`crate::Tiled`] needs: for the largest tile, for a copy of its part of the pair, and for the

@@ -146,9 +146,9 @@ impl Swept {
         &self.windows
     }
 
-    /// The labels of the image.
-    pub(crate) fn labels(&self) -> &[u16] {
-        self.labels.first().map_or(&[], Vec::as_slice)
+    /// The labels of a grid where they are decided.
+    pub(crate) fn labels(&self, grid: usize) -> &[u16] {
+        self.labels.get(grid).map_or(&[], Vec::as_slice)
     }
 
     /// Sweeps grid 0 again and copies the messages received from `side`, `[height][width][labels]`.

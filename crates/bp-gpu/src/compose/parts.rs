@@ -224,15 +224,18 @@ impl Composer<'_> {
         }
     }
 
-    pub(super) fn select_labels(&mut self, part: &mut PartRecorder) {
-        if self.plan.settings().schedule == Schedule::Sweep {
+    /// Records that the labels of a grid are decided, unless its sweep did, and handed out.
+    pub(super) fn select_labels(&mut self, part: &mut PartRecorder, grid: usize) {
+        if grid > 0 {
+            // The sweep decided them.
+        } else if self.plan.settings().schedule == Schedule::Sweep {
             self.decode(part, 0);
         } else {
             for nodes in self.nodes(0) {
                 self.select(part, nodes, self.all_rows(nodes));
             }
         }
-        let (from, bytes) = (self.buffers.labels[0], label_bytes(self.plan.image_size()));
+        let (from, bytes) = (self.buffers.labels[grid], label_bytes(self.plan.size(grid)));
         part.push_short(Command::Barrier);
         part.push_short(Command::Copy { from, from_offset: 0, to: Program::DOWNLOAD, to_offset: 0, bytes });
     }
