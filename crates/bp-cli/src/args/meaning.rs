@@ -76,7 +76,7 @@ impl MatchArgs {
             output: self.output.clone(),
             alignment: self.plan.align.file().cloned(),
             matching: self.options()?,
-            format: self.many.format.clone(),
+            format: self.many.format().to_owned(),
             also: self.many.also.clone(),
             shard: self.many.shard.unwrap_or_default(),
             warm_start: self.many.warm_start,
@@ -88,7 +88,7 @@ impl MatchArgs {
     /// How files are made.
     pub(crate) fn making(&self) -> Result<Making, Failure> {
         let also = |what| self.many.also.contains(&what);
-        let (has_depth, is_coloured) = (also(Also::Depth) || also(Also::Points), self.many.format == "y4m");
+        let (has_depth, is_coloured) = (also(Also::Depth) || also(Also::Points), self.many.format() == "y4m");
         self.outputs.making(also(Also::Picture) || is_coloured, has_depth, self.rectify)
     }
 }
@@ -110,11 +110,7 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
     if args.ground_truth.is_none() && reads_truth {
         return Err(Failure::usage("--ground-truth-right, --mask and --scale need --ground-truth"));
     }
-    // Clap's `requires` does not check this if --pairs or two images are given, which conflict with --video.
-    if args.many.warm_start.is_some() && args.many.video.is_none() {
-        return Err(Failure::usage("--warm-start needs --video: pairs of different scenes have nothing in common"));
-    }
-    Ok(())
+    args.many.check()
 }
 
 impl ManyArgs {

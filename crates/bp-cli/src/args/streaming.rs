@@ -12,7 +12,7 @@ impl MatchArgs {
         let Some(source) = self.many.stream()? else { return Ok(None) };
         self.check_stream()?;
         let making = self.making()?;
-        let format = match &*self.many.format {
+        let format = match self.many.format() {
             "pfm" => FrameFormat::Pfm,
             "npy" => FrameFormat::Npy { nan: making.nan },
             "y4m" => FrameFormat::Y4m(making.picture.colours),

@@ -253,3 +253,15 @@ fn frames_that_start_warm_are_the_same_however_they_are_resumed_or_shared() {
     folder.fails(&format!("match --pairs . {cold}"), 2, &["--warm-start needs --video"]);
     folder.fails(&format!("match --video l%d r%d {cold} --labels auto"), 2, &["--labels a number"]);
 }
+
+#[test]
+fn options_of_many_pairs_are_refused_by_name_for_one() {
+    let folder = Folder::new();
+    for option in ["--force", "--shard 1/2", "--also picture", "--format tif"] {
+        let name = option.split(' ').next().unwrap();
+        let sentence = format!("{name} is for many pairs: give --pairs or --video");
+        folder.fails(&format!("match left.png right.png -o no.pfm {option}"), 2, &[&sentence]);
+    }
+    folder.fails("match left.png right.png -o no.pfm --layout top-bottom", 2, &["--layout needs --video"]);
+    folder.fails("match --pairs . -o no --layout top-bottom", 2, &["--layout needs --video"]);
+}
