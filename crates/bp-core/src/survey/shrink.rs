@@ -51,7 +51,7 @@ fn write_means(image: &Image, factor: usize, row: usize, means: &mut [u8]) {
     let Size { width, height } = image.size();
     let ys = row * factor..((row + 1) * factor).min(height);
     let count = (ys.len() * factor.min(width)) as u64;
-    let inverse = (1 << SHIFT) / count + 1;
+    let inverse = inverse(count);
     let together = (TOGETHER / factor).max(1);
     for (part, means) in means.chunks_mut(together).enumerate() {
         let first = part * together * factor;
@@ -72,6 +72,12 @@ fn write_means(image: &Image, factor: usize, row: usize, means: &mut [u8]) {
     }
 }
 
+/// What a number is multiplied by in place of a division by `count`.
+#[inline(always)]
+fn inverse(count: u64) -> u64 {
+    (1 << SHIFT) / count + 1
+}
+
 /// Adds to the total of each column the sums of the block that begins with it, and clears them.
 #[inline(always)]
 fn add_blocks(sums: &mut [u16], factor: usize, totals: &mut [u32]) {
@@ -89,7 +95,7 @@ mod tests {
     #[test]
     fn means_are_rounded_as_quotients_are() {
         for count in [1_u64, 2, 3, 9, 16, 6724, (1 << 23) - 1] {
-            let inverse = (1 << SHIFT) / count + 1;
+            let inverse = inverse(count);
             let sums = (0..255).flat_map(|mean| [mean * count, mean * count + count / 2, mean * count + count - 1]);
             for rounded in sums.map(|sum| sum + count / 2) {
                 assert_eq!((rounded * inverse) >> SHIFT, rounded / count, "{rounded} by {count}");
