@@ -14,16 +14,12 @@ use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side,
 #[derive(Clone, Copy)]
 struct Way {
     solve: fn(&mut Driver, &StereoPair, &mut Observer<'_>) -> Result<Times, Error>,
-    /// The message entries of a tile, and of all tiles.
+    /// The message entries of a tile.
     updates: fn(&Plan) -> u64,
-    all_updates: fn(&Tiling) -> u64,
 }
 
-const WHOLLY: Way =
-    Way { solve: Driver::solve_observed, updates: Plan::message_updates, all_updates: Tiling::message_updates };
-
-const HALVED: Way =
-    Way { solve: Driver::solve_halved_observed, updates: Plan::halved_updates, all_updates: Tiling::halved_updates };
+const WHOLLY: Way = Way { solve: Driver::solve_observed, updates: Plan::message_updates };
+const HALVED: Way = Way { solve: Driver::solve_halved_observed, updates: Plan::halved_updates };
 
 /// A tiled plan prepared on a device, ready to match one pair of its size after another. A plan with a single tile runs
 /// as in [`Driver`], without a copy of the pair.
@@ -134,7 +130,7 @@ impl Tiled {
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         self.updates = 0;
-        let (mut times, mut done, total) = (Times::default(), 0, (way.all_updates)(&self.tiling));
+        let (mut times, mut done, total) = (Times::default(), 0, self.tiling.sum_of_updates(way.updates));
         for tile in self.tiling.tiles() {
             let mut driver = self.prepared(device, &tile)?;
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });

@@ -14,7 +14,7 @@ pub(crate) struct FinishArgs {
     /// Match the right image too, and drop pixels on which the two maps disagree.
     ///
     /// The maps disagree, by more than one pixel, at occluded pixels and at most wrong ones. The check takes
-    /// half as long again as the match. Dropped pixels are filled, unless --fill off is given.
+    /// half as long as the match, or as long where all labels are tried. Dropped pixels are filled, unless --fill off is given.
     #[arg(long, value_parser = named(&[()], |()| "left-right"))]
     pub(crate) check: Option<()>,
     /// Drop surfaces with fewer than N pixels.

@@ -153,7 +153,7 @@ impl Tiling {
         self.sum_of_updates(Plan::halved_updates)
     }
 
-    fn sum_of_updates(&self, updates: impl Fn(&Plan) -> u64) -> u64 {
+    pub(super) fn sum_of_updates(&self, updates: impl Fn(&Plan) -> u64) -> u64 {
         let plans = self.tiles().into_iter().filter_map(|tile| tile.plan(&self.plan).ok());
         plans.fold(0, |sum: u64, plan| sum.saturating_add(updates(&plan)))
     }
