@@ -4,6 +4,9 @@ use std::array;
 
 use crate::{MAX_LABELS, Patch, Plan};
 
+/// Neighbouring nodes are counted apart. They mostly have the same label, so each would wait for the one before.
+const LANES: usize = 8;
+
 /// Some of a plan's labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LabelSet {
@@ -46,24 +49,31 @@ impl LabelSet {
         }
         let size = plan.size(grid + 1);
         let region = patch.region(size);
-        let mut nodes = [0; MAX_LABELS];
+        let mut nodes = [[0_u8; LANES]; MAX_LABELS];
         for y in region.rows {
-            // Neighbours mostly have the same label. Counted one by one, each would wait for the one before.
-            let runs = coarser[y * size.width..][region.columns.clone()].chunk_by(|a, b| a == b);
-            runs.for_each(|run| nodes[usize::from(run[0])] += run.len() as u16);
+            for neighbours in coarser[y * size.width..][region.columns.clone()].chunks(LANES) {
+                for (lane, &label) in neighbours.iter().enumerate() {
+                    let count = &mut nodes[usize::from(label)][lane];
+                    *count = count.saturating_add(1);
+                }
+            }
         }
-        let near = |least| Self::near(&nodes[..labels], least);
-        Some(near(Self::AGREEING)).filter(|set| set.count() > 0).unwrap_or_else(|| near(1))
+        let nodes = &nodes[..labels];
+        Some(Self::near(nodes, Self::AGREEING)).filter(|set| set.count() > 0).unwrap_or_else(|| Self::near(nodes, 1))
     }
 
     /// The labels that differ by at most 1 from those of at least so many nodes, given how many have each label.
-    fn near(nodes: &[u16], least: u16) -> Self {
-        let mut set = Self { words: [0; MAX_LABELS / 64] };
-        for label in 0..nodes.len() {
-            let reach = label.saturating_sub(Self::REACH)..nodes.len().min(label + Self::REACH + 1);
-            if nodes[reach].iter().sum::<u16>() >= least {
-                set.insert(label);
+    fn near(nodes: &[[u8; LANES]], least: u16) -> Self {
+        let mut reached = [0; MAX_LABELS + 2 * Self::REACH];
+        for (label, lanes) in nodes.iter().enumerate() {
+            let count: u16 = lanes.iter().copied().map(u16::from).sum();
+            for reached in &mut reached[label..=label + 2 * Self::REACH] {
+                *reached += count;
             }
+        }
+        let mut set = Self { words: [0; MAX_LABELS / 64] };
+        for (label, _) in reached[Self::REACH..][..nodes.len()].iter().enumerate().filter(|(_, count)| **count >= least) {
+            set.insert(label);
         }
         set
     }
