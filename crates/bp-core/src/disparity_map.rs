@@ -1,5 +1,7 @@
 //! Disparity maps.
 
+use rayon::prelude::*;
+
 use crate::{Error, Model, Size};
 
 /// A disparity map `[height][width]`. Disparities are in pixels of the map's own size. Unknown pixels hold
@@ -63,6 +65,12 @@ impl DisparityMap {
         self
     }
 
+    /// The map with other values, of which those that are not finite are [`DisparityMap::UNKNOWN`].
+    pub(crate) fn with(self, values: Vec<f32>) -> Self {
+        debug_assert_eq!(values.len(), self.size.pixels());
+        Self { values, ..self }
+    }
+
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {
@@ -94,18 +102,32 @@ impl DisparityMap {
     /// The smallest and the largest known disparity; `None` if no pixel is known.
     #[must_use]
     pub fn range(&self) -> Option<(f32, f32)> {
-        const NONE: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
-        // Several ranges at once, because each step of one waits for the step before.
-        let mut ranges = [NONE; 16];
-        for values in self.values.chunks(ranges.len()) {
-            for ((low, high), &value) in ranges.iter_mut().zip(values) {
-                let known = if value == Self::UNKNOWN { f32::NEG_INFINITY } else { value };
-                // Unlike `min` and `max`, these need not look for NaN.
-                *low = if value < *low { value } else { *low };
-                *high = if known > *high { known } else { *high };
-            }
-        }
-        let (low, high) = ranges.iter().fold(NONE, |all, range| (range.0.min(all.0), range.1.max(all.1)));
+        let (low, high) = self.values.par_chunks(RANGED).map(range_of).reduce(|| NOTHING, joined);
         (low <= high).then_some((low, high))
     }
+}
+
+/// How many values one thread finds the range of at a time.
+const RANGED: usize = 1 << 16;
+
+/// The range of no values.
+const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
+
+fn joined(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// The smallest and the largest known value.
+fn range_of(values: &[f32]) -> (f32, f32) {
+    // Several ranges at once, because each step of one waits for the step before.
+    let mut ranges = [NOTHING; 16];
+    for values in values.chunks(ranges.len()) {
+        for ((low, high), &value) in ranges.iter_mut().zip(values) {
+            let known = if value == DisparityMap::UNKNOWN { f32::NEG_INFINITY } else { value };
+            // Unlike `min` and `max`, these need not look for NaN.
+            *low = if value < *low { value } else { *low };
+            *high = if known > *high { known } else { *high };
+        }
+    }
+    ranges.into_iter().fold(NOTHING, joined)
 }

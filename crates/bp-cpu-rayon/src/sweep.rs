@@ -96,21 +96,31 @@ pub(crate) struct Sweep<'a> {
 impl Sweep<'_> {
     /// Prepares the seams above and below a band, unless another band did. So no thread waits until all seams are prepared.
     fn prepare_seams(&self, band: usize, seams: &[Seams]) -> Result<(), Error> {
-        let all = Seam::all(self.layout.size.height).enumerate();
-        for (index, seam) in all.skip(band.saturating_sub(1)).take_while(|(index, _)| *index <= band) {
-            if seams[index].read().unwrap_or_else(PoisonError::into_inner).grid == Some(self.grid) {
-                continue;
+        let all = || Seam::all(self.layout.size.height).zip(seams);
+        let around = || all().skip(band.saturating_sub(1)).take(1 + band.min(1));
+        // First those that no other thread is preparing, which may take as long.
+        for (seam, prepared) in around() {
+            if let Ok(mut prepared) = prepared.try_write() {
+                self.prepare_seam(seam, &mut prepared)?;
             }
-            let mut prepared = seams[index].write().unwrap_or_else(PoisonError::into_inner);
-            if prepared.grid != Some(self.grid) {
-                self.windows.with(|window| self.prepare_seam(seam, &mut prepared, window))?;
-                prepared.grid = Some(self.grid);
+        }
+        for (seam, prepared) in around() {
+            if prepared.read().unwrap_or_else(PoisonError::into_inner).grid != Some(self.grid) {
+                self.prepare_seam(seam, &mut prepared.write().unwrap_or_else(PoisonError::into_inner))?;
             }
         }
         Ok(())
     }
 
-    fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
+    fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared) -> Result<(), Error> {
+        if prepared.grid != Some(self.grid) {
+            self.windows.with(|window| self.pass_seam(seam, prepared, window))?;
+            prepared.grid = Some(self.grid);
+        }
+        Ok(())
+    }
+
+    fn pass_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
         let Window { messages, work, .. } = window;
         self.fill(seam.rows(), &mut prepared.lists, messages, work)?;
         self.count(&prepared.lists, seam.rows(), |patch, labels| {

@@ -50,7 +50,7 @@ const CONFIDENCE: u64 = 12;
 const FRAME: usize = 8;
 
 /// Temporary bytes per pixel for finding surfaces in the speckle filter.
-const SPECKLE: u64 = 9;
+const SPECKLE: u64 = 8;
 
 /// What the program holds in memory beside the matcher, so that a memory limit includes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

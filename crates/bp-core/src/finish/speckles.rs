@@ -10,45 +10,56 @@ use crate::{DisparityMap, Error, memory};
 /// [`Error::OutOfMemory`].
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
-    let mut seen = memory::filled("surfaces", pixels, false)?;
-    // A surface may contain all pixels, but no pixel is pushed twice.
-    let mut surface = memory::filled("surfaces", pixels, 0)?;
+    let mut surfaces = memory::filled("surfaces", pixels, 0)?;
+    join(map.values(), width, &mut surfaces);
+    // Pixels of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
+    // first one holds the number of pixels, added to that of the image.
+    for pixel in 0..pixels {
+        let before = surfaces[pixel];
+        let first = if before == pixel || surfaces[before] >= pixels { before } else { surfaces[before] };
+        surfaces[pixel] = if first == pixel { pixels } else { first };
+        surfaces[first] += 1;
+    }
+    let count = |pixel: usize| {
+        let holds = surfaces[pixel];
+        (if holds >= pixels { holds } else { surfaces[holds] }) - pixels
+    };
     Ok(map.replaced(|values| {
-        for start in 0..pixels {
-            if seen[start] || !values[start].is_finite() {
-                continue;
-            }
-            collect(values, width, start, &mut seen, &mut surface);
-            if surface.len() < least {
-                surface.iter().for_each(|&pixel| values[pixel] = DisparityMap::UNKNOWN);
-            }
+        for (_, value) in values.iter_mut().enumerate().filter(|(pixel, _)| count(*pixel) < least) {
+            *value = DisparityMap::UNKNOWN;
         }
     }))
 }
 
-/// Sets `surface` to the pixels of the surface that `start` belongs to, and marks them as seen.
-fn collect(values: &[f32], width: usize, start: usize, seen: &mut [bool], surface: &mut Vec<usize>) {
-    surface.clear();
-    surface.push(start);
-    seen[start] = true;
-    let mut next = 0;
-    while let Some(&pixel) = surface.get(next) {
-        next += 1;
-        let x = pixel % width;
-        let sides = [
-            (x > 0).then(|| pixel - 1),
-            (x + 1 < width).then_some(pixel + 1),
-            pixel.checked_sub(width),
-            (pixel + width < values.len()).then_some(pixel + width),
-        ];
-        for other in sides.into_iter().flatten() {
-            // The difference to an unknown pixel is infinite.
-            if !seen[other] && (values[other] - values[pixel]).abs() <= AGREE {
-                seen[other] = true;
-                surface.push(other);
-            }
+/// Sets `surfaces` to an earlier pixel of the same surface for each pixel, or the pixel itself if it is the first.
+fn join(values: &[f32], width: usize, surfaces: &mut [usize]) {
+    // The difference of unknown pixels is infinite, or none.
+    let agree = |a: usize, b: usize| (values[a] - values[b]).abs() <= AGREE;
+    for start in (0..values.len()).step_by(width) {
+        for pixel in start..start + width {
+            let left = (pixel > start && agree(pixel - 1, pixel)).then(|| surfaces[pixel - 1]);
+            let above = (start > 0 && agree(pixel - width, pixel)).then(|| surfaces[pixel - width]);
+            surfaces[pixel] = match (left, above) {
+                (Some(left), Some(above)) if left != above => {
+                    let (left, above) = (first(surfaces, left), first(surfaces, above));
+                    surfaces[left.max(above)] = left.min(above);
+                    left.min(above)
+                }
+                (Some(before), _) | (None, Some(before)) => before,
+                (None, None) => pixel,
+            };
         }
     }
+}
+
+/// The first pixel of the surface that a pixel belongs to, as far as it is joined.
+fn first(surfaces: &mut [usize], mut pixel: usize) -> usize {
+    while surfaces[pixel] != pixel {
+        // Every second step becomes one of two, so that paths stay short.
+        surfaces[pixel] = surfaces[surfaces[pixel]];
+        pixel = surfaces[pixel];
+    }
+    pixel
 }
 
 #[cfg(test)]

@@ -14,12 +14,14 @@ use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
 pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range() else { return Ok(map) };
-    let (size, mut map) = (map.size(), map.into_values());
-    let mut other = memory::filled("a map", map.len(), 0.0)?;
-    write_means(size.width, &map, &mut other, is_stopped)?;
-    write_offsets(pair, &other, least..=largest, &mut map, is_stopped)?;
-    write_means(size.width, &map, &mut other, is_stopped)?;
-    DisparityMap::new(size, other)
+    let width = map.size().width;
+    let mut other = memory::filled("a map", map.values().len(), 0.0)?;
+    write_means(width, map.values(), &mut other, is_stopped)?;
+    let mut refined = Ok(());
+    let map = map.replaced(|values| refined = write_offsets(pair, &other, least..=largest, values, is_stopped));
+    refined?;
+    write_means(width, map.values(), &mut other, is_stopped)?;
+    Ok(map.with(other))
 }
 
 #[cfg(test)]

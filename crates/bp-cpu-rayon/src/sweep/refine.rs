@@ -125,7 +125,11 @@ impl CoarseRows {
     fn find_routes(&mut self, edges: &EdgeLevels, band: &Band, lists: &Lists) {
         for patch in 0..lists.patches() {
             let own = patch / 2;
-            let patches = [Some(own), own.checked_sub(1), Some(own + 1).filter(|&next| next < band.lists.patches())];
+            // A finer patch is the left or the right half of a coarser one.
+            let is_left = patch % 2 == 0;
+            let left = own.checked_sub(1).filter(|_| is_left);
+            let right = Some(own + 1).filter(|&next| !is_left && next < band.lists.patches());
+            let patches = [Some(own), left, right];
             for (routes, from) in self.routes.iter_mut().zip(patches) {
                 if let Some(from) = from {
                     routes.find(lists.range(patch), lists.list(patch).labels, band.lists.list(from).labels, edges);
