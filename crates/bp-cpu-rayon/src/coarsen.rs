@@ -155,7 +155,7 @@ impl Grids<'_> {
                     || costs::store_block(
                         self.clip,
                         #[inline(always)]
-                        |label| sums_of_children(&halves, label),
+                        |label| sums_of_children(simd, &halves, label),
                         stored,
                         keep,
                     ),
@@ -238,18 +238,19 @@ fn sum_of_blocks<S: Simd>(simd: S, blocks: [&[Block]; 4], label: usize) -> Bytes
 /// Sums for a block of coarse nodes of both planes. The children of coarse column X are lane X of both planes, so those of lane
 /// i of a coarse plane are lanes 2i + plane.
 #[inline(always)]
-fn sums_of_children<F: Sum + Widen<C>, C: Sum>(halves: &[[&[Block<F>]; 4]; 2], label: usize) -> [[C; LANES]; 2] {
-    let mut sums = [[C::default(); LANES]; 2];
-    for (sums, blocks) in sums.iter_mut().zip(halves) {
-        let none = Block([F::default(); LANES]);
-        let [a, b, c, d] = blocks.map(|labels| &labels.get(label).unwrap_or(&none).0);
-        for (i, sum) in sums.iter_mut().enumerate() {
-            *sum = a[i].widen() + b[i].widen() + (c[i].widen() + d[i].widen());
-        }
-    }
+fn sums_of_children<S: Simd, F: Sum + Widen<C>, C: Sum>(
+    simd: S,
+    halves: &[[&[Block<F>]; 4]; 2],
+    label: usize,
+) -> [[C; LANES]; 2] {
     let mut dealt = [[C::default(); LANES]; 2];
-    for (i, pair) in sums.as_flattened().as_chunks::<2>().0.iter().enumerate() {
-        (dealt[0][i], dealt[1][i]) = (pair[0], pair[1]);
+    for (half, blocks) in halves.iter().enumerate() {
+        let none = Block([F::default(); LANES]);
+        let [a, b, c, d] = blocks.map(|labels| labels.get(label).unwrap_or(&none));
+        let sums = F::sum_by_parity(simd, [a, b, c, d]);
+        for (dealt, sums) in dealt.iter_mut().zip(sums) {
+            dealt[half * sums.len()..(half + 1) * sums.len()].copy_from_slice(&sums);
+        }
     }
     dealt
 }

@@ -1,7 +1,7 @@
 //! The data costs of one grid.
 
 use bp_core::{Error, Plan, memory};
-use fearless_simd::{Simd, SimdBase};
+use fearless_simd::{Bytes as _, Simd, SimdBase, u16x16};
 use rayon::prelude::*;
 
 use crate::{
@@ -99,8 +99,39 @@ pub(crate) trait Sum:
 }
 
 /// A narrower integer that can be made wider.
-pub(crate) trait Widen<T> {
+pub(crate) trait Widen<T: Sum>: Sum {
     fn widen(self) -> T;
+
+    /// Sums four blocks: first their even lanes, then their odd ones.
+    #[inline(always)]
+    fn sum_by_parity<S: Simd>(_: S, blocks: [&Block<Self>; 4]) -> [[T; LANES / 2]; 2] {
+        let [a, b, c, d] = blocks.map(|block| &block.0);
+        let mut sums = [T::default(); LANES];
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = a[i].widen() + b[i].widen() + (c[i].widen() + d[i].widen());
+        }
+        let pairs = sums.as_chunks::<2>().0;
+        [0, 1].map(|parity| std::array::from_fn(|i| pairs[i][parity]))
+    }
+}
+
+impl Widen<u16> for u8 {
+    #[inline(always)]
+    fn widen(self) -> u16 {
+        self.into()
+    }
+
+    /// Two bytes make a number of 16 bits; the even lane is its lower half, or on some machines its upper half.
+    #[inline(always)]
+    fn sum_by_parity<S: Simd>(simd: S, blocks: [&Block; 4]) -> [[u16; LANES / 2]; 2] {
+        let (mut even, mut odd) = (u16x16::splat(simd, 0), u16x16::splat(simd, 0));
+        for block in blocks {
+            let pairs: u16x16<S> = block.load(simd).bitcast();
+            even += pairs & u16x16::splat(simd, 0xff);
+            odd += pairs >> 8;
+        }
+        if cfg!(target_endian = "big") { [odd.into(), even.into()] } else { [even.into(), odd.into()] }
+    }
 }
 
 macro_rules! sums {
@@ -129,7 +160,7 @@ macro_rules! widen {
     )* };
 }
 
-widen!(u8 => u16, u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
+widen!(u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
 /// A type of sums that a grid may keep.
 pub(crate) trait Kept: Sum {
