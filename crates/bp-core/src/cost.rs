@@ -127,7 +127,7 @@ impl DataCost {
     }
 }
 
-fn planes<T: Copy + Default>(size: Size) -> Result<[Vec<T>; 2], Error> {
+fn planes<T: Copy + Default + Send + Sync>(size: Size) -> Result<[Vec<T>; 2], Error> {
     let plane = || memory::filled("images", size.pixels(), T::default());
     Ok([plane()?, plane()?])
 }

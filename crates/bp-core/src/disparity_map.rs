@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, Model, Size};
+use crate::{Error, Model, Size, memory};
 
 /// A disparity map `[height][width]`. Disparities are in pixels of the map's own size. Unknown pixels hold
 /// [`DisparityMap::UNKNOWN`].
@@ -39,7 +39,10 @@ impl DisparityMap {
     #[must_use]
     pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Self {
         assert_eq!(labels.len(), size.pixels(), "one label a pixel");
-        Self { size, values: labels.iter().map(|&label| model.disparity(label) as f32).collect() }
+        let mut values = Vec::with_capacity(labels.len());
+        memory::ask_for_large_pages(values.spare_capacity_mut());
+        values.extend(labels.iter().map(|&label| model.disparity(label) as f32));
+        Self { size, values }
     }
 
     /// The map mirrored left to right.

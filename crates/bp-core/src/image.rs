@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::Arc};
 
-use crate::{Error, Size, limits::MAX_SIDE};
+use crate::{Error, Size, limits::MAX_SIDE, memory};
 
 /// The most rows of an apron (see [`Image::strip`]): no data cost reads rows further up or down.
 pub const APRON: usize = 4;
@@ -128,6 +128,7 @@ impl Image {
         let (above, below) = (above.min(APRON), below.min(APRON));
         let known = rows.start + self.above - above..rows.end + self.above + below;
         let mut pixels = Vec::with_capacity(known.len() * columns.len());
+        memory::ask_for_large_pages(pixels.spare_capacity_mut());
         let known = self.pixels[known.start * width..known.end * width].chunks_exact(width);
         known.for_each(|row| pixels.extend_from_slice(&row[columns.clone()]));
         Self { size: Size { width: columns.len(), height: rows.len() }, above, below, pixels: pixels.into() }
@@ -265,7 +266,11 @@ impl StereoPair {
     /// As [`Image::part`].
     #[must_use]
     pub fn part(&self, columns: Range<usize>, rows: Range<usize>) -> Self {
-        Self { left: self.left.part(columns.clone(), rows.clone()), right: self.right.part(columns, rows) }
+        let (left, right) = rayon::join(
+            || self.left.part(columns.clone(), rows.clone()),
+            || self.right.part(columns.clone(), rows.clone()),
+        );
+        Self { left, right }
     }
 }
 

@@ -72,7 +72,8 @@ impl LabelSet {
             }
         }
         let mut set = Self { words: [0; MAX_LABELS / 64] };
-        for (label, _) in reached[Self::REACH..][..nodes.len()].iter().enumerate().filter(|(_, count)| **count >= least) {
+        for (label, _) in reached[Self::REACH..][..nodes.len()].iter().enumerate().filter(|(_, count)| **count >= least)
+        {
             set.insert(label);
         }
         set

@@ -1,6 +1,8 @@
 //! Allocation that returns an error instead of ending the program, and a measurement of the rate of memory copies.
 
-use std::{hint::black_box, time::Instant};
+use std::{hint::black_box, mem::MaybeUninit, time::Instant};
+
+use rayon::prelude::*;
 
 use crate::Error;
 
@@ -9,11 +11,9 @@ use crate::Error;
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer in the error.
-pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
+pub fn filled<T: Clone + Send + Sync>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
-    let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
-    values.try_reserve_exact(len).map_err(|_| Error::OutOfMemory { what, needed, available: None })?;
-    values.resize(len, value);
+    grow(what, &mut values, len, value)?;
     Ok(values)
 }
 
@@ -21,13 +21,51 @@ pub fn filled<T: Clone>(what: &'static str, len: usize, value: T) -> Result<Vec<
 ///
 /// # Errors
 /// As [`filled`].
-pub fn grow<T: Clone>(what: &'static str, values: &mut Vec<T>, len: usize, value: T) -> Result<(), Error> {
+pub fn grow<T: Clone + Send + Sync>(
+    what: &'static str,
+    values: &mut Vec<T>,
+    len: usize,
+    value: T,
+) -> Result<(), Error> {
     let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
     let more = len.saturating_sub(values.len());
     values.try_reserve_exact(more).map_err(|_| Error::OutOfMemory { what, needed, available: None })?;
-    values.resize(len.max(values.len()), value);
+    let memory = values.spare_capacity_mut();
+    ask_for_large_pages(memory);
+    // Most of the time is the system's, to hand out memory. So several threads ask for much of it.
+    if size_of_val(memory) >= MUCH {
+        values.par_extend(rayon::iter::repeat_n(value, more));
+    } else {
+        values.resize(len.max(values.len()), value);
+    }
     Ok(())
 }
+
+/// Threads share the writing of this many bytes.
+const MUCH: usize = 32 << 20;
+
+/// Fewer bytes are not worth a large page, which usually has 2 MiB.
+const LARGE: usize = 2 << 20;
+
+/// Asks Linux to map memory that was not written yet in large pages. The first write to each page costs a visit to the system;
+/// with small pages, that takes longer than what images of many megapixels are matched with. No memory is held that was not
+/// allocated: large pages lie inside.
+#[cfg(all(target_os = "linux", not(miri)))]
+#[expect(unsafe_code, reason = "only the C library can tell the system")]
+pub(crate) fn ask_for_large_pages<T>(memory: &mut [MaybeUninit<T>]) {
+    /// Where pages are larger than this, the advice may be refused.
+    const PAGE: usize = 4096;
+    let (start, bytes) = (memory.as_mut_ptr().cast::<u8>(), size_of_val(memory));
+    let skipped = start.align_offset(PAGE);
+    if bytes >= LARGE {
+        // SAFETY: the bytes from the first page on are part of the memory, and the advice changes none of them.
+        let _ = unsafe { libc::madvise(start.wrapping_add(skipped).cast(), bytes - skipped, libc::MADV_HUGEPAGE) };
+    }
+}
+
+/// Other systems choose by themselves.
+#[cfg(not(all(target_os = "linux", not(miri))))]
+pub(crate) fn ask_for_large_pages<T>(_: &mut [MaybeUninit<T>]) {}
 
 /// The bytes that a vector holds.
 #[must_use]

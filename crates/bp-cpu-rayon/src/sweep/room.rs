@@ -69,8 +69,9 @@ impl Entries {
         let first_rows: Vec<_> = (0..size.height).step_by(BAND_ROWS).collect();
         let rows = |&first: &usize| entries(first..size.height.min(first + BAND_ROWS));
         let bands: Vec<usize> = first_rows.par_iter().map(rows).collect();
-        let seams = Seam::all(size.height).map(|seam| entries(seam.rows()));
-        Self { most: bands.iter().copied().chain(seams).max().unwrap_or(0), bands }
+        let seams: Vec<_> = Seam::all(size.height).collect();
+        let most_of_seams = seams.par_iter().map(|seam| entries(seam.rows())).max();
+        Self { most: bands.iter().copied().chain(most_of_seams).max().unwrap_or(0), bands }
     }
 
     /// The bytes that the bands of the grid will hold, given what is held already.
