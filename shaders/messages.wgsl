@@ -13,33 +13,33 @@
 // column has the next one.
 
 fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
-    let aligned = sent_right[index];
+    let aligned = in_plane(sent_right[index]);
     if nodes.parity == 1 {
         return aligned;
     }
     var before = vec4(0u);
     if nodes.word > 0 {
-        before = sent_right[index - 1];
+        before = in_plane(sent_right[index - 1]);
     }
     return (aligned << vec4(8u)) | (before >> vec4(24u));
 }
 
 fn from_right(index: u32, nodes: Nodes) -> vec4<u32> {
-    let aligned = sent_left[index];
+    let aligned = in_plane(sent_left[index]);
     if nodes.parity == 0 {
         return aligned;
     }
     var behind = vec4(0u);
     if nodes.word + 1 < parameters.words {
-        behind = sent_left[index + 1];
+        behind = in_plane(sent_left[index + 1]);
     }
     return (aligned >> vec4(8u)) | (behind << vec4(24u));
 }
 
 fn from_above(index: u32) -> vec4<u32> {
-    return sent_down[index - parameters.quads * parameters.words];
+    return in_plane(sent_down[index - parameters.quads * parameters.words]);
 }
 
 fn from_below(index: u32) -> vec4<u32> {
-    return sent_up[index + parameters.quads * parameters.words];
+    return in_plane(sent_up[index + parameters.quads * parameters.words]);
 }

@@ -63,9 +63,9 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     }
     let index = (row * parameters.quads + quad) * parameters.other_words + u32(word);
     if colour == 0 {
-        return even[index];
+        return in_plane(even[index]);
     }
-    return odd[index];
+    return in_plane(odd[index]);
 }
 
 // As coarse_nodes, for columns x, x + 2, x + 4 and x + 6 of coarse row y.
@@ -178,10 +178,10 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
             messages = Alternate(coarse_messages(even.x, y.x, quad), coarse_messages(odd.x, y.x, quad));
         }
         let index = first + quad * parameters.words;
-        fine[index] = (apart(messages.even) | (apart(messages.odd) << vec4(8u))) & mask;
+        fine[index] = in_plane((apart(messages.even) | (apart(messages.odd) << vec4(8u))) & mask);
         if is_pair {
             let half = vec4(16u);
-            fine[index + 1] = (apart(messages.even >> half) | (apart(messages.odd >> half) << vec4(8u))) & next_mask;
+            fine[index + 1] = in_plane((apart(messages.even >> half) | (apart(messages.odd >> half) << vec4(8u))) & next_mask);
         }
     }
 }

@@ -12,7 +12,7 @@ override SWEEP: bool = false;
 
 // Data cost plus the messages that count, for a quad of labels.
 fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
-    var total = sum(cost[index], from_below(index));
+    var total = sum(in_plane(cost[index]), from_below(index));
     if !SWEEP || parameters.colour == 0 {
         total = sum(total, sum(from_left(index, nodes), from_right(index, nodes)));
     }

@@ -25,6 +25,8 @@ wgsl! {
     REFINE = "refine.wgsl";
     /// Updates messages.
     UPDATE_MESSAGES = "update_messages.wgsl";
+    /// Updates messages, one node an invocation.
+    UPDATE_MESSAGES_OF_NODE = "update_messages_of_node.wgsl";
     /// Selects labels.
     SELECT_LABELS = "select_labels.wgsl";
     /// Finds the label sets of a grid.

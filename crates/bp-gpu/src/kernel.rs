@@ -31,8 +31,10 @@ pub enum Kernel {
     Coarsen,
     /// First messages of a grid.
     Refine,
-    /// Message passing.
+    /// Message passing, four nodes an invocation.
     UpdateMessages,
+    /// Message passing, one node an invocation; part of the stage `update_messages`.
+    UpdateMessagesOfNode,
     /// Labels.
     SelectLabels,
     /// The label sets of a grid.
@@ -45,7 +47,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// All kernels.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Features,
         Self::Greys,
         Self::MatchCost,
@@ -53,6 +55,7 @@ impl Kernel {
         Self::Coarsen,
         Self::Refine,
         Self::UpdateMessages,
+        Self::UpdateMessagesOfNode,
         Self::SelectLabels,
         Self::LabelSets,
         Self::RestrictCosts,
@@ -70,6 +73,7 @@ impl Kernel {
             Self::Coarsen => "coarsen",
             Self::Refine => "refine",
             Self::UpdateMessages => "update_messages",
+            Self::UpdateMessagesOfNode => "update_messages_of_node",
             Self::SelectLabels => "select_labels",
             Self::LabelSets => "label_sets",
             Self::RestrictCosts => "restrict_costs",
@@ -88,6 +92,7 @@ impl Kernel {
             Self::Coarsen => bp_shaders::COARSEN,
             Self::Refine => bp_shaders::REFINE,
             Self::UpdateMessages => bp_shaders::UPDATE_MESSAGES,
+            Self::UpdateMessagesOfNode => bp_shaders::UPDATE_MESSAGES_OF_NODE,
             Self::SelectLabels => bp_shaders::SELECT_LABELS,
             Self::LabelSets => bp_shaders::LABEL_SETS,
             Self::RestrictCosts => bp_shaders::RESTRICT_COSTS,
@@ -97,7 +102,7 @@ impl Kernel {
             Self::Features | Self::Greys => [bp_shaders::IMAGE, ""],
             Self::MatchCost | Self::Coarsen => [bp_shaders::COSTS, ""],
             Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
-            Self::CoarsenGreys | Self::Refine => ["", ""],
+            Self::CoarsenGreys | Self::Refine | Self::UpdateMessagesOfNode => ["", ""],
             Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => [bp_shaders::SETS, ""],
         };
         [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
@@ -113,9 +118,16 @@ impl Kernel {
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine | Self::RestrictCosts => &[Write, Read, Read],
-            Self::UpdateMessages => &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read],
+            Self::UpdateMessages | Self::UpdateMessagesOfNode => {
+                &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read]
+            }
             Self::SelectLabels => &[Read, Read, Read, Read, Read, Write, Read],
         }
+    }
+
+    /// How many invocations share the nodes of a word, if the kernel passes messages.
+    pub(crate) fn invocations_of_word(self) -> usize {
+        if matches!(self, Self::UpdateMessagesOfNode) { 4 } else { 1 }
     }
 
     /// The most storage buffers that a kernel binds, including the parameters.

@@ -17,6 +17,7 @@ pub mod missing;
 mod parameters;
 mod program;
 mod queue;
+mod shape;
 mod solver;
 
 pub use check::check;
@@ -26,4 +27,5 @@ pub use limits::Limits;
 pub use parameters::Parameters;
 pub use program::{BindGroup, Buffer, Command, Memory, Program, Segment};
 pub use queue::{PATIENCE, Queue};
+pub use shape::Shape;
 pub use solver::{GpuSolver, check_warm};

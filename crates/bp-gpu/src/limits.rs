@@ -2,6 +2,8 @@
 
 use bp_core::DeviceKind;
 
+use crate::Shape;
+
 /// The limits of the device that a [`crate::Program`] is made for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -17,6 +19,8 @@ pub struct Limits {
     pub workgroups: u32,
     /// The bytes that all buffers together may take, if known.
     pub memory_bytes: Option<u64>,
+    /// The shape of the kernels that suits it.
+    pub shape: Shape,
     /// The message entries after which a dispatch is split, so that none keeps the device busy for long.
     pub dispatch_entries: u64,
 }
@@ -32,6 +36,7 @@ impl Limits {
             bindings: 16,
             workgroups: 65_535,
             memory_bytes: None,
+            shape: Shape::FourNodes,
             dispatch_entries: 1 << 30,
         }
     }

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use bp_core::{Algorithm, Error, Model, Plan, Profile, Schedule, Settings, Size};
-use bp_gpu::{Access, Command, Kernel, Limits, Parameters, Program};
+use bp_gpu::{Access, Command, Kernel, Limits, Parameters, Program, Shape};
 
 fn plan(size: Size, algorithm: Algorithm, schedule: Schedule, profile: Profile) -> Plan {
     let model = Model::new(profile, 30).unwrap();
@@ -38,7 +38,7 @@ fn dispatches(program: &Program) -> impl Iterator<Item = Dispatch> {
 
 #[test]
 fn no_dispatch_and_no_buffer_passes_a_limit() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
+    let tight = tight();
     let mut cut = 0;
     for plan in plans() {
         let program = Program::new(&plan, &tight).unwrap();
@@ -62,6 +62,12 @@ fn no_dispatch_and_no_buffer_passes_a_limit() {
     assert!(cut > 0, "no grid was cut into strips");
 }
 
+/// Limits that cut a plan up, and the other shape.
+fn tight() -> Limits {
+    let shape = Shape::OneNode;
+    Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, shape, ..Limits::roomy() }
+}
+
 /// How often a program's kernels compute each row of each colour.
 fn computed(program: &Program) -> HashMap<(Kernel, u32, u32, u32), u32> {
     let mut times = HashMap::new();
@@ -82,10 +88,10 @@ fn expected(kernel: Kernel, schedule: Schedule, height: u32, (row, colour): (u32
         (Kernel::SelectLabels, Schedule::Sweep) => 1 + u32::from(has_seam_below(height, row) && row % 32 >= 26),
         (Kernel::SelectLabels, _) => 1,
         // A program contains two steps.
-        (Kernel::UpdateMessages, Schedule::Sync) => 2,
-        (Kernel::UpdateMessages, Schedule::Checkerboard) => 1,
-        (Kernel::UpdateMessages, Schedule::Outward { .. }) => 0,
-        (Kernel::UpdateMessages, Schedule::Sweep) => sweeps(height, row, colour),
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Sync) => 2,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Checkerboard) => 1,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Outward { .. }) => 0,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Sweep) => sweeps(height, row, colour),
         (Kernel::Refine, Schedule::Sweep) => restored(height, row, colour),
         (Kernel::CoarsenGreys | Kernel::Coarsen | Kernel::Refine, _) => 0,
         (Kernel::LabelSets | Kernel::RestrictCosts | Kernel::ExtendMessages, _) => 0,
@@ -120,7 +126,7 @@ fn sweeps(height: u32, row: u32, colour: u32) -> u32 {
 
 #[test]
 fn every_row_is_computed_as_often_as_it_should_be() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
+    let tight = tight();
     for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), Limits::roomy()), (plan, tight.clone())]) {
         let rows = computed(&Program::new(&plan, &limits).unwrap());
         let (size, height) = (plan.image_size(), |grid: usize| plan.size(grid).height);
@@ -240,7 +246,7 @@ fn may_meet(program: &Program, sweep: bool, a: Use, b: Use) -> bool {
 /// only copies.
 #[test]
 fn commands_without_a_barrier_between_them_do_not_meet() {
-    let tight = Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, ..Limits::roomy() };
+    let tight = tight();
     for (plan, limits) in plans().flat_map(|plan| [(plan.clone(), Limits::roomy()), (plan, tight.clone())]) {
         let program = Program::new(&plan, &limits).unwrap();
         let sweep = plan.settings().schedule == Schedule::Sweep;

@@ -6,6 +6,7 @@
 use std::error::Error;
 
 use bp_core::{Algorithm, Backend, Model, Plan, Profile, Schedule, Settings, Size};
+use bp_gpu::Shape;
 use bp_vulkan::{Statistics, Vulkan, statistics};
 
 /// The names that Mesa's RADV gives its figures.
@@ -18,10 +19,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| plan | kernel | {} |\n|---|---|{}", FIGURES.join(" | "), "---:|".repeat(FIGURES.len()));
     let mut known = Vec::new();
     for (name, plan) in plans()? {
-        for of in statistics(device, &plan)?.into_iter().filter(|of| !of.figures.is_empty()) {
-            if !known.contains(&of.pipeline) {
-                println!("| {name} | `{}` | {} |", of.pipeline, FIGURES.map(|figure| value(&of, figure)).join(" | "));
-                known.push(of.pipeline);
+        for shape in [Shape::FourNodes, Shape::OneNode] {
+            for of in statistics(device, &plan, shape)?.into_iter().filter(|of| !of.figures.is_empty()) {
+                if !known.contains(&of.pipeline) {
+                    println!(
+                        "| {name} | `{}` | {} |",
+                        of.pipeline,
+                        FIGURES.map(|figure| value(&of, figure)).join(" | ")
+                    );
+                    known.push(of.pipeline);
+                }
             }
         }
     }

@@ -19,7 +19,7 @@ impl VulkanDevice {
     pub(crate) fn open(instance: Instance, adapter: Adapter, change: impl FnOnce(&mut Limits)) -> Result<Self, String> {
         let gpu = Arc::new(Gpu::open(instance, adapter)?);
         let pipelines = Pipelines::new(&gpu).map_err(|error| error.to_string())?;
-        let mut limits = limits::of(&gpu);
+        let mut limits = limits::of(&gpu)?;
         change(&mut limits);
         Ok(Self { gpu, pipelines: Mutex::new(pipelines), limits })
     }

@@ -61,18 +61,20 @@ mod tests {
     use std::{collections::HashSet, io::Write as _, process::Command};
 
     use bp_core::{Algorithm, Model, Plan, Profile, Schedule, Size};
-    use bp_gpu::{Limits, Program};
+    use bp_gpu::{Limits, Program, Shape};
 
     use super::*;
 
     /// Every pipeline that plans of all profiles, schedules and algorithms need.
     fn pipelines() -> HashSet<Pipeline> {
         let size = Size { width: 90, height: 70 };
-        let limits = Limits::roomy();
+        let limits = [Shape::FourNodes, Shape::OneNode].map(|shape| Limits { shape, ..Limits::roomy() });
         let settings = Schedule::ALL.into_iter().flat_map(|s| Algorithm::ALL.map(|a| a.settings(size, 9, 2, s)));
         let plans = settings.flat_map(|settings| Profile::ALL.map(|profile| (profile, settings)));
         let plans = plans.map(|(profile, settings)| Plan::new(size, Model::new(profile, 20).unwrap(), settings));
-        plans.flat_map(|plan| Program::new(&plan.unwrap(), &limits).unwrap().pipelines).collect()
+        let programs =
+            plans.flat_map(|plan| limits.each_ref().map(|limits| Program::new(plan.as_ref().unwrap(), limits)));
+        programs.flat_map(|program| program.unwrap().pipelines).collect()
     }
 
     /// Uses the Khronos validator (Debian: spirv-tools). Where GPUs are required, so is the validator.

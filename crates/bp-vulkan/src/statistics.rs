@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use ash::{khr::pipeline_executable_properties, vk};
 use bp_core::{Backend, Error, Plan};
-use bp_gpu::{Limits, Pipeline, Program};
+use bp_gpu::{Limits, Pipeline, Program, Shape};
 
 use crate::{
     Vulkan,
@@ -28,18 +28,19 @@ pub struct Statistics {
     pub figures: Vec<(String, f64)>,
 }
 
-/// Compiles all kernels of a plan for a device, by its index in [`Backend::devices`], and returns what its compiler says of them.
+/// Compiles all kernels of a plan, in this shape, for a device, by its index in [`Backend::devices`]. Returns what its compiler says
+/// of them.
 ///
 /// # Errors
 /// [`Error::Unavailable`] if the device cannot be opened, or tells no figures ([`VK_KHR_pipeline_executable_properties`]);
 /// [`Error::Device`] if a kernel does not compile.
 ///
 /// [`VK_KHR_pipeline_executable_properties`]: https://docs.vulkan.org/refpages/latest/refpages/source/VK_KHR_pipeline_executable_properties.html
-pub fn statistics(device: usize, plan: &Plan) -> Result<Vec<Statistics>, Error> {
+pub fn statistics(device: usize, plan: &Plan, shape: Shape) -> Result<Vec<Statistics>, Error> {
     let gpu = open(device).map_err(|reason| Error::Unavailable { backend: Vulkan.name(), device, reason })?;
     let gpu = Arc::new(gpu);
     let calls = pipeline_executable_properties::Device::new(gpu.instance().raw(), gpu.raw());
-    let program = Program::new(plan, &Limits::roomy())?;
+    let program = Program::new(plan, &Limits { shape, ..Limits::roomy() })?;
     let of =
         |pipeline: &Pipeline| Ok(Statistics { pipeline: pipeline.clone(), figures: figures(&gpu, &calls, pipeline)? });
     program.pipelines.iter().map(of).collect()
@@ -104,11 +105,11 @@ mod tests {
         let settings = Algorithm::Cfbp.settings(size, 2, 2, Schedule::Checkerboard);
         let plan = Plan::new(size, Model::new(Profile::Census, 4).unwrap(), settings).unwrap();
         for device in 0..Vulkan.devices().len() {
-            match statistics(device, &plan) {
+            match statistics(device, &plan, Shape::FourNodes) {
                 Ok(all) => assert!(all.iter().any(|of| of.pipeline.to_string().starts_with("update_messages"))),
                 Err(error) => assert!(error.to_string().contains("VK_KHR_pipeline_executable_properties"), "{error}"),
             }
         }
-        assert!(matches!(statistics(99, &plan), Err(Error::Unavailable { device: 99, .. })));
+        assert!(matches!(statistics(99, &plan, Shape::FourNodes), Err(Error::Unavailable { device: 99, .. })));
     }
 }

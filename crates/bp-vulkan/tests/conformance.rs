@@ -3,7 +3,7 @@
 use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
 use bp_gpu::{
-    Limits,
+    Limits, Shape,
     conformance::{conforms, conforms_cut_up, opened, refuses, runs_plans_at_once, tells_times},
 };
 use bp_testkit::Difference;
@@ -11,6 +11,27 @@ use bp_vulkan::Vulkan;
 
 fn open(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
     opened(Vulkan.open_with(0, change))
+}
+
+/// The first device with the other shape of kernels than suits it.
+fn open_reshaped(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
+    opened(Vulkan.open_with(0, |limits| {
+        limits.shape = match limits.shape {
+            Shape::FourNodes => Shape::OneNode,
+            Shape::OneNode => Shape::FourNodes,
+        };
+        change(limits);
+    }))
+}
+
+#[test]
+fn the_other_shape_conforms() -> Result<(), Difference> {
+    conforms(8, &Scalar, open_reshaped)
+}
+
+#[test]
+fn the_other_shape_conforms_cut_up() -> Result<(), Difference> {
+    conforms_cut_up(8, &Scalar, open_reshaped)
 }
 
 #[test]

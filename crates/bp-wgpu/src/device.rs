@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bp_core::{Device, Error, Plan, Solver};
-use bp_gpu::{GpuSolver, Limits, Program};
+use bp_gpu::{GpuSolver, Limits, Program, Shape};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
 use crate::{
@@ -37,7 +37,7 @@ impl WgpuDevice {
         // wgpu panics if it cannot allocate what a new device needs.
         let opened = caught(|| pollster::block_on(adapter.request_device(&descriptor)))?;
         let (device, queue) = opened.map_err(|error| error.to_string())?;
-        let mut limits = limits(adapter);
+        let mut limits = limits(adapter)?;
         change(&mut limits);
         let gpu = Arc::new(Gpu::new(limits.device.clone(), device, queue));
         let pipelines = Pipelines::new(&gpu, adapter).map_err(|error| error.to_string())?;
@@ -51,17 +51,18 @@ impl WgpuDevice {
     }
 }
 
-fn limits(adapter: &Adapter) -> Limits {
+fn limits(adapter: &Adapter) -> Result<Limits, String> {
     let limits = adapter.limits();
-    Limits {
+    Ok(Limits {
         device: adapter.get_info().name,
         binding_bytes: limits.max_storage_buffer_binding_size,
         buffer_bytes: limits.max_buffer_size,
         bindings: limits.max_storage_buffers_per_shader_stage,
         workgroups: limits.max_compute_workgroups_per_dimension,
         memory_bytes: vulkan::memory_bytes(adapter),
+        shape: Shape::of(instance::kind(adapter))?,
         dispatch_entries: Limits::dispatch_entries(instance::kind(adapter)),
-    }
+    })
 }
 
 impl Device for WgpuDevice {

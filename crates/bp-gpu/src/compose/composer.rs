@@ -7,7 +7,7 @@ use super::{
     buffers::{Buffers, StripBuffers},
     recorder::PartRecorder,
 };
-use crate::{BindGroup, Command, Limits, Parameters, Pipeline, WORKGROUP, layout::Grid};
+use crate::{BindGroup, Command, Limits, Parameters, Pipeline, Shape, WORKGROUP, layout::Grid};
 
 /// The alignment of dynamic offsets: the largest of any device.
 pub(super) const PARAMETERS_ALIGNMENT: usize = 256;
@@ -53,33 +53,43 @@ impl Composer<'_> {
     }
 
     /// Records a kernel for rows of a strip, in as many dispatches as the limits require.
-    pub(super) fn dispatch(&mut self, part: &mut PartRecorder, pipeline: Pipeline, buffers: Vec<usize>, work: Work) {
+    pub(super) fn dispatch(
+        &mut self,
+        part: &mut PartRecorder,
+        mut pipeline: Pipeline,
+        buffers: Vec<usize>,
+        work: Work,
+    ) {
         let kernel = pipeline.kernel;
+        if self.limits.shape != Shape::FourNodes {
+            pipeline.constants.push(("ONE_NODE", 1));
+        }
         let pipeline = self.pipelines.insert_full(pipeline).0;
         let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
-        let most = self.rows_per_dispatch(&work);
+        let row_invocations = work.row_invocations * kernel.invocations_of_word();
+        let most = self.rows_per_dispatch(&work, row_invocations);
         for done in (0..work.rows.count).step_by(most) {
             let rows = most.min(work.rows.count - done);
             let row = work.rows.first + done * work.rows.step;
             let row_step = work.rows.step as u32;
             let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
-            let workgroups = (rows * work.row_invocations).div_ceil(WORKGROUP as usize) as u32;
+            let workgroups = (rows * row_invocations).div_ceil(WORKGROUP as usize) as u32;
             let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
             part.push(command, rows as u64 * self.row_entries(&work));
         }
     }
 
-    /// The message entries that a row of this work counts as. An invocation computes four messages at four nodes for
-    /// every label, or does less work.
+    /// The message entries that a row of this work counts as. The invocations of a word compute four messages at four nodes for
+    /// every label, or do less work.
     fn row_entries(&self, work: &Work) -> u64 {
         work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
     }
 
     /// How many rows a dispatch may compute.
-    fn rows_per_dispatch(&self, work: &Work) -> usize {
+    fn rows_per_dispatch(&self, work: &Work, row_invocations: usize) -> usize {
         let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
-        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / work.row_invocations.max(1);
+        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / row_invocations.max(1);
         usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
     }
 

@@ -6,7 +6,7 @@ use super::{
     composer::{Composer, Nodes, Work},
     recorder::PartRecorder,
 };
-use crate::{Kernel, Pipeline};
+use crate::{Kernel, Pipeline, Shape};
 
 impl Composer<'_> {
     /// The buffer of the grid's grey values. If all edges have the same cost, no kernel reads it, and a buffer of costs is bound.
@@ -25,7 +25,11 @@ impl Composer<'_> {
             ("SELECTIVE", selective.into()),
             self.finds_levels(),
         ];
-        Pipeline { kernel: Kernel::UpdateMessages, constants }
+        let kernel = match self.limits.shape {
+            Shape::FourNodes => Kernel::UpdateMessages,
+            Shape::OneNode => Kernel::UpdateMessagesOfNode,
+        };
+        Pipeline { kernel, constants }
     }
 
     /// The buffers of the data costs, of the messages from the other colour, of the messages that these nodes send, and
