@@ -39,9 +39,13 @@ fn fine_pair(colour: u32, index: u32, parity: u32) -> Pair {
     if FINE_SUM_BYTES == 0 {
         var bytes: vec4<u32>;
         if colour == 0 {
-            bytes = in_plane(even_costs[index]);
+            bytes = even_costs[index];
         } else {
-            bytes = in_plane(odd_costs[index]);
+            bytes = odd_costs[index];
+        }
+        if ONE_NODE {
+            let words = select(bytes.xz, bytes.yw, parity == 1);
+            return Pair(unpack(words.x), unpack(words.y));
         }
         bytes = bytes >> vec4(8 * parity);
         return Pair(bytes & vec4(0xffu), (bytes >> vec4(16u)) & vec4(0xffu));
