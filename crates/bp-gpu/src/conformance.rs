@@ -8,7 +8,7 @@ use std::{env, thread, time::Duration};
 use bp_core::{Algorithm, Device, Driver, Error, Model, Node, Plan, Profile, Schedule, Settings};
 use bp_testkit::{Case, Difference, compare, compare_at_random, conform_every, noise_pair};
 
-use crate::Limits;
+use crate::{Limits, Shape};
 
 /// Returns the device, or prints why there is none and returns `None`.
 ///
@@ -24,6 +24,14 @@ pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>>
         }
         Err(error) => panic!("{error}"),
     }
+}
+
+/// Changes the shape of the kernels to that which suits other devices.
+pub fn reshape(limits: &mut Limits) {
+    limits.shape = match limits.shape {
+        Shape::FourNodes => Shape::OneNode,
+        Shape::OneNode => Shape::FourNodes,
+    };
 }
 
 /// Runs every `n`-th case of the suite, and of 100 random ones.

@@ -3,8 +3,8 @@
 use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
 use bp_gpu::{
-    Limits, Shape,
-    conformance::{conforms, conforms_cut_up, opened, refuses, runs_plans_at_once, tells_times},
+    Limits,
+    conformance::{conforms, conforms_cut_up, opened, refuses, reshape, runs_plans_at_once, tells_times},
 };
 use bp_testkit::Difference;
 use bp_wgpu::Wgpu;
@@ -19,13 +19,10 @@ fn open(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
 
 /// The first device with the other shape of kernels than suits it.
 fn open_reshaped(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
-    opened(Wgpu.open_with(0, |limits| {
-        limits.shape = match limits.shape {
-            Shape::FourNodes => Shape::OneNode,
-            Shape::OneNode => Shape::FourNodes,
-        };
+    open(&|limits| {
+        reshape(limits);
         change(limits);
-    }))
+    })
 }
 
 #[test]
