@@ -92,7 +92,7 @@ impl Pass<'_> {
         if let Some(coarser) = self.sweep.coarser.filter(|_| start != Start::Held) {
             self.work.coarse_rows.read(simd, coarser, self.lists, y);
         }
-        for patch in 0..self.lists.patches() + 2 {
+        for patch in 0..=self.lists.patches() {
             if patch < self.lists.patches() {
                 if start != Start::Held {
                     self.first_visit(simd, patch, y, start);
@@ -102,7 +102,7 @@ impl Pass<'_> {
                 self.close(patch, y);
                 self.cross(Nodes { patch, plane: even, y, greys: greys[0] });
             }
-            if let Some(patch) = patch.checked_sub(2).filter(|_| onward) {
+            if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
                 self.send(simd, Way::Down, Nodes { patch, plane: odd, y, greys: greys[odd] }, Sends::Ahead);
             }
         }
@@ -115,14 +115,14 @@ impl Pass<'_> {
         let (even, odd) = (y % 2, 1 - y % 2);
         let greys = [0, 1].map(|plane| self.sweep.layout.around(plane, y));
         let upwards = greys.map(|greys| greys.map(Around::upwards));
-        for patch in 0..self.lists.patches() + 2 {
+        for patch in 0..=self.lists.patches() {
             if patch < self.lists.patches() {
                 let sends = if onward { Sends::SidesAndAhead } else { Sends::Sides };
                 self.send(simd, Way::Up, Nodes { patch, plane: odd, y, greys: upwards[odd] }, sends);
                 self.close(patch, y);
                 self.cross(Nodes { patch, plane: odd, y, greys: greys[0] });
             }
-            if let Some(patch) = patch.checked_sub(2).filter(|_| onward) {
+            if let Some(patch) = patch.checked_sub(1).filter(|_| onward) {
                 self.send(simd, Way::Up, Nodes { patch, plane: even, y, greys: upwards[even] }, Sends::Ahead);
             }
         }
