@@ -81,4 +81,48 @@ mod tests {
         assert_eq!(left.values(), [1.0, 2.0, NONE, NONE, 3.0, NONE, NONE, NONE, NONE]);
         assert_eq!(remove_speckles(map.clone(), 1).unwrap(), map);
     }
+
+    /// The surface that a pixel belongs to, found by going from neighbour to neighbour.
+    fn flooded(map: &DisparityMap, start: usize) -> Vec<usize> {
+        let (Size { width, height }, values) = (map.size(), map.values());
+        let mut surface = vec![start];
+        let mut next = 0;
+        while let Some(&pixel) = surface.get(next) {
+            next += 1;
+            let (x, y) = (pixel % width, pixel / width);
+            let sides = [
+                (x > 0, pixel.wrapping_sub(1)),
+                (x + 1 < width, pixel + 1),
+                (y > 0, pixel.wrapping_sub(width)),
+                (y + 1 < height, pixel + width),
+            ];
+            for (_, other) in sides.into_iter().filter(|(exists, _)| *exists) {
+                if !surface.contains(&other) && (values[other] - values[pixel]).abs() <= AGREE {
+                    surface.push(other);
+                }
+            }
+        }
+        surface
+    }
+
+    #[test]
+    fn surfaces_of_any_form_count_as_a_whole() {
+        let mut seed = 1_u32;
+        let mut random = |values: u32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 24) % values
+        };
+        for (width, height) in [(1, 1), (1, 9), (9, 1), (7, 5), (12, 20), (23, 17)].repeat(5) {
+            let value = |_| if random(5) == 0 { NONE } else { 2.5 * random(3) as f32 };
+            let values = (0..width * height).map(value).collect();
+            let map = DisparityMap::new(Size { width, height }, values).unwrap();
+            for least in [2, 5, 12] {
+                let left = remove_speckles(map.clone(), least).unwrap();
+                for (pixel, (&left, &value)) in left.values().iter().zip(map.values()).enumerate() {
+                    let expected = if flooded(&map, pixel).len() < least { NONE } else { value };
+                    assert_eq!(left, expected, "{width}x{height}, {least}, pixel {pixel}");
+                }
+            }
+        }
+    }
 }
