@@ -105,8 +105,12 @@ impl DisparityMap {
     /// The smallest and the largest known disparity; `None` if no pixel is known.
     #[must_use]
     pub fn range(&self) -> Option<(f32, f32)> {
-        let (low, high) = self.values.par_chunks(RANGED).map(range_of).reduce(|| NOTHING, joined);
-        (low <= high).then_some((low, high))
+        known(range_of(&self.values))
+    }
+
+    /// [`DisparityMap::range`], found by the threads of the current pool.
+    pub(crate) fn range_by_threads(&self) -> Option<(f32, f32)> {
+        known(self.values.par_chunks(RANGED).map(range_of).reduce(|| NOTHING, joined))
     }
 }
 
@@ -115,6 +119,11 @@ const RANGED: usize = 1 << 16;
 
 /// The range of no values.
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
+
+/// A range, if there are any values in it.
+fn known(range: (f32, f32)) -> Option<(f32, f32)> {
+    (range.0 <= range.1).then_some(range)
+}
 
 fn joined(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
     (a.0.min(b.0), a.1.max(b.1))

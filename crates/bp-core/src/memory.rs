@@ -13,31 +13,33 @@ use crate::Error;
 /// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer in the error.
 pub fn filled<T: Clone + Send + Sync>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
-    grow(what, &mut values, len, value)?;
+    reserve(what, &mut values, len)?;
+    // Most of the time is the system's, to hand out memory. So the threads of a pool ask for much of it together.
+    if len.saturating_mul(size_of::<T>()) >= MUCH && rayon::current_thread_index().is_some() {
+        values.par_extend(rayon::iter::repeat_n(value, len));
+    } else {
+        values.resize(len, value);
+    }
     Ok(values)
 }
 
-/// Lengthens a vector to `len` elements, if it has fewer. It keeps what it allocates.
+/// Lengthens a vector to `len` elements, if it has fewer. It keeps what it allocates. Only this thread writes it, because it may
+/// hold a lock: while a thread waits for others, it may take up work that needs the same lock.
 ///
 /// # Errors
 /// As [`filled`].
-pub fn grow<T: Clone + Send + Sync>(
-    what: &'static str,
-    values: &mut Vec<T>,
-    len: usize,
-    value: T,
-) -> Result<(), Error> {
+pub fn grow<T: Clone>(what: &'static str, values: &mut Vec<T>, len: usize, value: T) -> Result<(), Error> {
+    reserve(what, values, len)?;
+    values.resize(len.max(values.len()), value);
+    Ok(())
+}
+
+/// Makes room for `len` elements in all.
+fn reserve<T>(what: &'static str, values: &mut Vec<T>, len: usize) -> Result<(), Error> {
     let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
     let more = len.saturating_sub(values.len());
     values.try_reserve_exact(more).map_err(|_| Error::OutOfMemory { what, needed, available: None })?;
-    let memory = values.spare_capacity_mut();
-    ask_for_large_pages(memory);
-    // Most of the time is the system's, to hand out memory. So several threads ask for much of it.
-    if size_of_val(memory) >= MUCH {
-        values.par_extend(rayon::iter::repeat_n(value, more));
-    } else {
-        values.resize(len.max(values.len()), value);
-    }
+    ask_for_large_pages(values.spare_capacity_mut());
     Ok(())
 }
 

@@ -13,7 +13,7 @@ use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
 pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     check_size("the disparity map", map.size(), pair.size())?;
-    let Some((least, largest)) = map.range() else { return Ok(map) };
+    let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
     let width = map.size().width;
     let mut other = memory::filled("a map", map.values().len(), 0.0)?;
     write_means(width, map.values(), &mut other, is_stopped)?;
