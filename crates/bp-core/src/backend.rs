@@ -4,7 +4,10 @@
 //! and can stop a solve. It checks everything that needs no device, so a [`Solver`] may rely on a valid plan and on
 //! pairs of its size.
 
-use std::{ops::Range, time::Duration};
+use std::{
+    ops::{ControlFlow, Range},
+    time::Duration,
+};
 
 use crate::{Error, Plan, Seed, Side, Stage, StereoPair};
 
@@ -172,6 +175,21 @@ pub trait Solver: Send {
     /// Errors of the device.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error>;
 
+    /// Passes all messages on these grids, from the coarsest to the finest, if the solver works on several grids at the same time.
+    /// Then this replaces [`Solver::refine`] and [`Solver::update_messages`]. Calls `passed` with the message entries so far,
+    /// counted as [`Plan::grid_updates`] does. Returns `false`, as the default does, if grids are to be passed one after another.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`] if `passed` breaks, and errors of the device.
+    fn pass_messages(
+        &mut self,
+        grids: Range<usize>,
+        passed: &mut (dyn FnMut(u64) -> ControlFlow<()> + Send),
+    ) -> Result<bool, Error> {
+        let _ = (grids, passed);
+        Ok(false)
+    }
+
     /// Writes the label with the lowest belief of every node of `grid`, `[height][width]`; the smallest label wins a tie. Under
     /// [`crate::Schedule::Sweep`] labels are decided one after another, as described there. `grid` is the one whose messages
     /// were updated last: 0, or [`Plan::halved`].
@@ -189,7 +207,8 @@ pub trait Solver: Send {
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error>;
 
     /// Preferred number of steps per call, at least 1. A backend that fuses steps returns how many, or `u32::MAX` if it
-    /// runs all steps on a grid together. A solve reports progress and can stop only between calls.
+    /// runs all steps on a grid together. A solve reports progress and can stop between calls, and where [`Solver::pass_messages`]
+    /// does.
     fn fused_steps(&self) -> u32 {
         1
     }

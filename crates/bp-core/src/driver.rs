@@ -41,8 +41,9 @@ pub struct Progress {
     pub total: u64,
 }
 
-/// A function called after every [`Solver::update_messages`]. If it returns [`ControlFlow::Break`], the solve stops.
-pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
+/// A function called after every [`Solver::update_messages`], or now and then during [`Solver::pass_messages`], on any thread. If it
+/// returns [`ControlFlow::Break`], the solve stops.
+pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
 /// A plan prepared on a device, ready to match one pair of its size after another.
 pub struct Driver {
@@ -263,6 +264,16 @@ fn pass_messages(
     let grids = run.grids(plan);
     let mut progress =
         Progress { done: 0, total: grids.clone().map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add) };
+    let mut is_passed = false;
+    timed(times, Stage::UpdateMessages, || {
+        let mut passed = |done: u64| observer(Progress { done: done.min(progress.total), ..progress });
+        is_passed = solver.pass_messages(grids.clone(), &mut passed)?;
+        Ok(())
+    })?;
+    if is_passed {
+        progress.done = progress.total;
+        return if observer(progress).is_break() { Err(Error::Stopped) } else { Ok(()) };
+    }
     for grid in grids.rev() {
         timed(times, Stage::Refine, || match run {
             Run::Cold | Run::Halved => solver.refine(grid),

@@ -36,13 +36,13 @@ impl LabelSet {
     }
 
     /// The set of a patch of `grid`: the labels of `plan` that differ by at most 1 from those of at least four nodes of
-    /// [`Patch::region`], or, if there is no such label, from that of any. `coarser` are the labels decided on the next coarser
-    /// grid, `[height][width]`. On a grid without label sets, all labels.
+    /// [`Patch::region`], or, if there is no such label, from that of any. `coarser(y)` are the labels decided in row y of the next
+    /// coarser grid, `[width]`. On a grid without label sets, all labels.
     ///
     /// # Panics
-    /// If `coarser` is shorter than that grid.
+    /// If such a row is shorter than that grid.
     #[must_use]
-    pub fn of(plan: &Plan, grid: usize, patch: &Patch, coarser: &[u16]) -> Self {
+    pub fn of<'a>(plan: &Plan, grid: usize, patch: &Patch, coarser: impl Fn(usize) -> &'a [u16]) -> Self {
         let labels = plan.model().labels();
         if !plan.has_label_sets(grid) {
             return Self::all(labels);
@@ -51,7 +51,7 @@ impl LabelSet {
         let region = patch.region(size);
         let mut nodes = [[0_u8; LANES]; MAX_LABELS];
         for y in region.rows {
-            for neighbours in coarser[y * size.width..][region.columns.clone()].chunks(LANES) {
+            for neighbours in coarser(y)[region.columns.clone()].chunks(LANES) {
                 for (lane, &label) in neighbours.iter().enumerate() {
                     let count = &mut nodes[usize::from(label)][lane];
                     *count = count.saturating_add(1);
@@ -123,7 +123,7 @@ mod tests {
     fn a_set_reaches_one_label_from_those_of_four_coarser_nodes() {
         let (plan, patch) = (plan(true), Patch { columns: 0..64, rows: 0..32 });
         let mut coarser = vec![40; plan.size(1).pixels()];
-        let set = |coarser: &[u16]| LabelSet::of(&plan, 0, &patch, coarser);
+        let set = |coarser: &[u16]| LabelSet::of(&plan, 0, &patch, |y| &coarser[75 * y..]);
         for (node, label) in [0, 0, 1, 69, 69, 68].into_iter().enumerate() {
             coarser[node] = label;
         }
@@ -146,16 +146,15 @@ mod tests {
             Plan::new(size, Model::new(Profile::Census, 70).unwrap(), settings).unwrap()
         };
         let patch = Patch { columns: 0..5, rows: 0..3 };
-        let set = LabelSet::of(&plan, 0, &patch, &[0, 0, 0, 30, 40, 69]);
+        let set = LabelSet::of(&plan, 0, &patch, |y| &[0, 0, 0, 30, 40, 69][3 * y..]);
         assert_eq!(set.labels().collect::<Vec<_>>(), [0, 1, 29, 30, 31, 39, 40, 41, 68, 69]);
     }
 
     #[test]
     fn other_grids_keep_all_labels() {
         let patch = Patch { columns: 0..64, rows: 0..32 };
-        let coarser = vec![5; plan(true).size(1).pixels()];
-        assert_eq!(LabelSet::of(&plan(true), 2, &patch, &coarser), LabelSet::all(70));
-        assert_eq!(LabelSet::of(&plan(false), 0, &patch, &coarser), LabelSet::all(70));
+        assert_eq!(LabelSet::of(&plan(true), 2, &patch, |_| &[5; 75]), LabelSet::all(70));
+        assert_eq!(LabelSet::of(&plan(false), 0, &patch, |_| &[5; 75]), LabelSet::all(70));
         assert_eq!(LabelSet::all(70).count(), 70);
         assert_eq!([0, 1, 2].map(|grid| plan(true).has_label_sets(grid)), [true, true, false]);
         assert_eq!([447, 448].map(Plan::most_grids_with_label_sets), [2, 3]);

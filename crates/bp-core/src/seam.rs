@@ -37,7 +37,13 @@ impl Seam {
 
     /// The seams of a grid with this many rows, from top to bottom.
     pub fn all(height: usize) -> impl ExactSizeIterator<Item = Self> {
-        (1..height.div_ceil(BAND_ROWS).max(1)).map(move |band| Self { below: band * BAND_ROWS, height })
+        (1..height.div_ceil(BAND_ROWS).max(1)).map(move |band| Self::below_band(band - 1, height))
+    }
+
+    /// The seam below a band, which is not the last one, of a grid with this many rows.
+    #[must_use]
+    pub fn below_band(band: usize, height: usize) -> Self {
+        Self { below: (band + 1) * BAND_ROWS, height }
     }
 
     /// The rows that prepare it.

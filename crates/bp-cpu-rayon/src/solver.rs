@@ -1,6 +1,6 @@
 //! The buffers of one plan, and the kernels that run on them.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
 use fearless_simd::Level;
@@ -13,7 +13,7 @@ use crate::{
     layout::{self, Layout},
     match_cost::{Matching, is_stored, match_cost},
     shape::Shape,
-    sweep::{self, CostSource, Grid, Swept},
+    sweep::{self, CostSource, Grid, Passed, Swept},
 };
 
 /// A prepared plan.
@@ -218,16 +218,25 @@ impl Solver for RayonSolver {
         if self.plan.settings().schedule == Schedule::Sweep {
             // All loops of a band run together, at the last step.
             let is_last = steps.end == self.plan.settings().steps;
-            return if is_last { self.with_swept(|swept, solver| solver.sweep(grid, swept)) } else { Ok(()) };
+            return if is_last { self.sweep(grid..grid + 1, &mut |_| ControlFlow::Continue(())) } else { Ok(()) };
         }
         self.pass_messages(grid, steps, self.last(grid));
         Ok(())
     }
 
+    /// Grids overlap in sweeps only.
+    fn pass_messages(&mut self, grids: Range<usize>, passed: &mut Passed<'_>) -> Result<bool, Error> {
+        let is_swept = self.plan.settings().schedule == Schedule::Sweep;
+        if is_swept {
+            self.sweep(grids, passed)?;
+        }
+        Ok(is_swept)
+    }
+
     /// Only hands the labels out. They are decided in the last step, while messages are in cache.
     fn select_labels(&mut self, grid: usize, labels: &mut [u16]) -> Result<(), Error> {
         match self.plan.settings().schedule {
-            Schedule::Sweep => labels.copy_from_slice(self.swept.labels(grid)),
+            Schedule::Sweep => self.swept.read_labels(&self.plan, grid, labels),
             Schedule::Sync | Schedule::Checkerboard | Schedule::Outward { .. } => {
                 self.labels.hand_out(&self.layouts[0], labels);
             }
@@ -283,19 +292,11 @@ impl Solver for RayonSolver {
 }
 
 impl RayonSolver {
-    /// Sweeps a grid, if there is room.
-    fn sweep(&self, grid: usize, swept: &mut Swept) -> Result<(), Error> {
-        let grid = self.grid(grid);
-        if self.limit < u64::MAX {
-            swept.check_room(&grid, self.limit.saturating_sub(self.allocated_bytes()))?;
-        }
-        swept.run(&grid)
-    }
-
-    /// Calls `run` with what is swept, which it may change while it reads everything else.
-    fn with_swept(&mut self, run: impl FnOnce(&mut Swept, &Self) -> Result<(), Error>) -> Result<(), Error> {
+    /// Sweeps these grids, if there is room.
+    fn sweep(&mut self, grids: Range<usize>, passed: &mut Passed<'_>) -> Result<(), Error> {
         let mut swept = std::mem::take(&mut self.swept);
-        let result = run(&mut swept, self);
+        let room = if self.limit < u64::MAX { self.limit.saturating_sub(self.allocated_bytes()) } else { u64::MAX };
+        let result = swept.run(&self.plan, grids, |index| self.grid(index), room, passed);
         self.swept = swept;
         result
     }

@@ -4,13 +4,16 @@
 //! Every array is `[row][patch][entry]`, where the entries of a patch are the labels of its list ([`lists`]). So walks over
 //! the labels are contiguous, and patches may have different labels ([`bp_core::Settings::label_sets`]).
 //!
-//! `pass` runs over rows; it calls `costs`, `refine` and `send` block by block. `decode` decides labels.
+//! `pass` runs over rows; it calls `costs`, `refine` and `send` block by block. `decode` decides labels. `swept` holds what is kept
+//! of each grid, and `tasks` says in which order threads work through it.
 
+mod coarser;
 mod costs;
 mod crossings;
 mod decode;
 mod edges;
 mod lists;
+mod made;
 mod messages;
 mod padded;
 mod pass;
@@ -20,64 +23,81 @@ mod routes;
 mod seams;
 mod send;
 mod swept;
+mod tasks;
 mod windows;
 
 use std::{
     ops::Range,
-    sync::{
-        PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::atomic::{AtomicU64, Ordering},
 };
 
-use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side};
+use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side, memory};
 use fearless_simd::Level;
-use rayon::prelude::*;
 
 pub(crate) use costs::CostSource;
 pub(crate) use room::bytes;
 pub(crate) use swept::{Grid, Swept};
+pub(crate) use tasks::Passed;
 pub(crate) use windows::Windows;
 
 use crate::{
     block::{Block, LANES},
     layout::Layout,
 };
+use coarser::Coarser;
 use lists::Lists;
 use messages::{Entry, Messages};
 use pass::{Gap, Pass, Start};
-use refine::Coarser;
-use seams::{Prepared, Seams};
+use seams::Prepared;
 use windows::{Window, Work};
 
-/// A band of a grid whose messages the next finer grid starts with.
+/// What is kept of a band.
 #[derive(Default)]
 pub(crate) struct Band {
+    /// The messages that the next finer grid starts with. None on grid 0.
     lists: Lists,
     messages: Messages,
-}
-
-/// The bytes of a band of so many rows, patches and entries.
-fn band_bytes(rows: usize, patches: usize, entries: usize) -> u64 {
-    lists::bytes(patches, entries).saturating_add(messages::bytes(rows, entries))
+    /// The labels, if any are decided, `[row][width]`.
+    labels: Vec<u16>,
 }
 
 impl Band {
     /// Allocates room for so many rows, patches and entries.
-    fn new(rows: usize, patches: usize, entries: usize) -> Result<Self, Error> {
-        let mut band = Self::default();
-        band.lists.fit(patches, entries)?;
-        band.messages.fit(rows, entries)?;
+    fn new(plan: &Plan, grid: usize, rows: usize, patches: usize, entries: usize) -> Result<Self, Error> {
+        let mut band = Self { labels: memory::filled("labels", Self::labels(plan, grid, rows), 0)?, ..Self::default() };
+        if grid > 0 {
+            band.lists.fit(patches, entries)?;
+            band.messages.fit(rows, entries)?;
+        }
         Ok(band)
+    }
+
+    /// The number of labels.
+    fn labels(plan: &Plan, grid: usize, rows: usize) -> usize {
+        if plan.decides_labels(grid) { rows * plan.size(grid).width } else { 0 }
+    }
+
+    /// The bytes that it needs.
+    fn needed(plan: &Plan, grid: usize, rows: usize, patches: usize, entries: usize) -> u64 {
+        let labels = (Self::labels(plan, grid, rows) * size_of::<u16>()) as u64;
+        let kept = || lists::bytes(patches, entries).saturating_add(messages::bytes(rows, entries));
+        labels.saturating_add(if grid > 0 { kept() } else { 0 })
     }
 
     /// The bytes held.
     fn bytes(&self) -> u64 {
-        self.lists.bytes() + self.messages.bytes()
+        self.lists.bytes() + self.messages.bytes() + memory::bytes(&self.labels)
     }
 }
 
-/// A grid that is swept.
+/// The seams above and below a band.
+#[derive(Clone, Copy)]
+struct Beside<'a> {
+    above: Option<&'a Prepared>,
+    below: Option<&'a Prepared>,
+}
+
+/// A grid that is swept, as rows that are passed together see it.
 pub(crate) struct Sweep<'a> {
     level: Level,
     plan: &'a Plan,
@@ -85,41 +105,19 @@ pub(crate) struct Sweep<'a> {
     layout: &'a Layout,
     costs: &'a CostSource<'a>,
     coarser: Option<Coarser<'a>>,
-    /// The labels of the next coarser grid, if they determine label sets.
-    coarser_labels: &'a [u16],
-    windows: &'a Windows,
     gaps: [Option<Gap>; 4],
     /// The message entries computed so far.
     updates: &'a AtomicU64,
 }
 
 impl Sweep<'_> {
-    /// Prepares the seams above and below a band, unless another band did. So no thread waits until all seams are prepared.
-    fn prepare_seams(&self, band: usize, seams: &[Seams]) -> Result<(), Error> {
-        let all = || Seam::all(self.layout.size.height).zip(seams);
-        let around = || all().skip(band.saturating_sub(1)).take(1 + band.min(1));
-        // First those that no other thread is preparing, which may take as long.
-        for (seam, prepared) in around() {
-            if let Ok(mut prepared) = prepared.try_write() {
-                self.prepare_seam(seam, &mut prepared)?;
-            }
-        }
-        for (seam, prepared) in around() {
-            if prepared.read().unwrap_or_else(PoisonError::into_inner).grid != Some(self.grid) {
-                self.prepare_seam(seam, &mut prepared.write().unwrap_or_else(PoisonError::into_inner))?;
-            }
-        }
-        Ok(())
+    /// The rows of a band.
+    fn band_rows(&self, index: usize) -> Range<usize> {
+        let first = index * BAND_ROWS;
+        first..self.layout.size.height.min(first + BAND_ROWS)
     }
 
-    fn prepare_seam(&self, seam: Seam, prepared: &mut Prepared) -> Result<(), Error> {
-        if prepared.grid != Some(self.grid) {
-            self.windows.with(|window| self.pass_seam(seam, prepared, window))?;
-            prepared.grid = Some(self.grid);
-        }
-        Ok(())
-    }
-
+    /// Prepares a seam.
     fn pass_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
         let Window { messages, work, .. } = window;
         self.fill(seam.rows(), &mut prepared.lists, messages, work)?;
@@ -151,7 +149,8 @@ impl Sweep<'_> {
         messages: &mut Messages,
         work: &mut Work,
     ) -> Result<(), Error> {
-        lists.fill(self.plan, self.grid, rows.clone(), self.coarser_labels)?;
+        let coarser = |y: usize| self.coarser.map_or(&[][..], |coarser| coarser.labels(y));
+        lists.fill(self.plan, self.grid, rows.clone(), coarser)?;
         messages.fit(rows.len(), lists.entries())?;
         work.fit(rows.len(), lists.entries())?;
         work.crossings.find(lists, self.plan.model().edges());
@@ -165,82 +164,50 @@ impl Sweep<'_> {
         self.updates.fetch_add(sum, Ordering::Relaxed);
     }
 
-    /// Sweeps all bands and keeps their messages. Decides their labels, if `labels` has room for any.
-    fn keep(&self, seams: &[Seams], bands: &mut [Band], labels: &mut [u16]) -> Result<(), Error> {
-        let band_labels = BAND_ROWS * self.layout.size.width;
-        let bands = bands.par_iter_mut().take(self.layout.size.height.div_ceil(BAND_ROWS)).enumerate();
-        let sweep = |index: usize, band: &mut Band, labels: Option<&mut [u16]>| {
-            self.prepare_seams(index, seams)?;
-            self.windows.with(|window| {
-                let Band { lists, messages } = band;
-                self.sweep(index, seams, (lists, messages, &mut window.work), |pass, above| {
-                    if let Some(labels) = labels {
-                        pass.decode(pass.rows.clone(), above, labels);
-                    }
-                })
-            })
-        };
-        if labels.is_empty() {
-            bands.try_for_each(|(index, band)| sweep(index, band, None))
-        } else {
-            let labels = labels.par_chunks_mut(band_labels);
-            bands.zip(labels).try_for_each(|((index, band), labels)| sweep(index, band, Some(labels)))
-        }
-    }
-
-    /// Sweeps all bands and decides their labels.
-    fn decode(&self, seams: &[Seams], labels: &mut [u16]) -> Result<(), Error> {
-        let bands = labels.par_chunks_mut(BAND_ROWS * self.layout.size.width);
-        bands.enumerate().try_for_each(|(index, labels)| {
-            self.in_window(index, seams, |pass, above| pass.decode(pass.rows.clone(), above, labels))
+    /// Sweeps a band. Keeps its messages on grids from 1 on, and decides its labels where they are needed.
+    fn pass_band(&self, index: usize, beside: Beside<'_>, band: &mut Band, window: &mut Window) -> Result<(), Error> {
+        let Window { lists, messages, work } = window;
+        let (lists, messages) = if self.grid > 0 { (&mut band.lists, &mut band.messages) } else { (lists, messages) };
+        self.sweep(index, beside, (lists, messages, work), |pass| {
+            if !band.labels.is_empty() {
+                let above = beside.above.map(|seam| seam.labels_above(self.layout.size.width));
+                pass.decode(pass.rows.clone(), above, &mut band.labels);
+            }
         })
     }
 
-    /// Sweeps all bands again and copies the messages received from `side`, `[height][width][labels]`. Labels that the
-    /// receiver's set lacks have zeros.
-    fn read_messages(&self, seams: &[Seams], side: Side, messages: &mut [u8]) -> Result<(), Error> {
-        messages.fill(0);
-        let bands = messages.par_chunks_mut(BAND_ROWS * self.layout.size.width * self.layout.labels);
-        bands
-            .enumerate()
-            .try_for_each(|(index, out)| self.in_window(index, seams, |pass, _| pass.read_messages(side, out)))
-    }
-
-    fn in_window(
+    /// Sweeps a band again and copies the messages received from `side`, `[row][width][labels]`.
+    fn read_messages(
         &self,
         index: usize,
-        seams: &[Seams],
-        then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
+        beside: Beside<'_>,
+        window: &mut Window,
+        side: Side,
+        out: &mut [u8],
     ) -> Result<(), Error> {
-        self.prepare_seams(index, seams)?;
-        self.windows.with(|window| {
-            let Window { lists, messages, work } = window;
-            self.sweep(index, seams, (lists, messages, work), then)
-        })
+        let Window { lists, messages, work } = window;
+        self.sweep(index, beside, (lists, messages, work), |pass| pass.read_messages(side, out))
     }
 
-    /// Sweeps a band as often as the plan requires, then calls `then` with it and the labels above it.
+    /// Sweeps a band as often as the plan requires, then calls `then` with it.
     fn sweep(
         &self,
         index: usize,
-        seams: &[Seams],
+        beside: Beside<'_>,
         (lists, messages, work): (&mut Lists, &mut Messages, &mut Work),
-        then: impl FnOnce(&Pass<'_>, Option<&[u16]>),
+        then: impl FnOnce(&Pass<'_>),
     ) -> Result<(), Error> {
-        let (first, height) = (index * BAND_ROWS, self.layout.size.height);
-        let rows = first..height.min(first + BAND_ROWS);
+        let rows = self.band_rows(index);
         self.fill(rows.clone(), lists, messages, work)?;
         self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
         let mut pass = Pass { sweep: self, rows: rows.clone(), lists, messages, work };
-        let seam = |index: usize| seams[index].read().unwrap_or_else(PoisonError::into_inner);
-        let above = index.checked_sub(1).map(seam);
-        match &above {
-            Some(seam) => seam.carry(self.plan, 0, lists, pass.up_mut(first)),
-            None => pass.up_mut(first).fill(Block::ZERO),
+        match beside.above {
+            Some(seam) => seam.carry(self.plan, 0, lists, pass.up_mut(rows.start)),
+            None => pass.up_mut(rows.start).fill(Block::ZERO),
         }
         let mut start = Start::Refined;
-        if rows.end < height {
-            seam(index).carry(self.plan, 1, lists, pass.up_mut(rows.end));
+        if let Some(seam) = beside.below {
+            seam.carry(self.plan, 1, lists, pass.up_mut(rows.end));
             start = Start::RefinedAboveSeam;
         }
         for _ in 0..self.plan.settings().steps {
@@ -248,7 +215,7 @@ impl Sweep<'_> {
             pass.backward(rows.clone());
             start = Start::Held;
         }
-        then(&pass, above.as_deref().map(|seam| seam.labels_above(self.layout.size.width)));
+        then(&pass);
         Ok(())
     }
 }

@@ -21,7 +21,7 @@ pub(crate) fn restrict(
 ) {
     let size = plan.size(grid);
     for patch in Patch::all(size.width, rows) {
-        let set = LabelSet::of(plan, grid, &patch, coarser);
+        let set = set(plan, grid, &patch, coarser);
         patch.nodes().for_each(|node| costs.restrict(size.index(node), &set, scratch));
     }
 }
@@ -37,7 +37,7 @@ pub(crate) fn extend(
 ) {
     let (size, [passed, extended]) = (plan.size(grid), rows);
     for patch in Patch::all(size.width, passed) {
-        let set = LabelSet::of(plan, grid, &patch, coarser);
+        let set = set(plan, grid, &patch, coarser);
         for node in patch.nodes().filter(|node| extended.contains(&node.y)) {
             for &side in sides.iter().filter(|&&side| plan.neighbour(grid, node, side).is_some()) {
                 if side == Side::Up || side == Side::Down || node.is_even() {
@@ -46,6 +46,11 @@ pub(crate) fn extend(
             }
         }
     }
+}
+
+/// The set of a patch, given the labels of the next coarser grid, `[height][width]`.
+fn set(plan: &Plan, grid: usize, patch: &Patch, coarser: &[u16]) -> LabelSet {
+    LabelSet::of(plan, grid, patch, |y| &coarser[y * plan.size(grid + 1).width..])
 }
 
 /// The value at d becomes the least `min(M(e) + s |d - e|, K)` over e in the set, by two passes.

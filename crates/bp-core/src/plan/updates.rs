@@ -71,7 +71,11 @@ impl Plan {
     }
 
     /// The message entries that are computed on a grid.
-    pub(crate) fn grid_updates(&self, grid: usize) -> u64 {
+    ///
+    /// # Panics
+    /// If there is no such grid.
+    #[must_use]
+    pub fn grid_updates(&self, grid: usize) -> u64 {
         let steps = self.updates_per_step(grid).saturating_mul(self.settings.steps.into());
         steps.saturating_add(self.seam_updates(grid))
     }

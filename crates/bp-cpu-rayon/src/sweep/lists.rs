@@ -36,12 +36,18 @@ pub(crate) fn bytes(patches: usize, entries: usize) -> u64 {
 }
 
 impl Lists {
-    /// Makes the lists of these rows of a grid, whose label sets come from the labels `coarser`.
-    pub(crate) fn fill(&mut self, plan: &Plan, grid: usize, rows: Range<usize>, coarser: &[u16]) -> Result<(), Error> {
+    /// Makes the lists of these rows of a grid, whose label sets come from rows of labels `coarser`.
+    pub(crate) fn fill<'a>(
+        &mut self,
+        plan: &Plan,
+        grid: usize,
+        rows: Range<usize>,
+        coarser: impl Fn(usize) -> &'a [u16],
+    ) -> Result<(), Error> {
         let patches = Patch::all(plan.size(grid).width, rows);
         self.fit(patches.len(), 0)?;
         for patch in patches {
-            let set = LabelSet::of(plan, grid, &patch, coarser);
+            let set = LabelSet::of(plan, grid, &patch, &coarser);
             self.reserve(0, set.count())?;
             self.push(plan.model().edges(), set);
         }

@@ -11,15 +11,13 @@ use fearless_simd::{Simd, SimdBase, SimdCombine, SimdInt, u8x16};
 
 use super::{
     Band,
+    coarser::Coarser,
     lists::Lists,
     messages::{Around, Held, Place},
     padded::Padded,
     routes::{self, Route, Routes},
 };
-use crate::{
-    block::{Block, Bytes, LANES},
-    layout::Layout,
-};
+use crate::block::{Block, Bytes, LANES};
 
 /// The coarse rows that a finer row is interpolated between lie within this number of rows.
 const ROWS: usize = 3;
@@ -48,14 +46,6 @@ pub(crate) struct CoarseRows {
 pub(crate) fn bytes(entries: usize) -> u64 {
     let values = (entries as u64).saturating_mul((ROWS * SIDES * size_of::<Padded>()) as u64);
     values.saturating_add(routes::bytes(entries).saturating_mul(3))
-}
-
-/// The messages of the next coarser grid.
-#[derive(Clone, Copy)]
-pub(crate) struct Coarser<'a> {
-    pub(crate) layout: &'a Layout,
-    pub(crate) bands: &'a [Band],
-    pub(crate) edges: &'a EdgeLevels,
 }
 
 /// A coarse row to be read for one finer patch.
@@ -100,7 +90,7 @@ impl CoarseRows {
     #[inline(always)]
     fn read_row<S: Simd>(&mut self, simd: S, coarser: Coarser<'_>, lists: &Lists, y: usize) {
         let index = y / BAND_ROWS;
-        let band = &coarser.bands[index];
+        let band = coarser.band(index);
         if self.band != Some(index) {
             self.find_routes(coarser.edges, band, lists);
             self.band = Some(index);
@@ -224,7 +214,7 @@ impl Reading<'_> {
 
     /// The messages that the nodes of the coarser patch hold.
     fn held(&self, plane: usize) -> Held<'_> {
-        let Band { lists, messages } = self.band;
+        let Band { lists, messages, .. } = self.band;
         let range = lists.range(self.patch / 2);
         messages.at(&Place { entries: lists.entries(), row: self.row, plane, range: &range })
     }

@@ -1,48 +1,39 @@
 //! What was prepared for each seam of a swept grid; see [`bp_core::Seam`].
 
-use std::sync::RwLock;
-
-use bp_core::{Error, Plan, Schedule, Seam, memory};
+use bp_core::{Error, Plan, Seam, memory};
 
 use super::lists::{self, Lists, sources};
 use crate::block::Block;
 
-/// One seam. Every grid overwrites what was prepared for the coarser one.
+/// One seam.
 #[derive(Default)]
 pub(crate) struct Prepared {
     /// The labels that the messages have values for.
     pub(crate) lists: Lists,
     /// The messages across it from above, then those from below, both `[plane][entry]`.
     pub(crate) messages: [Vec<Block>; 2],
-    /// The labels of [`Seam::label_rows`].
+    /// The labels of [`Seam::label_rows`], if the grid decides any.
     pub(crate) labels: Vec<u16>,
-    /// The grid that it was prepared for, in this solve.
-    pub(crate) grid: Option<usize>,
 }
 
-/// A seam that several bands may read. The first of them prepares it.
-pub(crate) type Seams = RwLock<Prepared>;
-
-/// The number of seams.
-fn count(plan: &Plan) -> usize {
-    if plan.settings().schedule == Schedule::Sweep { Seam::all(plan.image_size().height).len() } else { 0 }
+/// The number of labels of a seam.
+fn labels(plan: &Plan, grid: usize) -> usize {
+    if plan.decides_labels(grid) { Seam::LABEL_ROWS * plan.size(grid).width } else { 0 }
 }
 
-/// The bytes that [`prepared`] seams hold, whatever their lists.
-pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
-    let labels = (Seam::LABEL_ROWS * plan.image_size().width * size_of::<u16>()) as u64;
+/// The bytes of a seam of a grid with so many patches and entries.
+pub(crate) fn bytes(plan: &Plan, grid: usize, patches: usize, entries: usize) -> u64 {
+    let labels = (labels(plan, grid) * size_of::<u16>()) as u64;
     let messages = (entries as u64).saturating_mul(4 * size_of::<Block>() as u64);
-    (count(plan) as u64).saturating_mul(labels + messages + lists::bytes(patches, entries))
-}
-
-/// Makes room for the seams of the finest grid.
-pub(crate) fn prepared(plan: &Plan) -> Result<Vec<Seams>, Error> {
-    let len = Seam::LABEL_ROWS * plan.image_size().width;
-    let seam = |_| Ok(RwLock::new(Prepared { labels: memory::filled("labels", len, 0)?, ..Prepared::default() }));
-    (0..count(plan)).map(seam).collect()
+    labels.saturating_add(messages).saturating_add(lists::bytes(patches, entries))
 }
 
 impl Prepared {
+    /// Makes room for the labels of a seam, which does not depend on its lists.
+    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+        Ok(Self { labels: memory::filled("labels", labels(plan, grid), 0)?, ..Self::default() })
+    }
+
     /// Makes room for so many patches and entries.
     pub(crate) fn fit(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
         self.lists.fit(patches, entries)?;
@@ -54,9 +45,9 @@ impl Prepared {
         self.messages.iter_mut().try_for_each(|messages| memory::grow("messages", messages, 2 * entries, Block::ZERO))
     }
 
-    /// The labels of the row above it.
+    /// The labels of the row above it, if any are decided.
     pub(crate) fn labels_above(&self, width: usize) -> &[u16] {
-        &self.labels[(Seam::LABEL_ROWS - 1) * width..Seam::LABEL_ROWS * width]
+        self.labels.rchunks(width).next().unwrap_or_default()
     }
 
     /// Writes its messages from above (0) or below (1) for the lists of a band, `[plane][entry]`.

@@ -1,33 +1,49 @@
-//! The state of the schedule `sweep` from grid to grid: the messages of the coarser grid, the seams, and labels.
+//! The state of the schedule `sweep` from grid to grid: bands and seams.
 
-use std::sync::{
-    PoisonError,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicU64, Ordering},
 };
 
-use bp_core::{Error, Plan, Schedule, Side, memory};
+use bp_core::{BAND_ROWS, Error, Plan, Seam, Side};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::{
-    Band, CostSource, Sweep, Windows,
+    Band, Beside, CostSource, Sweep, Windows,
+    coarser::Coarser,
+    made::Made,
     pass::gaps,
-    refine::Coarser,
-    room::{Entries, band_rows, decided, most_entries},
-    seams::{self, Prepared, Seams},
+    room::{self, Entries, most_entries},
+    seams::Prepared,
+    tasks::{self, Part, Passed, Queue, Task},
 };
 use crate::layout::Layout;
 
-/// What is kept of swept grids.
+/// What is kept of a grid.
+pub(crate) struct Kept {
+    pub(super) bands: Vec<Made<Band>>,
+    pub(super) seams: Vec<Made<Prepared>>,
+}
+
+impl Kept {
+    fn forget(&mut self) {
+        self.bands.iter_mut().for_each(Made::forget);
+        self.seams.iter_mut().for_each(Made::forget);
+    }
+
+    fn bytes(&self) -> u64 {
+        let bands: u64 = self.bands.iter().map(|band| band.with(Band::bytes)).sum();
+        bands + self.seams.iter().map(|seam| seam.with(Prepared::bytes)).sum::<u64>()
+    }
+}
+
+/// What is kept of all grids.
 #[derive(Default)]
 pub(crate) struct Swept {
     windows: Windows,
-    seams: Vec<Seams>,
-    /// The bands of grids of even index from 2 on and of odd index: only a grid and the next coarser one are needed at the
-    /// same time.
-    bands: [Vec<Band>; 2],
-    /// The labels of all grids where they are decided, from the finest one on.
-    labels: Vec<Vec<u16>>,
+    grids: Vec<Kept>,
+    tasks: Vec<Task>,
     /// The message entries computed so far in a solve.
     updates: AtomicU64,
 }
@@ -41,99 +57,118 @@ pub(crate) struct Grid<'a> {
     pub(crate) costs: CostSource<'a>,
 }
 
-/// The grids from `first` on whose bands are the largest of those of even and of odd index that keep any, under `sweep`.
-fn kept(plan: &Plan, first: usize) -> impl Iterator<Item = usize> + use<> {
-    let swept = plan.settings().schedule == Schedule::Sweep;
-    let grids = plan.grids();
-    [first, first + 1].into_iter().filter(move |&grid| swept && grid < grids)
-}
-
-/// A seam that no band uses.
-fn prepared(seam: &mut Seams) -> &mut Prepared {
-    seam.get_mut().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Swept {
     /// Allocates everything, except for what label sets make shorter.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
-        let base = plan.finest_with_all_labels();
-        let mut bands: [Vec<Band>; 2] = [Vec::new(), Vec::new()];
-        for grid in kept(plan, base.max(1)) {
-            let [patches, entries] = most_entries(plan, grid);
-            let band = |rows| Band::new(rows, patches, entries);
-            // In parallel, because most of the time is the system's, to hand out memory.
-            let rows: Vec<_> = band_rows(plan, grid).collect();
-            bands[grid % 2] = rows.into_par_iter().map(band).collect::<Result<_, _>>()?;
-        }
-        for grid in kept(plan, 1) {
-            bands[grid % 2].resize_with(band_rows(plan, grid).count(), Band::default);
-        }
+        let grids = room::swept(plan).map(|grid| room::kept(plan, grid)).collect::<Result<_, _>>()?;
+        let tasks = if room::swept(plan).is_empty() {
+            Vec::new()
+        } else {
+            tasks::all(plan, rayon::current_num_threads()).collect()
+        };
         let mut windows = Windows::new(plan);
-        let mut seams = seams::prepared(plan)?;
-        let [patches, entries] = most_entries(plan, base);
+        let [patches, entries] = most_entries(plan, plan.finest_with_all_labels());
         windows.fit(plan, patches, entries)?;
-        seams.iter_mut().map(prepared).try_for_each(|seam| seam.fit(patches, entries))?;
-        let labels = decided(plan).map(|labels| memory::filled("labels", labels, 0)).collect::<Result<_, _>>()?;
-        Ok(Self { windows, seams, bands, labels, updates: AtomicU64::new(0) })
+        Ok(Self { windows, grids, tasks, updates: AtomicU64::new(0) })
     }
 
     /// Checks that sweeping a grid takes no more than `room` bytes in all, if it has label sets, which are known by now.
-    pub(crate) fn check_room(&self, grid: &Grid<'_>, room: u64) -> Result<(), Error> {
-        let Grid { plan, index, .. } = *grid;
-        if !plan.has_label_sets(index) {
+    fn check_room(&self, plan: &Plan, grid: usize, room: u64) -> Result<(), Error> {
+        if !plan.has_label_sets(grid) {
             return Ok(());
         }
-        let entries = Entries::count(plan, index, &self.labels[index + 1]);
-        let bands = if index > 0 { entries.band_bytes(plan, index, &self.bands[index % 2]) } else { 0 };
-        let held = self.bands[1 - index % 2].iter().map(Band::bytes);
-        let labels = self.labels.iter().map(memory::bytes);
-        let needed = held.chain(labels).chain([bands, entries.shared_bytes(plan)]).fold(0, u64::saturating_add);
+        let others = self.grids.iter().enumerate().filter(|&(other, _)| other != grid).map(|(_, kept)| kept.bytes());
+        let entries = Entries::count(plan, grid, &self.grids[grid + 1]);
+        let needed = others.chain([entries.bytes(plan, grid, &self.grids[grid])]).fold(0, u64::saturating_add);
         if needed <= room {
             return Ok(());
         }
         Err(Error::OutOfMemory { what: "label sets", needed, available: Some(room) })
     }
 
-    /// Runs all loops on a grid. Keeps the messages of grids from 1 on, and decides labels where they are needed.
-    pub(crate) fn run(&mut self, grid: &Grid<'_>) -> Result<(), Error> {
-        if grid.index + 1 == grid.plan.grids() {
+    /// Runs all loops on these grids, in no more than `room` bytes in all. Calls `passed` with the message entries computed so far,
+    /// counted for all labels; stops if it breaks.
+    pub(crate) fn run<'a>(
+        &mut self,
+        plan: &Plan,
+        grids: Range<usize>,
+        grid: impl Fn(usize) -> Grid<'a> + Sync,
+        room: u64,
+        passed: &mut Passed<'_>,
+    ) -> Result<(), Error> {
+        if grids.end == plan.grids() {
             self.updates.store(0, Ordering::Relaxed);
+            self.grids.iter_mut().for_each(Kept::forget);
         }
-        self.seams.iter_mut().for_each(|seam| prepared(seam).grid = None);
-        let mut bands = if grid.index > 0 { std::mem::take(&mut self.bands[grid.index % 2]) } else { Vec::new() };
-        let mut labels = self.labels.get_mut(grid.index).map(std::mem::take).unwrap_or_default();
-        let sweep = self.sweep(grid);
-        let result = match grid.index {
-            0 => sweep.decode(&self.seams, &mut labels),
-            _ => sweep.keep(&self.seams, &mut bands, &mut labels),
-        };
-        if grid.index > 0 {
-            self.bands[grid.index % 2] = bands;
+        if room == u64::MAX {
+            return self.run_together(plan, grids, &grid, passed);
         }
-        if let Some(kept) = self.labels.get_mut(grid.index) {
-            *kept = labels;
+        // How much the next grid needs is known when this one is done.
+        let mut before = 0;
+        for index in grids.rev() {
+            self.check_room(plan, index, room)?;
+            self.run_together(plan, index..index + 1, &grid, &mut |done| passed(before + done))?;
+            before += plan.grid_updates(index);
         }
-        let [patches, _] = most_entries(grid.plan, 0);
-        result.and(self.windows.even_out(grid.plan, patches))
+        Ok(())
     }
 
-    fn sweep<'a>(&'a self, grid: &'a Grid<'a>) -> Sweep<'a> {
-        let Grid { level, plan, index, layouts, costs } = grid;
-        let edges = plan.model().edges();
-        let coarser = layouts.get(index + 1);
-        let cut = plan.settings().cut.map(|cut| cut.x);
-        Sweep {
-            level: *level,
-            plan,
-            grid: *index,
-            layout: &layouts[*index],
-            costs,
-            coarser: coarser.map(|layout| Coarser { layout, bands: &self.bands[(index + 1) % 2], edges }),
-            coarser_labels: self.labels.get(index + 1).map_or(&[], Vec::as_slice),
-            windows: &self.windows,
-            gaps: gaps(plan.size(*index).width, cut),
-            updates: &self.updates,
+    /// Runs all loops on these grids. Threads go on to the next grid while others are at the last bands of this one.
+    fn run_together<'a>(
+        &mut self,
+        plan: &Plan,
+        grids: Range<usize>,
+        grid: &(impl Fn(usize) -> Grid<'a> + Sync),
+        passed: &mut Passed<'_>,
+    ) -> Result<(), Error> {
+        let queue = Queue::new(tasks::of_grids(&self.tasks, grids), passed);
+        // No more threads than windows, so that none waits for one.
+        (0..self.windows.len()).into_par_iter().with_max_len(1).for_each(|_| {
+            queue.work(|task| {
+                self.run_task(&grid(task.grid), task.part)?;
+                Ok(share(plan, task))
+            });
+        });
+        queue.result()?;
+        let [patches, _] = most_entries(plan, 0);
+        self.windows.even_out(plan, patches)
+    }
+
+    fn run_task(&self, grid: &Grid<'_>, part: Part) -> Result<(), Error> {
+        let Kept { bands, seams } = &self.grids[grid.index];
+        match part {
+            Part::Seam(index) => seams[index].make(|prepared| {
+                let seam = Seam::below_band(index, grid.plan.size(grid.index).height);
+                let sweep = self.sweep(grid, seam.rows())?;
+                self.windows.with(|window| sweep.pass_seam(seam, prepared, window))
+            }),
+            Part::Band(index) => bands[index].make(|band| {
+                let (sweep, beside) = self.band(grid, index)?;
+                self.windows.with(|window| sweep.pass_band(index, beside, band, window))
+            }),
         }
+    }
+
+    /// Waits for what a band depends on.
+    fn band<'a>(&'a self, grid: &'a Grid<'a>, index: usize) -> Result<(Sweep<'a>, Beside<'a>), Error> {
+        let seams = &self.grids[grid.index].seams;
+        let wait = |seam: Option<&'a Made<Prepared>>| seam.map(Made::wait).transpose();
+        let beside =
+            Beside { above: wait(index.checked_sub(1).map(|above| &seams[above]))?, below: wait(seams.get(index))? };
+        let first = index * BAND_ROWS;
+        let rows = first..grid.plan.size(grid.index).height.min(first + BAND_ROWS);
+        Ok((self.sweep(grid, rows)?, beside))
+    }
+
+    /// Waits for what these rows of a grid need of the coarser one.
+    fn sweep<'a>(&'a self, grid: &'a Grid<'a>, rows: Range<usize>) -> Result<Sweep<'a>, Error> {
+        let Grid { level, plan, index, layouts, costs } = grid;
+        let coarser = layouts.get(index + 1).zip(self.grids.get(index + 1));
+        let wait = |(layout, kept): (&'a Layout, &'a Kept)| Coarser::wait(plan, *index, rows, layout, &kept.bands);
+        let coarser = coarser.map(wait).transpose()?;
+        let gaps = gaps(plan.size(*index).width, plan.settings().cut.map(|cut| cut.x));
+        let (level, layout) = (*level, &layouts[*index]);
+        Ok(Sweep { level, plan, grid: *index, layout, costs, coarser, gaps, updates: &self.updates })
     }
 
     /// The message entries that the last solve computed.
@@ -146,21 +181,43 @@ impl Swept {
         &self.windows
     }
 
-    /// The labels of a grid where they are decided.
-    pub(crate) fn labels(&self, grid: usize) -> &[u16] {
-        self.labels.get(grid).map_or(&[], Vec::as_slice)
+    /// Copies the labels of a grid where they are decided, `[height][width]`.
+    pub(crate) fn read_labels(&self, plan: &Plan, grid: usize, labels: &mut [u16]) {
+        let bands = labels.par_chunks_mut(BAND_ROWS * plan.size(grid).width).zip(&self.grids[grid].bands);
+        bands.for_each(|(labels, band)| {
+            if let Some(band) = band.get() {
+                labels.copy_from_slice(&band.labels);
+            }
+        });
     }
 
-    /// Sweeps grid 0 again and copies the messages received from `side`, `[height][width][labels]`.
+    /// Sweeps all bands of grid 0 again and copies the messages received from `side`, `[height][width][labels]`. Labels that the
+    /// receiver's set lacks have zeros, as have all if grid 0 was not swept.
     pub(crate) fn read_messages(&self, grid: &Grid<'_>, side: Side, messages: &mut [u8]) -> Result<(), Error> {
-        self.sweep(grid).read_messages(&self.seams, side, messages)
+        messages.fill(0);
+        if self.grids[grid.index].bands.iter().any(|band| band.get().is_none()) {
+            return Ok(());
+        }
+        let row = grid.plan.size(grid.index).width * grid.plan.model().labels();
+        messages.par_chunks_mut(BAND_ROWS * row).enumerate().try_for_each(|(index, out)| {
+            let (sweep, beside) = self.band(grid, index)?;
+            self.windows.with(|window| sweep.read_messages(index, beside, window, side, out))
+        })
     }
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        let bands: u64 = self.bands.iter().flatten().map(Band::bytes).sum();
-        let bytes = |seam: &Seams| seam.read().unwrap_or_else(PoisonError::into_inner).bytes();
-        let seams: u64 = self.seams.iter().map(bytes).sum();
-        self.windows.bytes() + bands + seams + self.labels.iter().map(memory::bytes).sum::<u64>()
+        self.windows.bytes() + self.grids.iter().map(Kept::bytes).sum::<u64>()
+    }
+}
+
+/// A task's share of the message entries of its grid: that of a band's rows. Seams have none of their own.
+fn share(plan: &Plan, task: Task) -> u64 {
+    match task.part {
+        Part::Seam(_) => 0,
+        Part::Band(index) => {
+            let height = plan.size(task.grid).height;
+            plan.grid_updates(task.grid) / height as u64 * BAND_ROWS.min(height - index * BAND_ROWS) as u64
+        }
     }
 }

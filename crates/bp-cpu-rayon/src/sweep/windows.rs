@@ -106,6 +106,11 @@ impl Windows {
         self.fit(plan, patches, most.unwrap_or(0))
     }
 
+    /// The number of windows.
+    pub(crate) fn len(&self) -> usize {
+        self.windows.len()
+    }
+
     /// Calls `work` with a free window. A thread waits only if more threads than windows need one at the same time.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Window) -> R) -> R {
         let own = rayon::current_thread_index().unwrap_or(0) % self.windows.len();

@@ -13,7 +13,8 @@ impl State {
             return;
         }
         for patch in Patch::all(self.plan.size(grid).width, rows) {
-            let set = LabelSet::of(&self.plan, grid, &patch, &self.grids[grid + 1].decided);
+            let (decided, width) = (&self.grids[grid + 1].decided, self.plan.size(grid + 1).width);
+            let set = LabelSet::of(&self.plan, grid, &patch, |y| &decided[y * width..]);
             for node in patch.nodes() {
                 let node = self.index(grid, node);
                 self.grids[grid].sets[node] = set;
