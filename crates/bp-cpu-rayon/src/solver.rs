@@ -295,7 +295,7 @@ impl RayonSolver {
     /// Sweeps these grids, if there is room.
     fn sweep(&mut self, grids: Range<usize>, passed: &mut Passed<'_>) -> Result<(), Error> {
         let mut swept = std::mem::take(&mut self.swept);
-        let room = if self.limit < u64::MAX { self.limit.saturating_sub(self.allocated_bytes()) } else { u64::MAX };
+        let room = self.limit.saturating_sub(self.allocated_bytes());
         let result = swept.run(&self.plan, grids, |index| self.grid(index), room, passed);
         self.swept = swept;
         result

@@ -48,6 +48,7 @@ use coarser::Coarser;
 use lists::Lists;
 use messages::{Entry, Messages};
 use pass::{Gap, Pass, Start};
+use room::Room;
 use seams::Prepared;
 use windows::{Window, Work};
 
@@ -106,6 +107,7 @@ pub(crate) struct Sweep<'a> {
     costs: &'a CostSource<'a>,
     coarser: Option<Coarser<'a>>,
     gaps: [Option<Gap>; 4],
+    room: &'a Room<'a>,
     /// The message entries computed so far.
     updates: &'a AtomicU64,
 }
@@ -120,7 +122,9 @@ impl Sweep<'_> {
     /// Prepares a seam.
     fn pass_seam(&self, seam: Seam, prepared: &mut Prepared, window: &mut Window) -> Result<(), Error> {
         let Window { messages, work, .. } = window;
-        self.fill(seam.rows(), &mut prepared.lists, messages, work)?;
+        let (held, patches) = (prepared.bytes(), Patch::all(self.layout.size.width, seam.rows()).len());
+        let kept = |entries| seams::bytes(self.plan, self.grid, patches, entries).saturating_sub(held);
+        self.fill(seam.rows(), &mut prepared.lists, messages, work, kept)?;
         self.count(&prepared.lists, seam.rows(), |patch, labels| {
             self.plan.seam_patch_messages(self.grid, seam, patch) * labels
         });
@@ -141,18 +145,22 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    /// Makes the lists of rows that are passed together, and room for everything else.
+    /// Makes the lists of rows that are passed together, and room for everything else. `kept` is by how many bytes what is kept
+    /// grows with so many entries.
     fn fill(
         &self,
         rows: Range<usize>,
         lists: &mut Lists,
         messages: &mut Messages,
         work: &mut Work,
+        kept: impl FnOnce(usize) -> u64,
     ) -> Result<(), Error> {
         let coarser = |y: usize| self.coarser.map_or(&[][..], |coarser| coarser.labels(y));
-        lists.fill(self.plan, self.grid, rows.clone(), coarser)?;
-        messages.fit(rows.len(), lists.entries())?;
-        work.fit(rows.len(), lists.entries())?;
+        let entries = work.find_sets(self.plan, self.grid, rows.clone(), coarser)?;
+        self.room.take(entries, kept(entries))?;
+        lists.fill(self.plan.model().edges(), &work.sets)?;
+        messages.fit(rows.len(), entries)?;
+        work.fit(rows.len(), entries)?;
         work.crossings.find(lists, self.plan.model().edges());
         Ok(())
     }
@@ -166,14 +174,19 @@ impl Sweep<'_> {
 
     /// Sweeps a band. Keeps its messages on grids from 1 on, and decides its labels where they are needed.
     fn pass_band(&self, index: usize, beside: Beside<'_>, band: &mut Band, window: &mut Window) -> Result<(), Error> {
+        let (held, rows) = (band.bytes(), self.band_rows(index));
+        let patches = Patch::all(self.layout.size.width, rows.clone()).len();
+        let kept = |entries| Band::needed(self.plan, self.grid, rows.len(), patches, entries).saturating_sub(held);
         let Window { lists, messages, work } = window;
         let (lists, messages) = if self.grid > 0 { (&mut band.lists, &mut band.messages) } else { (lists, messages) };
+        self.fill(rows.clone(), lists, messages, work, kept)?;
         self.sweep(index, beside, (lists, messages, work), |pass| {
             if !band.labels.is_empty() {
                 let above = beside.above.map(|seam| seam.labels_above(self.layout.size.width));
                 pass.decode(pass.rows.clone(), above, &mut band.labels);
             }
-        })
+        });
+        Ok(())
     }
 
     /// Sweeps a band again and copies the messages received from `side`, `[row][width][labels]`.
@@ -186,19 +199,20 @@ impl Sweep<'_> {
         out: &mut [u8],
     ) -> Result<(), Error> {
         let Window { lists, messages, work } = window;
-        self.sweep(index, beside, (lists, messages, work), |pass| pass.read_messages(side, out))
+        self.fill(self.band_rows(index), lists, messages, work, |_| 0)?;
+        self.sweep(index, beside, (lists, messages, work), |pass| pass.read_messages(side, out));
+        Ok(())
     }
 
-    /// Sweeps a band as often as the plan requires, then calls `then` with it.
+    /// Sweeps a band, whose lists are filled, as often as the plan requires, then calls `then` with it.
     fn sweep(
         &self,
         index: usize,
         beside: Beside<'_>,
-        (lists, messages, work): (&mut Lists, &mut Messages, &mut Work),
+        (lists, messages, work): (&Lists, &mut Messages, &mut Work),
         then: impl FnOnce(&Pass<'_>),
-    ) -> Result<(), Error> {
+    ) {
         let rows = self.band_rows(index);
-        self.fill(rows.clone(), lists, messages, work)?;
         self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
         let mut pass = Pass { sweep: self, rows: rows.clone(), lists, messages, work };
         match beside.above {
@@ -216,7 +230,6 @@ impl Sweep<'_> {
             start = Start::Held;
         }
         then(&pass);
-        Ok(())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{EdgeLevels, Error, LabelSet, Patch, Plan, Smoothness, memory};
+use bp_core::{EdgeLevels, Error, LabelSet, Smoothness, memory};
 
 /// What the smoothness costs over edges of each level.
 pub(crate) type Steps = [u8; EdgeLevels::COUNT];
@@ -36,21 +36,10 @@ pub(crate) fn bytes(patches: usize, entries: usize) -> u64 {
 }
 
 impl Lists {
-    /// Makes the lists of these rows of a grid, whose label sets come from rows of labels `coarser`.
-    pub(crate) fn fill<'a>(
-        &mut self,
-        plan: &Plan,
-        grid: usize,
-        rows: Range<usize>,
-        coarser: impl Fn(usize) -> &'a [u16],
-    ) -> Result<(), Error> {
-        let patches = Patch::all(plan.size(grid).width, rows);
-        self.fit(patches.len(), 0)?;
-        for patch in patches {
-            let set = LabelSet::of(plan, grid, &patch, &coarser);
-            self.reserve(0, set.count())?;
-            self.push(plan.model().edges(), set);
-        }
+    /// Makes the lists of patches with these sets.
+    pub(crate) fn fill(&mut self, edges: &EdgeLevels, sets: &[LabelSet]) -> Result<(), Error> {
+        self.fit(sets.len(), sets.iter().map(LabelSet::count).sum())?;
+        sets.iter().for_each(|&set| self.push(edges, set));
         Ok(())
     }
 
@@ -63,14 +52,9 @@ impl Lists {
     /// Makes room for so many patches and entries.
     pub(crate) fn fit(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
         self.clear();
-        self.reserve(patches, entries)
-    }
-
-    /// Makes room for so many more patches and entries.
-    fn reserve(&mut self, patches: usize, entries: usize) -> Result<(), Error> {
         let needed = bytes(patches, entries);
         let reserved = self.labels.try_reserve_exact(entries).and_then(|()| {
-            self.steps.try_reserve_exact(entries + patches.max(1))?;
+            self.steps.try_reserve_exact(entries + patches)?;
             self.starts.try_reserve_exact(if patches > 0 { patches + 1 } else { 0 })
         });
         reserved.map_err(|_| Error::OutOfMemory { what: "label sets", needed, available: None })

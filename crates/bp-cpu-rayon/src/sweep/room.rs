@@ -1,11 +1,20 @@
 //! The memory that sweeps need, before label sets are known and after.
 
-use std::ops::Range;
+use std::{
+    ops::Range,
+    sync::{Mutex, PoisonError},
+};
 
-use bp_core::{BAND_ROWS, LabelSet, Patch, Plan, Schedule, Seam};
+use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Seam};
 use rayon::prelude::*;
 
-use super::{Band, made::Made, seams, seams::Prepared, swept::Kept, windows};
+use super::{
+    Band,
+    made::Made,
+    seams::{self, Prepared},
+    swept::Kept,
+    windows,
+};
 
 /// The patches of a row of a grid, and the most entries that they may have.
 pub(super) fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
@@ -41,54 +50,44 @@ pub(crate) fn bytes(plan: &Plan, labels: usize) -> u64 {
     grids.fold(windows::bytes(plan, patches, most), u64::saturating_add)
 }
 
-/// The entries of the label sets of a grid.
-pub(super) struct Entries {
-    /// Those of each band.
-    bands: Vec<usize>,
-    /// Those of each seam.
-    seams: Vec<usize>,
+/// The bytes that may be allocated in a solve, when label sets are known, by all threads.
+pub(crate) struct Room<'a> {
+    plan: &'a Plan,
+    bytes: u64,
+    left: Mutex<Left>,
 }
 
-impl Entries {
-    /// Counts the entries of a grid, whose label sets come from the labels of the next coarser one, `kept`.
-    pub(super) fn count(plan: &Plan, grid: usize, kept: &Kept) -> Self {
-        let size = plan.size(grid);
-        let coarser = plan.size(grid + 1);
-        let entries = |rows: Range<usize>| -> usize {
-            let sets = Patch::all(size.width, rows).map(|patch| {
-                let band = |y: usize| kept.bands[y / BAND_ROWS].get().map_or(&[][..], |band| &band.labels);
-                LabelSet::of(plan, grid, &patch, |y| &band(y)[y % BAND_ROWS * coarser.width..])
-            });
-            sets.map(|set| set.count()).sum()
-        };
-        let (bands, seams): (Vec<_>, Vec<_>) = (bands(plan, grid).collect(), Seam::all(size.height).collect());
-        Self {
-            bands: bands.into_par_iter().map(&entries).collect(),
-            seams: seams.into_par_iter().map(|seam| entries(seam.rows())).collect(),
-        }
+/// What is left of it.
+struct Left {
+    bytes: u64,
+    /// The most entries that windows have room for.
+    entries: usize,
+}
+
+impl<'a> Room<'a> {
+    /// So many bytes, of which some are held, among them windows for so many entries.
+    pub(super) fn new(plan: &'a Plan, bytes: u64, held: u64, entries: usize) -> Self {
+        Self { plan, bytes, left: Mutex::new(Left { bytes: bytes.saturating_sub(held), entries }) }
     }
 
-    /// The bytes that the grid will hold, given what is held already, and all windows.
-    pub(super) fn bytes(&self, plan: &Plan, grid: usize, held: &Kept) -> u64 {
-        let [patches, _] = most_entries(plan, grid);
-        let bands = bands(plan, grid).zip(&self.bands).zip(&held.bands).map(|((rows, &entries), held)| {
-            Band::needed(plan, grid, rows.len(), patches, entries).max(held.with(Band::bytes))
-        });
-        let seams = self
-            .seams
-            .iter()
-            .zip(&held.seams)
-            .map(|(&entries, held)| seams::bytes(plan, grid, patches, entries).max(held.with(Prepared::bytes)));
-        // The windows have been used on the grids with all labels.
-        let [_, all] = most_entries(plan, plan.finest_with_all_labels());
-        let most = self.bands.iter().chain(&self.seams).copied().chain([all]).max().unwrap_or(0);
-        let [patches, _] = most_entries(plan, 0);
-        bands.chain(seams).fold(windows::bytes(plan, patches, most), u64::saturating_add)
+    /// Takes what rows with so many entries need: all windows must have room for them, and they keep `kept` more bytes.
+    pub(super) fn take(&self, entries: usize, kept: u64) -> Result<(), Error> {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let [patches, _] = most_entries(self.plan, 0);
+        let most = left.entries.max(entries);
+        let [before, after] = [left.entries, most].map(|entries| windows::bytes(self.plan, patches, entries));
+        let more = (after - before).saturating_add(kept);
+        let available = Some(self.bytes);
+        let needed = (self.bytes - left.bytes).saturating_add(more);
+        let bytes = left.bytes.checked_sub(more);
+        *left =
+            Left { bytes: bytes.ok_or(Error::OutOfMemory { what: "label sets", needed, available })?, entries: most };
+        Ok(())
     }
 }
 
 /// Makes room for the bands and seams of a grid, unless label sets will tell how much.
-pub(super) fn kept(plan: &Plan, grid: usize) -> Result<Kept, bp_core::Error> {
+pub(super) fn kept(plan: &Plan, grid: usize) -> Result<Kept, Error> {
     let [patches, entries] = if plan.has_label_sets(grid) { [0, 0] } else { most_entries(plan, grid) };
     let band = |rows: Range<usize>| Band::new(plan, grid, rows.len(), patches, entries).map(Made::new);
     let seam = |_| {

@@ -14,7 +14,7 @@ use super::{
     coarser::Coarser,
     made::Made,
     pass::gaps,
-    room::{self, Entries, most_entries},
+    room::{self, Room, most_entries},
     seams::Prepared,
     tasks::{self, Part, Passed, Queue, Task},
 };
@@ -67,65 +67,31 @@ impl Swept {
             tasks::all(plan, rayon::current_num_threads()).collect()
         };
         let mut windows = Windows::new(plan);
-        let [patches, entries] = most_entries(plan, plan.finest_with_all_labels());
+        let ([patches, _], [_, entries]) = (most_entries(plan, 0), most_entries(plan, plan.finest_with_all_labels()));
         windows.fit(plan, patches, entries)?;
         Ok(Self { windows, grids, tasks, updates: AtomicU64::new(0) })
     }
 
-    /// Checks that sweeping a grid takes no more than `room` bytes in all, if it has label sets, which are known by now.
-    fn check_room(&self, plan: &Plan, grid: usize, room: u64) -> Result<(), Error> {
-        if !plan.has_label_sets(grid) {
-            return Ok(());
-        }
-        let others = self.grids.iter().enumerate().filter(|&(other, _)| other != grid).map(|(_, kept)| kept.bytes());
-        let entries = Entries::count(plan, grid, &self.grids[grid + 1]);
-        let needed = others.chain([entries.bytes(plan, grid, &self.grids[grid])]).fold(0, u64::saturating_add);
-        if needed <= room {
-            return Ok(());
-        }
-        Err(Error::OutOfMemory { what: "label sets", needed, available: Some(room) })
-    }
-
-    /// Runs all loops on these grids, in no more than `room` bytes in all. Calls `passed` with the message entries computed so far,
-    /// counted for all labels; stops if it breaks.
+    /// Runs all loops on these grids, in no more than `bytes` bytes in all. Threads go on to the next grid while others are at the
+    /// last bands of this one. Calls `passed` with the message entries computed so far, counted for all labels; stops if it breaks.
     pub(crate) fn run<'a>(
         &mut self,
         plan: &Plan,
         grids: Range<usize>,
         grid: impl Fn(usize) -> Grid<'a> + Sync,
-        room: u64,
+        bytes: u64,
         passed: &mut Passed<'_>,
     ) -> Result<(), Error> {
         if grids.end == plan.grids() {
             self.updates.store(0, Ordering::Relaxed);
-            self.grids.iter_mut().for_each(Kept::forget);
         }
-        if room == u64::MAX {
-            return self.run_together(plan, grids, &grid, passed);
-        }
-        // How much the next grid needs is known when this one is done.
-        let mut before = 0;
-        for index in grids.rev() {
-            self.check_room(plan, index, room)?;
-            self.run_together(plan, index..index + 1, &grid, &mut |done| passed(before + done))?;
-            before += plan.grid_updates(index);
-        }
-        Ok(())
-    }
-
-    /// Runs all loops on these grids. Threads go on to the next grid while others are at the last bands of this one.
-    fn run_together<'a>(
-        &mut self,
-        plan: &Plan,
-        grids: Range<usize>,
-        grid: &(impl Fn(usize) -> Grid<'a> + Sync),
-        passed: &mut Passed<'_>,
-    ) -> Result<(), Error> {
+        self.grids[..grids.end].iter_mut().for_each(Kept::forget);
+        let room = Room::new(plan, bytes, self.bytes(), self.windows.most_entries());
         let queue = Queue::new(tasks::of_grids(&self.tasks, grids), passed);
         // No more threads than windows, so that none waits for one.
         (0..self.windows.len()).into_par_iter().with_max_len(1).for_each(|_| {
             queue.work(|task| {
-                self.run_task(&grid(task.grid), task.part)?;
+                self.run_task(&grid(task.grid), task.part, &room)?;
                 Ok(share(plan, task))
             });
         });
@@ -134,41 +100,46 @@ impl Swept {
         self.windows.even_out(plan, patches)
     }
 
-    fn run_task(&self, grid: &Grid<'_>, part: Part) -> Result<(), Error> {
+    fn run_task(&self, grid: &Grid<'_>, part: Part, room: &Room<'_>) -> Result<(), Error> {
         let Kept { bands, seams } = &self.grids[grid.index];
         match part {
             Part::Seam(index) => seams[index].make(|prepared| {
                 let seam = Seam::below_band(index, grid.plan.size(grid.index).height);
-                let sweep = self.sweep(grid, seam.rows())?;
+                let sweep = self.sweep(grid, seam.rows(), room)?;
                 self.windows.with(|window| sweep.pass_seam(seam, prepared, window))
             }),
             Part::Band(index) => bands[index].make(|band| {
-                let (sweep, beside) = self.band(grid, index)?;
+                let (sweep, beside) = self.band(grid, index, room)?;
                 self.windows.with(|window| sweep.pass_band(index, beside, band, window))
             }),
         }
     }
 
     /// Waits for what a band depends on.
-    fn band<'a>(&'a self, grid: &'a Grid<'a>, index: usize) -> Result<(Sweep<'a>, Beside<'a>), Error> {
+    fn band<'a>(
+        &'a self,
+        grid: &'a Grid<'a>,
+        index: usize,
+        room: &'a Room<'a>,
+    ) -> Result<(Sweep<'a>, Beside<'a>), Error> {
         let seams = &self.grids[grid.index].seams;
         let wait = |seam: Option<&'a Made<Prepared>>| seam.map(Made::wait).transpose();
         let beside =
             Beside { above: wait(index.checked_sub(1).map(|above| &seams[above]))?, below: wait(seams.get(index))? };
         let first = index * BAND_ROWS;
         let rows = first..grid.plan.size(grid.index).height.min(first + BAND_ROWS);
-        Ok((self.sweep(grid, rows)?, beside))
+        Ok((self.sweep(grid, rows, room)?, beside))
     }
 
     /// Waits for what these rows of a grid need of the coarser one.
-    fn sweep<'a>(&'a self, grid: &'a Grid<'a>, rows: Range<usize>) -> Result<Sweep<'a>, Error> {
+    fn sweep<'a>(&'a self, grid: &'a Grid<'a>, rows: Range<usize>, room: &'a Room<'a>) -> Result<Sweep<'a>, Error> {
         let Grid { level, plan, index, layouts, costs } = grid;
         let coarser = layouts.get(index + 1).zip(self.grids.get(index + 1));
         let wait = |(layout, kept): (&'a Layout, &'a Kept)| Coarser::wait(plan, *index, rows, layout, &kept.bands);
         let coarser = coarser.map(wait).transpose()?;
         let gaps = gaps(plan.size(*index).width, plan.settings().cut.map(|cut| cut.x));
         let (level, layout) = (*level, &layouts[*index]);
-        Ok(Sweep { level, plan, grid: *index, layout, costs, coarser, gaps, updates: &self.updates })
+        Ok(Sweep { level, plan, grid: *index, layout, costs, coarser, gaps, room, updates: &self.updates })
     }
 
     /// The message entries that the last solve computed.
@@ -198,9 +169,11 @@ impl Swept {
         if self.grids[grid.index].bands.iter().any(|band| band.get().is_none()) {
             return Ok(());
         }
+        // What was swept before needs no more memory.
+        let room = Room::new(grid.plan, u64::MAX, 0, 0);
         let row = grid.plan.size(grid.index).width * grid.plan.model().labels();
         messages.par_chunks_mut(BAND_ROWS * row).enumerate().try_for_each(|(index, out)| {
-            let (sweep, beside) = self.band(grid, index)?;
+            let (sweep, beside) = self.band(grid, index, &room)?;
             self.windows.with(|window| sweep.read_messages(index, beside, window, side, out))
         })
     }

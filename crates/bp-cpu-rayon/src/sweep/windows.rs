@@ -1,8 +1,11 @@
 //! Memory for the rows that threads pass at the same time.
 
-use std::sync::{Mutex, PoisonError};
+use std::{
+    ops::Range,
+    sync::{Mutex, PoisonError},
+};
 
-use bp_core::{BAND_ROWS, Error, Plan, Schedule, memory};
+use bp_core::{BAND_ROWS, Error, LabelSet, Patch, Plan, Schedule, memory};
 
 use super::{
     Sweep,
@@ -25,6 +28,8 @@ pub(crate) struct Window {
 /// What a pass needs besides labels and messages.
 #[derive(Default)]
 pub(crate) struct Work {
+    /// The label sets of the patches.
+    pub(crate) sets: Vec<LabelSet>,
     /// Data costs, `[row][plane][entry]`.
     pub(crate) costs: Vec<Block>,
     pub(crate) coarse_rows: CoarseRows,
@@ -37,6 +42,26 @@ fn costs(rows: usize) -> usize {
 }
 
 impl Work {
+    /// Finds the label sets of these rows of a grid, which come from rows of labels `coarser`. Returns how many labels they have.
+    pub(crate) fn find_sets<'a>(
+        &mut self,
+        plan: &Plan,
+        grid: usize,
+        rows: Range<usize>,
+        coarser: impl Fn(usize) -> &'a [u16],
+    ) -> Result<usize, Error> {
+        let patches = Patch::all(plan.size(grid).width, rows);
+        self.sets.clear();
+        self.fit_sets(patches.len())?;
+        self.sets.iter_mut().zip(patches).for_each(|(set, patch)| *set = LabelSet::of(plan, grid, &patch, &coarser));
+        Ok(self.sets.iter().map(LabelSet::count).sum())
+    }
+
+    /// Makes room for the sets of so many patches.
+    fn fit_sets(&mut self, patches: usize) -> Result<(), Error> {
+        memory::grow("label sets", &mut self.sets, patches, LabelSet::all(0))
+    }
+
     /// Makes room for so many rows with so many entries each.
     pub(crate) fn fit(&mut self, rows: usize, entries: usize) -> Result<(), Error> {
         memory::grow("data cost", &mut self.costs, costs(rows).saturating_mul(entries), Block::ZERO)?;
@@ -52,7 +77,7 @@ impl Work {
     }
 
     fn bytes(&self) -> u64 {
-        memory::bytes(&self.costs) + self.coarse_rows.bytes() + self.crossings.bytes()
+        memory::bytes(&self.sets) + memory::bytes(&self.costs) + self.coarse_rows.bytes() + self.crossings.bytes()
     }
 }
 
@@ -73,7 +98,8 @@ fn windows(plan: &Plan) -> usize {
 pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
     let rows = BAND_ROWS.min(plan.image_size().height);
     let costs = ((costs(rows) * size_of::<Block>()) as u64).saturating_mul(entries as u64);
-    let work = costs + refine::bytes(entries) + crossings::bytes(entries);
+    let sets = (patches * size_of::<LabelSet>()) as u64;
+    let work = sets + costs + refine::bytes(entries) + crossings::bytes(entries);
     let window = work.saturating_add(messages::bytes(rows, entries)).saturating_add(lists::bytes(patches, entries));
     (windows(plan) as u64).saturating_mul(window)
 }
@@ -95,6 +121,7 @@ impl Windows {
         self.windows.iter_mut().map(unused).try_for_each(|window| {
             window.lists.fit(patches, entries)?;
             window.messages.fit(rows, entries)?;
+            window.work.fit_sets(patches)?;
             window.work.fit(rows, entries)
         })
     }
@@ -102,8 +129,13 @@ impl Windows {
     /// Makes all windows as large as any had to become. So memory does not depend on which thread passed which rows, and
     /// the same pair needs no more when other threads pass them.
     pub(crate) fn even_out(&mut self, plan: &Plan, patches: usize) -> Result<(), Error> {
-        let most = self.windows.iter_mut().map(|window| unused(window).work.crossings.most_entries()).max();
-        self.fit(plan, patches, most.unwrap_or(0))
+        let most = self.most_entries();
+        self.fit(plan, patches, most)
+    }
+
+    /// The most entries that any window has room for.
+    pub(crate) fn most_entries(&mut self) -> usize {
+        self.windows.iter_mut().map(|window| unused(window).work.crossings.most_entries()).max().unwrap_or(0)
     }
 
     /// The number of windows.
