@@ -13,6 +13,10 @@ pub const HALO: usize = 96;
 /// The same for rows under [`Schedule::Sweep`], where less reaches a row from far above or below.
 const SWEPT_ROWS_HALO: usize = 64;
 
+/// Writing so many bytes for the first time takes about as long as matching a pixel of an ordinary pair, because the system has to
+/// find and clear the memory.
+const BYTES_PER_PIXEL: f64 = 128.0;
+
 /// A plan, and the tiles that it runs on. One tile gives the image's answer to the bit. Several give nearly the same one, which is
 /// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`] bands also begin at the first row of
 /// each tile.
@@ -64,8 +68,8 @@ impl Tiling {
         Self { plan, columns, rows, likely: None }
     }
 
-    /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that need the least
-    /// work in total. `needed` returns the most bytes that a device needs for a plan, or why it cannot run it. `likely` returns
+    /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that probably take the least
+    /// time. `needed` returns the most bytes that a device needs for a plan, or why it cannot run it. `likely` returns
     /// fewer, if it probably needs no more. Tiles that only probably fit are replaced by others if they do not, see
     /// [`Tiling::certain`].
     ///
@@ -78,17 +82,18 @@ impl Tiling {
             return Ok(whole);
         }
         let best = |needed: &Needed<'_>| {
-            let tiles = heights(plan).filter_map(|height| widest(plan, height, |tiling| fits(tiling, needed)));
-            tiles.filter(|tiling| !tiling.is_whole()).min_by(|a, b| a.work().total_cmp(&b.work()))
+            let tiles = heights(plan).flat_map(|height| of_height(plan, height, |tiling| fits(tiling, needed)));
+            let tiles = tiles.filter(|tiling| !tiling.is_whole()).map(|tiling| (tiling.cost(needed), tiling));
+            tiles.min_by(|(a, _), (b, _)| a.total_cmp(b))
         };
-        let Some(certain) = best(needed) else {
+        let Some((cost, certain)) = best(needed) else {
             let smallest = Self::cut(plan.clone(), Size { width: 1, height: 1 }, HALO);
             let needed = smallest.bytes(needed)?;
             return Err(Error::OutOfMemory { what: "the smallest tiles", needed, available: Some(bytes) });
         };
-        let tiling = best(likely).filter(|tiling| tiling.work() < certain.work());
+        let tiling = best(likely).filter(|&(likely, _)| likely < cost);
         Ok(match tiling {
-            Some(tiling) => Self { likely: Some(Likely { bytes, certain: Box::new(certain) }), ..tiling },
+            Some((_, tiling)) => Self { likely: Some(Likely { bytes, certain: Box::new(certain) }), ..tiling },
             None => certain,
         })
     }
@@ -184,10 +189,15 @@ impl Tiling {
         2 * self.plan.image_size().pixels() as u64
     }
 
-    /// The number of matched pixels per pixel of the image.
-    fn work(&self) -> f64 {
+    /// The number of matched pixels.
+    fn matched_pixels(&self) -> f64 {
         let matched = |spans: &[Span]| spans.iter().map(|span| span.all.len()).sum::<usize>() as f64;
-        matched(&self.columns) * matched(&self.rows) / self.plan.image_size().pixels() as f64
+        matched(&self.columns) * matched(&self.rows)
+    }
+
+    /// About how long it takes, in matched pixels. Tiles use the same memory, one after another.
+    fn cost(&self, needed: &Needed<'_>) -> f64 {
+        self.matched_pixels() + self.bytes(needed).unwrap_or(u64::MAX) as f64 / BYTES_PER_PIXEL
     }
 }
 
@@ -208,12 +218,13 @@ fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
     std::iter::successors(Some(highest), move |&rows| (rows > align).then(|| rows.div_ceil(2).next_multiple_of(align)))
 }
 
-/// The widest tiles of a height that fit.
-fn widest(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> Option<Tiling> {
+/// The widest tiles of a height that fit, and narrower ones.
+fn of_height(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> impl Iterator<Item = Tiling> {
     let align = align(plan).width;
-    let tiles = |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * align, height }, HALO);
+    let tiles = move |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * align, height }, HALO);
     let blocks = plan.image_size().width.div_ceil(align);
-    evenly(blocks, |blocks| fits(&tiles(blocks))).map(tiles)
+    let widest = evenly(blocks, |blocks| fits(&tiles(blocks)));
+    std::iter::successors(widest, |&blocks| (blocks > 1).then(|| blocks.div_ceil(2))).map(tiles)
 }
 
 /// Divides `units` into the fewest parts that fit, as evenly as possible, and returns the units of a part. If a part
@@ -258,13 +269,9 @@ mod tests {
         let plan = plan((1500, 3000), 64, Algorithm::Sweep);
         let whole = plan.bytes();
         assert!(within(&plan, whole).is_whole());
-        let mut work = 1.0;
-        for (bytes, counts) in [(whole - 1, (1, 2)), (whole / 2, (1, 4)), (whole / 5, (1, 8))] {
-            let tiling = within(&plan, bytes);
-            assert_eq!(tiling.counts(), counts, "{bytes}");
-            assert!(tiling.work() > work);
-            work = tiling.work();
-        }
+        let tilings = [whole - 1, whole / 5, whole / 10, whole / 20].map(|bytes| within(&plan, bytes));
+        assert_eq!(tilings.each_ref().map(Tiling::counts), [(1, 8), (1, 8), (3, 8), (5, 16)]);
+        assert!(tilings.is_sorted_by(|a, b| a.matched_pixels() <= b.matched_pixels()));
         let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed, &needed)
         else {
             panic!()
@@ -282,9 +289,10 @@ mod tests {
         let certain = within(&plan, bytes);
         let likely = |plan: &Plan| Ok(plan.bytes() / 2);
         let tiling = Tiling::within(&plan, bytes, &needed, &likely).unwrap();
-        assert!(tiling.work() < certain.work() && tiling.bytes(&needed).unwrap() == bytes);
+        assert!(tiling.matched_pixels() < certain.matched_pixels() && tiling.bytes(&needed).unwrap() == bytes);
         assert_eq!((tiling.certain(), certain.certain()), (Some(&certain), None));
-        assert_eq!(Tiling::within(&plan, plan.bytes() / 2, &needed, &likely).unwrap().counts(), (1, 2), "not whole");
+        let whole = likely(&plan).unwrap();
+        assert!(!Tiling::within(&plan, whole, &needed, &likely).unwrap().is_whole());
     }
 
     #[test]
@@ -293,8 +301,20 @@ mod tests {
         for algorithm in [Algorithm::Cfbp, Algorithm::Ctbp] {
             let plan = plan((1500, 3000), 16, algorithm);
             let tiling = within(&plan, plan.bytes() / 4);
-            assert!(!tiling.is_whole() && tiling.work() < 1.45, "{:?} {}", tiling.counts(), tiling.work());
+            let share = tiling.matched_pixels() / plan.image_size().pixels() as f64;
+            assert!(!tiling.is_whole() && share < 1.45, "{:?} {share}", tiling.counts());
         }
+    }
+
+    /// The largest tiles that fit would compute least, but the system would take longer to hand out their memory.
+    #[test]
+    fn no_more_memory_is_taken_than_pays() {
+        let plan = plan((8000, 8000), 16, Algorithm::Sweep);
+        let needed = |plan: &Plan| Ok(150 * plan.image_size().pixels() as u64);
+        let tiling = Tiling::within(&plan, 8_000_000_000, &needed, &needed).unwrap();
+        let bytes = tiling.bytes(&needed).unwrap();
+        assert!(bytes < 2_000_000_000, "{:?} {bytes}", tiling.counts());
+        assert!(tiling.matched_pixels() < 1.2 * 64e6, "{:?}", tiling.counts());
     }
 
     #[test]
