@@ -41,8 +41,8 @@ pub struct Progress {
     pub total: u64,
 }
 
-/// A function called after every [`Solver::update_messages`], or now and then during [`Solver::pass_messages`], on any thread. If it
-/// returns [`ControlFlow::Break`], the solve stops.
+/// A function called before every [`Solver::coarsen`], after every [`Solver::update_messages`], and now and then during
+/// [`Solver::pass_messages`], on any thread. If it returns [`ControlFlow::Break`], the solve stops.
 pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 
 /// A plan prepared on a device, ready to match one pair of its size after another.
@@ -180,12 +180,15 @@ impl Driver {
         let mut times = Times::default();
         let start = Instant::now();
         let seed = seed(pair, plan);
-        timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
         let grids = run.grids(plan);
+        let total = grids.clone().map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add);
+        let mut reports = Reports { observer, total };
+        timed(&mut times, Stage::MatchCost, || solver.match_cost(pair, seed))?;
         for grid in 1..grids.end {
+            reports.report(0)?;
             timed(&mut times, Stage::Coarsen, || solver.coarsen(grid))?;
         }
-        pass_messages(plan, solver.as_mut(), run, &mut times, observer)?;
+        pass_messages(plan, solver.as_mut(), run, &mut times, &mut reports)?;
         let nodes = plan.size(grids.start).pixels();
         timed(&mut times, Stage::SelectLabels, || solver.select_labels(grids.start, &mut labels[..nodes]))?;
         if grids.start > 0 {
@@ -254,41 +257,54 @@ fn spread(plan: &Plan, grid: usize, labels: &mut [u16]) {
     }
 }
 
+/// To whom a solve reports its progress.
+struct Reports<'a, 'b> {
+    observer: &'a mut Observer<'b>,
+    total: u64,
+}
+
+impl Reports<'_, '_> {
+    /// Reports so many message entries.
+    fn observe(&mut self, done: u64) -> ControlFlow<()> {
+        (self.observer)(Progress { done: done.min(self.total), total: self.total })
+    }
+
+    /// The same, with an error if the solve is to stop.
+    fn report(&mut self, done: u64) -> Result<(), Error> {
+        if self.observe(done).is_break() { Err(Error::Stopped) } else { Ok(()) }
+    }
+}
+
 fn pass_messages(
     plan: &Plan,
     solver: &mut dyn Solver,
     run: Run,
     times: &mut Times,
-    observer: &mut Observer<'_>,
+    reports: &mut Reports<'_, '_>,
 ) -> Result<(), Error> {
     let grids = run.grids(plan);
-    let mut progress =
-        Progress { done: 0, total: grids.clone().map(|grid| plan.grid_updates(grid)).fold(0, u64::saturating_add) };
     let mut is_passed = false;
     timed(times, Stage::UpdateMessages, || {
-        let mut passed = |done: u64| observer(Progress { done: done.min(progress.total), ..progress });
-        is_passed = solver.pass_messages(grids.clone(), &mut passed)?;
+        is_passed = solver.pass_messages(grids.clone(), &mut |done| reports.observe(done))?;
         Ok(())
     })?;
     if is_passed {
-        progress.done = progress.total;
-        return if observer(progress).is_break() { Err(Error::Stopped) } else { Ok(()) };
+        return reports.report(reports.total);
     }
+    let mut done = 0;
     for grid in grids.rev() {
         timed(times, Stage::Refine, || match run {
             Run::Cold | Run::Halved => solver.refine(grid),
             Run::Warm => solver.keep_messages(),
         })?;
-        progress.done += plan.seam_updates(grid);
+        done += plan.seam_updates(grid);
         let mut steps = 0..plan.settings().steps;
         while !steps.is_empty() {
             let end = steps.start.saturating_add(solver.fused_steps()).min(steps.end);
             timed(times, Stage::UpdateMessages, || solver.update_messages(grid, steps.start..end))?;
-            progress.done += u64::from(end - steps.start) * plan.updates_per_step(grid);
+            done += u64::from(end - steps.start) * plan.updates_per_step(grid);
             steps.start = end;
-            if observer(progress).is_break() {
-                return Err(Error::Stopped);
-            }
+            reports.report(done)?;
         }
     }
     Ok(())

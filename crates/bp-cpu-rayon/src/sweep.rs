@@ -12,6 +12,7 @@ mod costs;
 mod crossings;
 mod decode;
 mod edges;
+mod kept;
 mod lists;
 mod made;
 mod messages;

@@ -38,7 +38,11 @@ fn a_sweep_stops_before_it_has_done_all_bands() {
     let all = driver.message_updates();
     for threads in [1, 2, 8] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let stopped = pool.install(|| driver.solve_observed(&pair, &mut |_| ControlFlow::Break(())));
+        let first_band = &mut |progress: Progress| match progress.done {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        };
+        let stopped = pool.install(|| driver.solve_observed(&pair, first_band));
         assert_eq!(stopped.err(), Some(Error::Stopped));
         assert!(driver.message_updates() < all / 2, "{threads} threads: {} of {all}", driver.message_updates());
     }

@@ -208,6 +208,9 @@ fn align(plan: &Plan) -> Size {
     Size { width, height }
 }
 
+/// Tiles of a height are tried in so many widths, each half as wide as the one before.
+const NARROWER: usize = 5;
+
 /// Returns how many bytes a device needs for a plan, or why it cannot run it.
 pub type Needed<'a> = dyn Fn(&Plan) -> Result<u64, Error> + 'a;
 
@@ -218,13 +221,13 @@ fn heights(plan: &Plan) -> impl Iterator<Item = usize> + use<> {
     std::iter::successors(Some(highest), move |&rows| (rows > align).then(|| rows.div_ceil(2).next_multiple_of(align)))
 }
 
-/// The widest tiles of a height that fit, and narrower ones.
+/// The widest tiles of a height that fit, and some narrower ones.
 fn of_height(plan: &Plan, height: usize, fits: impl Fn(&Tiling) -> bool) -> impl Iterator<Item = Tiling> {
     let align = align(plan).width;
     let tiles = move |blocks: usize| Tiling::cut(plan.clone(), Size { width: blocks * align, height }, HALO);
     let blocks = plan.image_size().width.div_ceil(align);
     let widest = evenly(blocks, |blocks| fits(&tiles(blocks)));
-    std::iter::successors(widest, |&blocks| (blocks > 1).then(|| blocks.div_ceil(2))).map(tiles)
+    std::iter::successors(widest, |&blocks| (blocks > 1).then(|| blocks.div_ceil(2))).take(NARROWER).map(tiles)
 }
 
 /// Divides `units` into the fewest parts that fit, as evenly as possible, and returns the units of a part. If a part

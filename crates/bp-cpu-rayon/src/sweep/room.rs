@@ -6,15 +6,8 @@ use std::{
 };
 
 use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Seam};
-use rayon::prelude::*;
 
-use super::{
-    Band,
-    made::Made,
-    seams::{self, Prepared},
-    swept::Kept,
-    windows,
-};
+use super::{Band, seams, windows};
 
 /// The patches of a row of a grid, and the most entries that they may have.
 pub(super) fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
@@ -84,19 +77,4 @@ impl<'a> Room<'a> {
             Left { bytes: bytes.ok_or(Error::OutOfMemory { what: "label sets", needed, available })?, entries: most };
         Ok(())
     }
-}
-
-/// Makes room for the bands and seams of a grid, unless label sets will tell how much.
-pub(super) fn kept(plan: &Plan, grid: usize) -> Result<Kept, Error> {
-    let [patches, entries] = if plan.has_label_sets(grid) { [0, 0] } else { most_entries(plan, grid) };
-    let band = |rows: Range<usize>| Band::new(plan, grid, rows.len(), patches, entries).map(Made::new);
-    let seam = |_| {
-        let mut prepared = Prepared::new(plan, grid)?;
-        prepared.fit(patches, entries)?;
-        Ok(Made::new(prepared))
-    };
-    // In parallel, because most of the time is the system's, to hand out memory.
-    let rows: Vec<_> = bands(plan, grid).collect();
-    let bands = rows.into_par_iter().map(band).collect::<Result<_, _>>()?;
-    Ok(Kept { bands, seams: Seam::all(plan.size(grid).height).map(seam).collect::<Result<_, _>>()? })
 }

@@ -10,8 +10,9 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::{
-    Band, Beside, CostSource, Sweep, Windows,
+    Beside, CostSource, Sweep, Windows,
     coarser::Coarser,
+    kept::Kept,
     made::Made,
     pass::gaps,
     room::{self, Room, most_entries},
@@ -19,24 +20,6 @@ use super::{
     tasks::{self, Part, Passed, Queue, Task},
 };
 use crate::layout::Layout;
-
-/// What is kept of a grid.
-pub(crate) struct Kept {
-    pub(super) bands: Vec<Made<Band>>,
-    pub(super) seams: Vec<Made<Prepared>>,
-}
-
-impl Kept {
-    fn forget(&mut self) {
-        self.bands.iter_mut().for_each(Made::forget);
-        self.seams.iter_mut().for_each(Made::forget);
-    }
-
-    fn bytes(&self) -> u64 {
-        let bands: u64 = self.bands.iter().map(|band| band.with(Band::bytes)).sum();
-        bands + self.seams.iter().map(|seam| seam.with(Prepared::bytes)).sum::<u64>()
-    }
-}
 
 /// What is kept of all grids.
 #[derive(Default)]
@@ -60,7 +43,7 @@ pub(crate) struct Grid<'a> {
 impl Swept {
     /// Allocates everything, except for what label sets make shorter.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
-        let grids = room::swept(plan).map(|grid| room::kept(plan, grid)).collect::<Result<_, _>>()?;
+        let grids = room::swept(plan).map(|grid| Kept::new(plan, grid)).collect::<Result<_, _>>()?;
         let tasks = if room::swept(plan).is_empty() {
             Vec::new()
         } else {
@@ -95,11 +78,12 @@ impl Swept {
                 Ok(share(plan, task))
             });
         });
-        queue.result()?;
+        let result = queue.result();
         let [patches, _] = most_entries(plan, 0);
-        self.windows.even_out(plan, patches)
+        result.and(self.windows.even_out(plan, patches))
     }
 
+    /// Makes a band or a seam.
     fn run_task(&self, grid: &Grid<'_>, part: Part, room: &Room<'_>) -> Result<(), Error> {
         let Kept { bands, seams } = &self.grids[grid.index];
         match part {
