@@ -140,7 +140,7 @@ impl RayonSolver {
     }
 
     /// Passes messages in half-steps or loops.
-    fn pass_messages(&mut self, grid: usize, steps: Range<u32>, last: Last) {
+    fn run_steps(&mut self, grid: usize, steps: Range<u32>, last: Last) {
         let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
         let mut labels = std::mem::replace(&mut self.labels, Labels::none());
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
@@ -220,7 +220,7 @@ impl Solver for RayonSolver {
             let is_last = steps.end == self.plan.settings().steps;
             return if is_last { self.sweep(grid..grid + 1, &mut |_| ControlFlow::Continue(())) } else { Ok(()) };
         }
-        self.pass_messages(grid, steps, self.last(grid));
+        self.run_steps(grid, steps, self.last(grid));
         Ok(())
     }
 
@@ -250,7 +250,7 @@ impl Solver for RayonSolver {
             return self.swept.read_messages(&self.grid(0), side, messages);
         }
         if self.lacks_messages {
-            self.pass_messages(0, 0..self.plan.settings().steps, Last::Decides);
+            self.run_steps(0, 0..self.plan.settings().steps, Last::Decides);
         }
         let received = received(&self.plan, &self.layouts[0], &self.messages[0]);
         half_steps::read_messages(&self.plan, received, side, messages);

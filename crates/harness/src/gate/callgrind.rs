@@ -214,7 +214,10 @@ fn stage(symbol: &str) -> Option<Stage> {
         Some((path, hash)) => path.contains("Solver") && (hash.is_empty() || hash.starts_with("17h")),
         None => false,
     };
-    Stage::ALL.into_iter().find(|stage| ends(&format!("{}{}", stage.name().len(), stage.name())))
+    let is_kernel = |name: &str| ends(&format!("{}{name}", name.len()));
+    // A solver that works on several grids at the same time does this in place of that stage.
+    let passed = is_kernel("pass_messages").then_some(Stage::UpdateMessages);
+    passed.or_else(|| Stage::ALL.into_iter().find(|stage| is_kernel(stage.name())))
 }
 
 #[cfg(test)]
@@ -231,6 +234,7 @@ mod tests {
             (format!("{scalar}15update_messages"), Some(Stage::UpdateMessages)),
             (format!("{scalar}6refine.llvm.123"), Some(Stage::Refine)),
             (format!("{rayon}7coarsen17h0123456789abcdefE"), Some(Stage::Coarsen)),
+            (format!("{rayon}13pass_messages17h0123456789abcdefE"), Some(Stage::UpdateMessages)),
             (format!("{rayon}10match_cost17h0123456789abcdefE"), Some(Stage::MatchCost)),
             (format!("{rayon}13read_messages17h0123456789abcdefE"), None),
             (format!("{rayon}15update_messages28_$u7b$$u7b$closure$u7d$$u7d$17h0123456789abcdefE"), None),
