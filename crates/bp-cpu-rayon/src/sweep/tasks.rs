@@ -155,6 +155,11 @@ mod tests {
         queue.fail(Error::Stopped);
         assert_eq!(queue.result(), Err(Error::Plan("no")));
         assert_eq!(seen, [5, 10, 15, 20]);
+        // A task that waited for another may end before the one that failed.
+        let mut passed = |_| ControlFlow::Continue(());
+        let queue = Queue::new(&tasks, &mut passed);
+        [Error::Stopped, Error::Plan("no")].into_iter().for_each(|error| queue.fail(error));
+        assert_eq!(queue.result(), Err(Error::Plan("no")));
         let mut passed = |_| ControlFlow::Break(());
         let queue = Queue::new(&tasks, &mut passed);
         queue.work(|_| Ok(1));
