@@ -32,7 +32,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use bp_core::{BAND_ROWS, Error, Patch, Plan, Seam, Side, memory};
+use bp_core::{Error, Patch, Plan, Seam, Side, memory};
 use fearless_simd::Level;
 
 pub(crate) use costs::CostSource;
@@ -116,8 +116,7 @@ pub(crate) struct Sweep<'a> {
 impl Sweep<'_> {
     /// The rows of a band.
     fn band_rows(&self, index: usize) -> Range<usize> {
-        let first = index * BAND_ROWS;
-        first..self.layout.size.height.min(first + BAND_ROWS)
+        room::band_rows(self.layout.size.height, index)
     }
 
     /// Prepares a seam.

@@ -18,7 +18,12 @@ pub(super) fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
 /// The rows of the bands of a grid.
 pub(super) fn bands(plan: &Plan, grid: usize) -> impl ExactSizeIterator<Item = Range<usize>> + use<> {
     let height = plan.size(grid).height;
-    (0..height.div_ceil(BAND_ROWS)).map(move |band| BAND_ROWS * band..height.min(BAND_ROWS * (band + 1)))
+    (0..height.div_ceil(BAND_ROWS)).map(move |band| band_rows(height, band))
+}
+
+/// The rows of a band of a grid with this many rows.
+pub(super) fn band_rows(height: usize, band: usize) -> Range<usize> {
+    BAND_ROWS * band..height.min(BAND_ROWS * (band + 1))
 }
 
 /// The grids that are swept.

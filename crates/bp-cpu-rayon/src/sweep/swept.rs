@@ -15,7 +15,7 @@ use super::{
     kept::Kept,
     made::Made,
     pass::gaps,
-    room::{self, Room, most_entries},
+    room::{self, Room, band_rows, most_entries},
     seams::Prepared,
     tasks::{self, Part, Passed, Queue, Task},
 };
@@ -73,10 +73,7 @@ impl Swept {
         let queue = Queue::new(tasks::of_grids(&self.tasks, grids), passed);
         // No more threads than windows, so that none waits for one.
         (0..self.windows.len()).into_par_iter().with_max_len(1).for_each(|_| {
-            queue.work(|task| {
-                self.run_task(&grid(task.grid), task.part, &room)?;
-                Ok(share(plan, task))
-            });
+            queue.work(|task| self.run_task(&grid(task.grid), task.part, &room));
         });
         let result = queue.result();
         let [patches, _] = most_entries(plan, 0);
@@ -110,8 +107,7 @@ impl Swept {
         let wait = |seam: Option<&'a Made<Prepared>>| seam.map(Made::wait).transpose();
         let beside =
             Beside { above: wait(index.checked_sub(1).map(|above| &seams[above]))?, below: wait(seams.get(index))? };
-        let first = index * BAND_ROWS;
-        let rows = first..grid.plan.size(grid.index).height.min(first + BAND_ROWS);
+        let rows = band_rows(grid.plan.size(grid.index).height, index);
         Ok((self.sweep(grid, rows, room)?, beside))
     }
 
@@ -165,16 +161,5 @@ impl Swept {
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         self.windows.bytes() + self.grids.iter().map(Kept::bytes).sum::<u64>()
-    }
-}
-
-/// A task's share of the message entries of its grid: that of a band's rows. Seams have none of their own.
-fn share(plan: &Plan, task: Task) -> u64 {
-    match task.part {
-        Part::Seam(_) => 0,
-        Part::Band(index) => {
-            let height = plan.size(task.grid).height;
-            plan.grid_updates(task.grid) / height as u64 * BAND_ROWS.min(height - index * BAND_ROWS) as u64
-        }
     }
 }

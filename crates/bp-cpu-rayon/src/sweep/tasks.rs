@@ -19,6 +19,8 @@ use bp_core::{BAND_ROWS, Error, Plan, Seam};
 pub(super) struct Task {
     pub(super) grid: usize,
     pub(super) part: Part,
+    /// Its share of the message entries of its grid: that of a band's rows. Seams have none of their own.
+    pub(super) updates: u64,
 }
 
 /// The band or seam of this index.
@@ -34,10 +36,15 @@ pub(super) fn all(plan: &Plan, ahead: usize) -> impl Iterator<Item = Task> + use
     (0..plan.grids()).rev().flat_map(move |grid| {
         let height = plan.size(grid).height;
         let (bands, seams) = (height.div_ceil(BAND_ROWS), Seam::all(height).len());
+        let updates_a_row = plan.grid_updates(grid) / height as u64;
+        let updates = move |part: Part| match part {
+            Part::Seam(_) => 0,
+            Part::Band(index) => updates_a_row * BAND_ROWS.min(height - index * BAND_ROWS) as u64,
+        };
         (0..bands + ahead).flat_map(move |step| {
             let seam = (step < seams).then_some(Part::Seam(step));
             let band = step.checked_sub(ahead).map(Part::Band);
-            [seam, band].into_iter().flatten().map(move |part| Task { grid, part })
+            [seam, band].into_iter().flatten().map(move |part| Task { grid, part, updates: updates(part) })
         })
     })
 }
@@ -73,12 +80,12 @@ impl<'a> Queue<'a> {
         }
     }
 
-    /// Takes tasks until there are no more, or one failed. `run` returns how much a task was.
-    pub(super) fn work(&self, run: impl Fn(Task) -> Result<u64, Error>) {
+    /// Takes tasks until there are no more, or one failed.
+    pub(super) fn work(&self, run: impl Fn(Task) -> Result<(), Error>) {
         while !self.has_failed.load(Ordering::Relaxed) {
             let Some(&task) = self.tasks.get(self.next.fetch_add(1, Ordering::Relaxed)) else { break };
             match run(task) {
-                Ok(done) => self.report(done),
+                Ok(()) => self.report(task.updates),
                 Err(error) => self.fail(error),
             }
         }
@@ -136,7 +143,7 @@ mod tests {
         assert_eq!(of_grids(&tasks, 0..1), &tasks[3..]);
         // Also where seams are only a little ahead, no task comes before those that it waits for.
         let tasks: Vec<_> = all(&plan, 1).collect();
-        let at = |part| tasks.iter().position(|&task| task == Task { grid: 0, part });
+        let at = |part| tasks.iter().position(|task| (task.grid, task.part) == (0, part));
         assert!((0..3).all(|seam| at(Part::Seam(seam)) < at(Part::Band(seam))));
     }
 
@@ -150,11 +157,13 @@ mod tests {
             ControlFlow::Continue(())
         };
         let queue = Queue::new(&tasks, &mut passed);
-        let run = |task: Task| if task.part == Part::Band(1) { Err(Error::Plan("no")) } else { Ok(5) };
+        let run = |task: Task| if task.part == Part::Band(1) { Err(Error::Plan("no")) } else { Ok(()) };
         queue.work(run);
         queue.fail(Error::Stopped);
         assert_eq!(queue.result(), Err(Error::Plan("no")));
-        assert_eq!(seen, [5, 10, 15, 20]);
+        // Two seams, the first band, and the third seam. A band's share is that of its rows.
+        let band = plan.grid_updates(0) / 97 * 32;
+        assert_eq!(seen, [0, 0, band, band]);
         // A task that waited for another may end before the one that failed.
         let mut passed = |_| ControlFlow::Continue(());
         let queue = Queue::new(&tasks, &mut passed);
@@ -162,7 +171,7 @@ mod tests {
         assert_eq!(queue.result(), Err(Error::Plan("no")));
         let mut passed = |_| ControlFlow::Break(());
         let queue = Queue::new(&tasks, &mut passed);
-        queue.work(|_| Ok(1));
+        queue.work(|_| Ok(()));
         assert_eq!(queue.result(), Err(Error::Stopped));
     }
 }
