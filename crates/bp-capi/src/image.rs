@@ -90,19 +90,27 @@ impl BpstereoImage {
     /// That of [`Self::copied`].
     unsafe fn converted<T: Copy>(&self, name: &str, stored: impl Fn(T) -> u8) -> Result<Image, Failure> {
         let (size, rows) = (self.size(name)?, self.rows::<T>(name)?);
-        let mut pixels = Vec::new();
         let no_room = |_| Failure(BpstereoStatus::Memory, format!("{name}: no memory for {size} pixels"));
-        pixels.try_reserve_exact(size.pixels()).map_err(no_room)?;
+        let (mut greys, mut colours) = (Vec::new(), Vec::new());
+        if self.channels == 3 {
+            colours.try_reserve_exact(size.pixels()).map_err(no_room)?;
+        } else {
+            greys.try_reserve_exact(size.pixels()).map_err(no_room)?;
+        }
         for y in 0..size.height {
             // SAFETY: the caller's promise.
             let mut values = unsafe { rows.read(y) }.map(&stored);
-            let mut next = || values.next().unwrap_or_default();
             if self.channels == 3 {
-                pixels.extend((0..size.width).map(|_| [next(), next(), next()]));
+                let mut next = || values.next().unwrap_or_default();
+                colours.extend((0..size.width).map(|_| [next(), next(), next()]));
             } else {
-                pixels.extend((0..size.width).map(|_| [next(); 3]));
+                greys.extend(values);
             }
         }
-        Ok(Image::from_rgb(size.width, size.height, pixels)?)
+        Ok(if self.channels == 3 {
+            Image::from_rgb(size.width, size.height, colours)?
+        } else {
+            Image::from_grey(size.width, size.height, greys)?
+        })
     }
 }

@@ -70,7 +70,7 @@ fn computed(
 #[test]
 fn every_type_and_stride_gives_the_librarys_map() {
     let [left, right] = [view(0), view(3)];
-    let [one, other] = [&left, &right].map(|grey| Image::from_grey(WIDTH, HEIGHT, grey).unwrap());
+    let [one, other] = [&left, &right].map(|grey| Image::from_grey(WIDTH, HEIGHT, grey.clone()).unwrap());
     let expected = Matcher::new(&Options::default().with_labels(16)).unwrap().compute(&one, &other).unwrap().map;
     let same = |map: &[f32], stride: usize| {
         let rows = map.chunks_exact(stride).zip(expected.values().chunks_exact(WIDTH));

@@ -1,10 +1,10 @@
 //! The census transform (Zabih and Woodfill 1994) and the match that it finds for the image's centre.
 
-use std::ops::Range;
+use std::{array, ops::Range};
 
 use fearless_simd::{Level, Simd, dispatch};
 
-use crate::{Image, Model, Node, Plan, StereoPair, image::grey};
+use crate::{Image, Model, Node, Plan, StereoPair};
 
 /// Half the length of the strip that is compared around the centre: the "length scan" of the thesis.
 const HALF_LENGTH: usize = 10;
@@ -36,7 +36,7 @@ impl Seed {
 /// If (x, y) lies outside the image.
 #[must_use]
 pub fn code(image: &Image, x: usize, y: usize) -> u8 {
-    compare(image, (x, y), &INNER, grey)
+    compare((x, y), &INNER, |x, y| image.grey_near(x, y))
 }
 
 /// The columns and rows of the neighbours that a code compares, relative to the pixel, from the highest bit to the lowest.
@@ -69,7 +69,7 @@ pub(crate) fn write_codes<const TABLES: usize>(
     ));
 }
 
-/// Computes each grey value once, in runs of columns from top to bottom.
+/// Reads each grey value once, in runs of columns from top to bottom.
 #[inline(always)]
 fn write_codes_in_runs<const TABLES: usize>(
     image: &Image,
@@ -80,7 +80,7 @@ fn write_codes_in_runs<const TABLES: usize>(
 ) {
     let width = columns.len();
     for (x, first) in columns.zip(0..).step_by(COLUMNS) {
-        let greys = |y: isize| greys_around(image.row_near(y), x);
+        let greys = |y: isize| greys_around(image.greys_near(y), x);
         // The rows around row y lie at (y + dy) mod 16.
         let mut around = [[0; AROUND]; 16];
         let place = |y: isize| (y & 15) as usize;
@@ -107,17 +107,9 @@ fn write_codes_in_runs<const TABLES: usize>(
 
 /// The grey values of [`COLUMNS`] pixels of a row from column x on, and those around. Border columns are repeated outward.
 #[inline(always)]
-fn greys_around(row: &[[u8; 3]], x: usize) -> [u8; AROUND] {
-    let mut greys = [0; AROUND];
-    let inside = x.checked_sub(REACH).and_then(|first| row.get(first..first + AROUND));
-    // A loop takes vectors, `map` of an array does not.
-    if let Some(pixels) = inside {
-        greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel));
-    } else {
-        let column = |i: usize| (x + i).saturating_sub(REACH).min(row.len() - 1);
-        greys.iter_mut().enumerate().for_each(|(i, out)| *out = grey(row[column(i)]));
-    }
-    greys
+fn greys_around(row: &[u8], x: usize) -> [u8; AROUND] {
+    let inside = x.checked_sub(REACH).and_then(|first| row[first..].first_chunk());
+    inside.copied().unwrap_or_else(|| array::from_fn(|i| row[(x + i).saturating_sub(REACH).min(row.len() - 1)]))
 }
 
 /// The codes of [`code`] of the pixels at `columns` and `rows`, `[rows][columns]`.
@@ -133,7 +125,7 @@ pub(crate) fn codes(image: &Image, columns: Range<usize>, rows: Range<usize>) ->
 /// If (x, y) lies outside the image, or `channel` is above 2.
 #[must_use]
 pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 {
-    compare(image, (x, y), &INNER, |colour| colour[channel])
+    compare((x, y), &INNER, |x, y| image.rgb_near(x, y)[channel])
 }
 
 /// The census code of the eight neighbours two and four pixels away, left and right, above and below: in row order, from the
@@ -143,18 +135,14 @@ pub fn code_of_channel(image: &Image, x: usize, y: usize, channel: usize) -> u8 
 /// If (x, y) lies outside the image.
 #[must_use]
 pub fn outer_code(image: &Image, x: usize, y: usize) -> u8 {
-    compare(image, (x, y), &OUTER, grey)
+    compare((x, y), &OUTER, |x, y| image.grey_near(x, y))
 }
 
-/// One bit for each neighbour. `value` converts colours to the values compared.
-fn compare(image: &Image, (x, y): (usize, usize), neighbours: &Neighbours, value: impl Fn([u8; 3]) -> u8) -> u8 {
-    let centre = value(image.rgb(x, y));
-    let last = image.size().width as isize - 1;
-    let brighter = |&(dx, dy): &(isize, isize)| {
-        let row = image.row_near(y as isize + dy);
-        value(row[(x as isize + dx).clamp(0, last) as usize]) > centre
-    };
-    neighbours.iter().fold(0, |code, neighbour| code << 1 | u8::from(brighter(neighbour)))
+/// One bit for each neighbour of (x, y). `value` is that of a pixel, which may lie outside the image.
+fn compare((x, y): (usize, usize), neighbours: &Neighbours, value: impl Fn(isize, isize) -> u8) -> u8 {
+    let (x, y) = (x as isize, y as isize);
+    let centre = value(x, y);
+    neighbours.iter().fold(0, |code, &(dx, dy)| code << 1 | u8::from(value(x + dx, y + dy) > centre))
 }
 
 /// The match of a left pixel: the label whose strip of 21x3 census codes differs least. The strip is shortened at the border
@@ -201,7 +189,7 @@ mod tests {
     fn shifted_pair(width: usize, height: usize, shift: usize) -> StereoPair {
         let view = |offset: usize| {
             let pixel = |i| noise(i % width + offset, i / width);
-            Image::from_grey(width, height, &(0..width * height).map(pixel).collect::<Vec<_>>()).unwrap()
+            Image::from_grey(width, height, (0..width * height).map(pixel).collect::<Vec<_>>()).unwrap()
         };
         StereoPair::new(view(0), view(shift)).unwrap()
     }
@@ -217,7 +205,7 @@ mod tests {
     #[test]
     fn codes_of_many_pixels_are_those_of_single_ones() {
         let pixels: Vec<u8> = (0..1000).map(|i| (i * i * 29 % 50) as u8).collect();
-        let image = Image::from_grey(200, 5, &pixels).unwrap();
+        let image = Image::from_grey(200, 5, pixels).unwrap();
         for (columns, rows) in [(0..200, 0..5), (2..5, 1..3), (70..198, 0..2), (199..200, 4..5)] {
             let singly = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
             let singly: Vec<u8> = singly.map(|(x, y)| code(&image, x, y)).collect();

@@ -66,7 +66,7 @@ impl DataCost {
             match &mut self.planes {
                 Planes::Thesis(planes) => fill(&mut planes[side], view, |image, x, y| image.grey(x, y)),
                 Planes::Census(planes) => write_codes(view, [&census::INNER], &mut planes[side]),
-                Planes::Mrf(planes) => planes[side].copy_from_slice(view.pixels()),
+                Planes::Mrf(planes) => planes[side].copy_from_slice(&view.pixels()),
                 Planes::Gradient(planes) => fill(&mut planes[side], view, features::gradient),
                 Planes::BirchfieldTomasi(planes) => fill(&mut planes[side], view, features::half_samples),
                 Planes::Census16(planes) => write_codes(view, [&census::INNER, &census::OUTER], &mut planes[side]),

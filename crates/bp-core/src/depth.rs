@@ -107,10 +107,9 @@ pub fn points(
     if image.size() != size {
         return Err(Error::WrongSize { what: "the image", found: image.size(), expected: size });
     }
-    let pixels = map.values().iter().zip(image.pixels()).enumerate();
-    Ok(pixels.filter_map(move |(index, (&disparity, &colour))| {
-        let depth = calibration.depth(disparity)?;
-        Some(Point { position: calibration.position(index % size.width, index / size.width, depth), colour })
+    Ok(map.values().iter().enumerate().filter_map(move |(index, &disparity)| {
+        let (depth, [x, y]) = (calibration.depth(disparity)?, [index % size.width, index / size.width]);
+        Some(Point { position: calibration.position(x, y, depth), colour: image.rgb(x, y) })
     }))
 }
 

@@ -5,16 +5,16 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{
-    DataCost, EdgeLevels, Error, Image, Model, Size, StereoPair,
-    image::{APRON, grey},
-};
+use crate::{DataCost, EdgeLevels, Error, Model, Size, StereoPair, image::APRON};
 
 /// Rows that one thread adds up. Only their features are held.
 const ROWS: usize = 32;
 
 /// The most bytes that a profile compares for each pixel.
 const MOST_FEATURES: usize = 4;
+
+/// The most bytes of a pixel: three channels and its grey value.
+const MOST_BYTES: usize = 4;
 
 /// The energy of a labelling in the units of its profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Energy {
     #[must_use]
     pub fn temporary_bytes(size: Size, threads: usize) -> u64 {
         let (rows, known) = (size.height.min(ROWS), size.height.min(ROWS + 2 * APRON));
-        let a_column = 2 * (3 * known + MOST_FEATURES * rows) + 2;
+        let a_column = 2 * (MOST_BYTES * known + MOST_FEATURES * rows);
         size.height.div_ceil(ROWS).min(threads) as u64 * (a_column * size.width) as u64
     }
 
@@ -59,16 +59,15 @@ impl Energy {
         let cost = DataCost::of_pair(&pair.strip(rows.clone()), *model)?;
         let (edges, level) = (model.edges(), Level::new());
         let labels_of = |y: usize| &labels[y * size.width..][..size.width];
+        let greys_of = |y: usize| &pair.left().greys()[y * size.width..][..size.width];
         let mut energy = Self::default();
-        let mut greys = greys(pair.left(), rows.start);
         for (row, y) in rows.enumerate() {
             let labels = labels_of(y);
             energy.data += cost.of_row(row, labels);
-            energy.smoothness += smoothness(level, edges, [labels, &labels[1..]], [&greys, &greys[1..]]);
+            let greys = greys_of(y);
+            energy.smoothness += smoothness(level, edges, [labels, &labels[1..]], [greys, &greys[1..]]);
             if y + 1 < size.height {
-                let below = self::greys(pair.left(), y + 1);
-                energy.smoothness += smoothness(level, edges, [labels, labels_of(y + 1)], [&greys, &below]);
-                greys = below;
+                energy.smoothness += smoothness(level, edges, [labels, labels_of(y + 1)], [greys, greys_of(y + 1)]);
             }
         }
         Ok(energy)
@@ -79,11 +78,6 @@ impl Energy {
     pub fn total(&self) -> u64 {
         self.data + self.smoothness
     }
-}
-
-/// The grey values of a row.
-fn greys(image: &Image, y: usize) -> Vec<u8> {
-    image.row_near(y as isize).iter().copied().map(grey).collect()
 }
 
 /// The smoothness costs of the edges between nodes and as many neighbours.

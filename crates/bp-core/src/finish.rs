@@ -99,7 +99,7 @@ mod tests {
 
     /// A pair of blank images.
     fn pair(width: usize) -> StereoPair {
-        let image = || Image::from_grey(width, 1, &vec![0; width]).unwrap();
+        let image = || Image::from_grey(width, 1, vec![0; width]).unwrap();
         StereoPair::new(image(), image()).unwrap()
     }
 

@@ -1,8 +1,11 @@
 //! Images and rectified stereo pairs.
 
-use std::{ops::Range, sync::Arc};
+use std::{borrow::Cow, ops::Range, sync::Arc};
 
-use crate::{Error, Size, limits::MAX_SIDE, memory};
+use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
+
+use crate::{Error, Profile, Size, limits::MAX_SIDE, memory};
 
 /// The most rows of an apron (see [`Image::strip`]): no data cost reads rows further up or down.
 pub const APRON: usize = 4;
@@ -24,47 +27,63 @@ impl Size {
     }
 }
 
-/// An image of 8-bit colours, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
+/// An image of 8-bit values, grey or colour, `[height][width]`, rows from top to bottom. A grey image has three equal channels.
 ///
 /// A strip of a larger image may have an *apron*: up to [`APRON`] rows of the larger image above and below it. These
 /// rows are not part of the strip, but data costs that read neighbouring rows use them.
-#[derive(Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub struct Image {
     size: Size,
     /// The rows of the apron above and below the image.
     above: usize,
     below: usize,
-    /// Colours `[above + height + below][width]`. Clones share them.
-    pixels: Arc<Vec<[u8; 3]>>,
+    /// Grey values `[above + height + below][width]`. Clones share them.
+    greys: Arc<Vec<u8>>,
+    /// Colours, in the same order; `None` if all pixels are grey.
+    colours: Option<Arc<Vec<[u8; 3]>>>,
 }
 
 impl Image {
     /// An image from its colours, `[height][width]`.
     ///
     /// # Errors
-    /// As [`Size::new`]; [`Error::PixelCount`] if `pixels` does not hold `width * height` colours.
+    /// As [`Size::new`]; [`Error::PixelCount`] if `pixels` does not hold `width * height` colours, [`Error::OutOfMemory`].
     pub fn from_rgb(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Result<Self, Error> {
         let size = Size::new(width, height)?;
         if pixels.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: pixels.len() });
         }
-        Ok(Self { size, above: 0, below: 0, pixels: pixels.into() })
+        let mut greys = memory::filled("grey values", pixels.len(), 0)?;
+        let parts = greys.par_chunks_mut(TOGETHER).zip(pixels.par_chunks(TOGETHER));
+        let is_grey = parts.map(|(greys, pixels)| write_greys(pixels, greys)).reduce(|| true, |a, b| a && b);
+        let colours = (!is_grey).then(|| pixels.into());
+        Ok(Self { size, above: 0, below: 0, greys: greys.into(), colours })
     }
 
     /// An image from grey values, `[height][width]`.
     ///
     /// # Errors
     /// As [`Image::from_rgb`].
-    pub fn from_grey(width: usize, height: usize, pixels: &[u8]) -> Result<Self, Error> {
-        Self::from_rgb(width, height, pixels.iter().map(|&v| [v; 3]).collect())
+    pub fn from_grey(width: usize, height: usize, values: impl Into<Vec<u8>>) -> Result<Self, Error> {
+        let (size, greys) = (Size::new(width, height)?, values.into());
+        if greys.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: greys.len() });
+        }
+        Ok(Self { size, above: 0, below: 0, greys: greys.into(), colours: None })
     }
 
     /// The image mirrored left to right.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let mut pixels = self.pixels.to_vec();
-        pixels.chunks_exact_mut(self.size.width).for_each(<[_]>::reverse);
-        Self { pixels: pixels.into(), ..*self }
+        let width = self.size.width;
+        let colours = self.colours.as_ref().map(|colours| mirrored(width, colours).into());
+        Self { greys: mirrored(width, &self.greys).into(), colours, ..*self }
+    }
+
+    /// The image in grey.
+    #[must_use]
+    pub fn without_colours(&self) -> Self {
+        Self { greys: Arc::clone(&self.greys), colours: None, ..*self }
     }
 
     /// Width and height.
@@ -73,32 +92,71 @@ impl Image {
         self.size
     }
 
-    /// Whether all pixels are grey.
+    /// The bytes held, which clones share.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        memory::bytes(&self.greys) + self.colours.as_ref().map_or(0, |colours| memory::bytes(colours))
+    }
+
+    /// Whether the image has no colours.
     #[must_use]
     pub fn is_grey(&self) -> bool {
-        self.pixels().iter().all(|&[red, green, blue]| red == green && green == blue)
+        self.colours.is_none()
     }
 
-    /// All colours, `[height][width]`, without those of an apron.
+    /// All grey values, `[height][width]`, without those of an apron.
     #[must_use]
-    pub fn pixels(&self) -> &[[u8; 3]] {
-        &self.pixels[self.above * self.size.width..][..self.size.pixels()]
+    pub fn greys(&self) -> &[u8] {
+        &self.greys[self.above * self.size.width..][..self.size.pixels()]
     }
 
-    /// The colours of row `y`, `[width]`. Outside the image they come from the apron, and beyond the apron from the
+    /// All colours, `[height][width]`, without those of an apron; `None` if all pixels are grey.
+    #[must_use]
+    pub fn colours(&self) -> Option<&[[u8; 3]]> {
+        let colours = self.colours.as_ref()?;
+        Some(&colours[self.above * self.size.width..][..self.size.pixels()])
+    }
+
+    /// The channels of all pixels, `[height][width]`, without those of an apron.
+    #[must_use]
+    pub fn pixels(&self) -> Cow<'_, [[u8; 3]]> {
+        self.colours().map_or_else(|| self.greys().iter().map(|&grey| [grey; 3]).collect(), Cow::from)
+    }
+
+    /// The grey values of row `y`, `[width]`. Outside the image they come from the apron, and beyond the apron from the
     /// last row in that direction.
     #[must_use]
-    pub fn row_near(&self, y: isize) -> &[[u8; 3]] {
+    pub fn greys_near(&self, y: isize) -> &[u8] {
+        &self.greys[self.row_near(y)]
+    }
+
+    /// As [`Image::greys_near`], the colours; `None` if all pixels are grey.
+    #[must_use]
+    pub fn colours_near(&self, y: isize) -> Option<&[[u8; 3]]> {
+        self.colours.as_ref().map(|colours| &colours[self.row_near(y)])
+    }
+
+    fn row_near(&self, y: isize) -> Range<usize> {
         let last = self.above + self.size.height + self.below - 1;
         let row = y.saturating_add_unsigned(self.above).clamp(0, last as isize) as usize;
-        &self.pixels[row * self.size.width..][..self.size.width]
+        row * self.size.width..(row + 1) * self.size.width
     }
 
     /// The grey value at column `x`, row `y`. Outside the image, border columns repeat, and rows come from
-    /// [`Image::row_near`].
+    /// [`Image::greys_near`].
     #[must_use]
     pub fn grey_near(&self, x: isize, y: isize) -> u8 {
-        grey(self.row_near(y)[x.clamp(0, self.size.width as isize - 1) as usize])
+        self.greys_near(y)[self.column_near(x)]
+    }
+
+    /// As [`Image::grey_near`], the channels.
+    #[must_use]
+    pub fn rgb_near(&self, x: isize, y: isize) -> [u8; 3] {
+        self.colours_near(y).map_or_else(|| [self.grey_near(x, y); 3], |row| row[self.column_near(x)])
+    }
+
+    fn column_near(&self, x: isize) -> usize {
+        x.clamp(0, self.size.width as isize - 1) as usize
     }
 
     /// Copies some rows to a new image; see [`Image::part`].
@@ -127,20 +185,22 @@ impl Image {
         let (above, below) = (rows.start + self.above, height - rows.end + self.below);
         let (above, below) = (above.min(APRON), below.min(APRON));
         let known = rows.start + self.above - above..rows.end + self.above + below;
-        let mut pixels = Vec::with_capacity(known.len() * columns.len());
-        memory::ask_for_large_pages(pixels.spare_capacity_mut());
-        let known = self.pixels[known.start * width..known.end * width].chunks_exact(width);
-        known.for_each(|row| pixels.extend_from_slice(&row[columns.clone()]));
-        Self { size: Size { width: columns.len(), height: rows.len() }, above, below, pixels: pixels.into() }
+        Self {
+            size: Size { width: columns.len(), height: rows.len() },
+            above,
+            below,
+            greys: part_of(&self.greys, width, &columns, &known).into(),
+            colours: self.colours.as_ref().map(|colours| part_of(colours, width, &columns, &known).into()),
+        }
     }
 
-    /// The colour at column `x`, row `y`.
+    /// The channels at column `x`, row `y`.
     ///
     /// # Panics
     /// If (x, y) lies outside the image.
     #[must_use]
     pub fn rgb(&self, x: usize, y: usize) -> [u8; 3] {
-        self.pixels()[y * self.size.width + x]
+        self.colours().map_or_else(|| [self.grey(x, y); 3], |colours| colours[y * self.size.width + x])
     }
 
     /// The grey value at column `x`, row `y`.
@@ -148,9 +208,58 @@ impl Image {
     /// # Panics
     /// If (x, y) lies outside the image.
     #[must_use]
+    #[inline]
     pub fn grey(&self, x: usize, y: usize) -> u8 {
-        grey(self.rgb(x, y))
+        self.greys()[y * self.size.width + x]
     }
+}
+
+/// Images are equal if their pixels and aprons are.
+impl PartialEq for Image {
+    fn eq(&self, other: &Self) -> bool {
+        let shape = |image: &Self| (image.size, image.above, image.below);
+        // A part of a coloured image may be grey, and still hold colours.
+        let rows = -(self.above as isize)..(self.size.height + self.below) as isize;
+        let is_same = |y: isize| (0..self.size.width as isize).all(|x| self.rgb_near(x, y) == other.rgb_near(x, y));
+        shape(self) == shape(other)
+            && self.greys == other.greys
+            && (self.is_grey() && other.is_grey() || self.colours == other.colours || rows.into_iter().all(is_same))
+    }
+}
+
+impl Eq for Image {}
+
+/// Pixels whose grey values one thread computes together.
+const TOGETHER: usize = 1 << 16;
+
+/// Writes the grey values of colours, and returns whether these are grey.
+fn write_greys(pixels: &[[u8; 3]], greys: &mut [u8]) -> bool {
+    dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut differing = 0;
+            for (out, &[red, green, blue]) in greys.iter_mut().zip(pixels) {
+                *out = grey([red, green, blue]);
+                differing |= (red ^ green) | (green ^ blue);
+            }
+            differing == 0
+        },
+    ))
+}
+
+fn mirrored<T: Copy>(width: usize, values: &[T]) -> Vec<T> {
+    let mut mirrored = values.to_vec();
+    mirrored.chunks_exact_mut(width).for_each(<[_]>::reverse);
+    mirrored
+}
+
+/// Some columns and rows of values in rows of this width.
+fn part_of<T: Copy>(values: &[T], width: usize, columns: &Range<usize>, rows: &Range<usize>) -> Vec<T> {
+    let mut part = Vec::with_capacity(rows.len() * columns.len());
+    memory::ask_for_large_pages(part.spare_capacity_mut());
+    let rows = values[rows.start * width..rows.end * width].chunks_exact(width);
+    rows.for_each(|row| part.extend_from_slice(&row[columns.clone()]));
+    part
 }
 
 impl std::fmt::Debug for Image {
@@ -233,10 +342,23 @@ impl StereoPair {
         Self { left, right }
     }
 
+    /// What a profile compares of the pair: its colours, or grey values only.
+    #[must_use]
+    pub fn compared_by(&self, profile: Profile) -> Self {
+        let of = |image: &Image| if profile.compares_colours() { image.clone() } else { image.without_colours() };
+        Self { left: of(&self.left), right: of(&self.right) }
+    }
+
     /// The size of both images.
     #[must_use]
     pub fn size(&self) -> Size {
         self.left.size()
+    }
+
+    /// The bytes held, which clones share.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.left.bytes() + self.right.bytes()
     }
 
     /// The left image, to which the disparity map belongs.
@@ -292,7 +414,7 @@ mod tests {
 
     /// Seven rows, each filled with its own index.
     fn rows() -> Image {
-        Image::from_grey(2, 7, &(0..14).map(|i| i / 2).collect::<Vec<_>>()).unwrap()
+        Image::from_grey(2, 7, (0..14).map(|i| i / 2).collect::<Vec<_>>()).unwrap()
     }
 
     #[test]
@@ -300,7 +422,7 @@ mod tests {
         let near = |image: &Image| (-6..8).map(|y| image.grey_near(0, y)).collect::<Vec<_>>();
         assert_eq!(near(&rows()), [0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 6]);
         let strip = rows().strip(5..6);
-        assert_eq!((strip.size().height, strip.pixels()), (1, [[5; 3]; 2].as_slice()));
+        assert_eq!((strip.size().height, strip.greys()), (1, [5; 2].as_slice()));
         assert_eq!(near(&strip), [1, 1, 1, 2, 3, 4, 5, 6, 6, 6, 6, 6, 6, 6]);
         // Rows beyond the apron are lost.
         assert_eq!(near(&rows().strip(0..2)), [0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 5, 5]);

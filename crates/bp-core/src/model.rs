@@ -65,6 +65,12 @@ impl Profile {
         }
     }
 
+    /// Whether it compares colours. The others compare grey values.
+    #[must_use]
+    pub fn compares_colours(self) -> bool {
+        matches!(self, Self::Mrf | Self::Census32)
+    }
+
     /// The largest data cost.
     #[must_use]
     pub fn max_cost(self) -> u16 {

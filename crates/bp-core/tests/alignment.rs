@@ -75,14 +75,14 @@ fn equal_rows_stay_within_a_tenth_of_a_pixel() {
 fn whole_rows_are_copied() {
     let (width, height) = (40, 9);
     let pixels: Vec<u8> = (0..width * height).map(|i| (i * i * 37 % 251) as u8).collect();
-    let image = || Image::from_grey(width, height, &pixels).unwrap();
+    let image = || Image::from_grey(width, height, pixels.as_slice()).unwrap();
     let pair = StereoPair::new(image(), image()).unwrap();
     let down = |rows: f64| Alignment::new(pair.size(), [rows, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
     let moved = |rows: f64| down(rows).aligned(&pair).unwrap().right().clone();
     assert_eq!(moved(0.0), image());
     for (rows, from) in [(2.0, [2, 3, 4, 5, 6, 7, 8, 8, 8]), (-1.0, [0, 0, 1, 2, 3, 4, 5, 6, 7]), (1e4, [8; 9])] {
-        let expected: Vec<_> = from.iter().flat_map(|&y| image().row_near(y).to_vec()).collect();
-        assert_eq!(moved(rows).pixels(), expected, "{rows} rows");
+        let expected: Vec<_> = from.iter().flat_map(|&y| image().greys_near(y).to_vec()).collect();
+        assert_eq!(moved(rows).greys(), expected, "{rows} rows");
     }
 }
 
@@ -92,10 +92,10 @@ fn too_few_points_give_nothing() {
     for (width, height) in [(1, 1), (7, 300), (300, 7), (200, 150)] {
         let image = |seed| {
             let pixels: Vec<u8> = (0..(width * height) as u32).map(|i| noise(seed, i)).collect();
-            Image::from_grey(width, height, &pixels).unwrap()
+            Image::from_grey(width, height, pixels).unwrap()
         };
         assert_eq!(find(&StereoPair::new(image(0x1234_5677), image(0x7654_321f)).unwrap()), None);
-        let blank = Image::from_grey(width, height, &vec![7; width * height]).unwrap();
+        let blank = Image::from_grey(width, height, vec![7; width * height]).unwrap();
         assert_eq!(find(&StereoPair::new(blank.clone(), blank).unwrap()), None);
     }
 }

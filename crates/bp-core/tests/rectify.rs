@@ -133,12 +133,12 @@ fn between(image: &Image, at: [f64; 2]) -> [u8; 3] {
 
 #[test]
 fn a_view_shows_nothing_black_or_everything() {
-    let white = Image::from_grey(SIZE.width, SIZE.height, &vec![255; SIZE.pixels()]).unwrap();
+    let white = Image::from_grey(SIZE.width, SIZE.height, vec![255; SIZE.pixels()]).unwrap();
     let black = |rig: &Rig, kept| {
         let rectifier = Rectifier::new(rig, Rectification::of(rig, kept).unwrap()).unwrap();
         let pair = rectifier.rectified(&white, &white).unwrap();
-        let all = pair.left().pixels().iter().chain(pair.right().pixels());
-        all.filter(|pixel| **pixel == [0; 3]).count() as f64 / (2 * SIZE.pixels()) as f64
+        let all = pair.left().greys().iter().chain(pair.right().greys());
+        all.filter(|&&grey| grey == 0).count() as f64 / (2 * SIZE.pixels()) as f64
     };
     for (rig, most) in rigs().into_iter().zip([0.01, 0.01, 0.1]) {
         // The view is chosen at some points of the border only; that of fisheyes cuts off corners.

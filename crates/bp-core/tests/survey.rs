@@ -16,7 +16,7 @@ fn noise(x: usize, y: usize) -> u8 {
 
 fn image(size: Size, pixel: impl Fn(usize, usize) -> u8) -> Image {
     let pixels: Vec<u8> = (0..size.pixels()).map(|i| pixel(i % size.width, i / size.width)).collect();
-    Image::from_grey(size.width, size.height, &pixels).unwrap()
+    Image::from_grey(size.width, size.height, pixels).unwrap()
 }
 
 /// Two views of a noisy plane, `disparity` pixels and `rows` rows apart.

@@ -3,7 +3,7 @@
 use bp_core::{
     Error, Image, Node, Plan, Profile, Size, StereoPair,
     census::{INNER, Neighbours, OUTER},
-    image::{APRON, grey},
+    image::APRON,
     memory,
 };
 use fearless_simd::{Level, Simd, dispatch};
@@ -121,17 +121,16 @@ fn padded_planes(profile: Profile) -> usize {
 fn pad_row<S: Simd>(simd: S, profile: Profile, image: &Image, index: usize, row: &mut [u8]) {
     let width = image.size().width;
     let (y, plane) = (index / padded_planes(profile), index % padded_planes(profile));
-    let pixels = image.row_near(y as isize - APRON as isize);
+    let y = y as isize - APRON as isize;
     let (before, rest) = row.split_at_mut(APRON);
     let (own, after) = rest.split_at_mut(width);
-    let values = own.iter_mut().zip(pixels);
-    simd.vectorize(
-        #[inline(always)]
-        || match profile {
-            Profile::Census32 if plane < 3 => values.for_each(|(out, pixel)| *out = pixel[plane]),
-            _ => values.for_each(|(out, &pixel)| *out = grey(pixel)),
-        },
-    );
+    match image.colours_near(y).filter(|_| profile == Profile::Census32 && plane < 3) {
+        Some(colours) => simd.vectorize(
+            #[inline(always)]
+            || own.iter_mut().zip(colours).for_each(|(out, pixel)| *out = pixel[plane]),
+        ),
+        None => own.copy_from_slice(image.greys_near(y)),
+    }
     before.fill(own[0]);
     after.fill(own[width - 1]);
 }
@@ -163,21 +162,24 @@ impl View<'_> {
     fn fill<S: Simd>(&self, simd: S, y: usize, rows: &mut [u8]) {
         let (lanes, offset) = (self.lanes, self.offset);
         let width = self.image.size().width;
-        let pixels = &self.image.pixels()[y * width..][..width];
+        let greys = &self.image.greys()[y * width..][..width];
+        let colours = self.image.colours().map(|colours| &colours[y * width..][..width]);
         for (channel, out) in rows.chunks_exact_mut(2 * lanes).enumerate() {
             let (even, odd) = out.split_at_mut(lanes);
             let (even, odd) = (&mut even[offset..][..width.div_ceil(2)], &mut odd[offset..][..width / 2]);
             simd.vectorize(
                 #[inline(always)]
                 || match self.profile {
-                    Profile::Thesis => {
-                        every_second(even, pixels, |&pixel| grey(pixel));
-                        every_second(odd, &pixels[1..], |&pixel| grey(pixel));
-                    }
-                    Profile::Mrf => {
-                        every_second(even, pixels, |pixel| pixel[channel]);
-                        every_second(odd, &pixels[1..], |pixel| pixel[channel]);
-                    }
+                    Profile::Thesis | Profile::Mrf => match colours.filter(|_| self.profile == Profile::Mrf) {
+                        Some(colours) => {
+                            every_second(even, colours, |pixel| pixel[channel]);
+                            every_second(odd, &colours[1..], |pixel| pixel[channel]);
+                        }
+                        None => {
+                            every_second(even, greys, |&grey| grey);
+                            every_second(odd, &greys[1..], |&grey| grey);
+                        }
+                    },
                     Profile::Census => deal(even, odd, |x, out| self.census(&INNER, 0, Node { x, y }, out)),
                     Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, Node { x, y }, out)),
                     Profile::BirchfieldTomasi => {

@@ -1,6 +1,6 @@
 //! The grey values of a grid. They determine the levels of edges; see [`bp_core::EdgeLevels`].
 
-use bp_core::{EdgeLevels, Error, Image, Model, Plan, image::grey, memory};
+use bp_core::{EdgeLevels, Error, Image, Model, Plan, memory};
 use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, dispatch, u8x16, u32x4};
 use rayon::prelude::*;
 
@@ -31,8 +31,8 @@ impl Greys {
         let rows = self.values.par_chunks_exact_mut(2 * stride(&shape)).with_min_len(MIN_ROWS).enumerate();
         rows.for_each(|(y, row)| {
             let [even, odd] = planes_mut(&shape, row);
-            let pixels = &image.pixels()[y * image.size().width + margin..][..shape.size.width];
-            dispatch!(level, simd => load_row(simd, pixels, even, odd));
+            let greys = &image.greys()[y * image.size().width + margin..][..shape.size.width];
+            dispatch!(level, simd => load_row(simd, greys, even, odd));
         });
     }
 
@@ -116,12 +116,12 @@ fn mean_of(children: [u8; 4]) -> u8 {
 
 /// Writes the grey values of a row to even and odd columns.
 #[inline(always)]
-fn load_row<S: Simd>(simd: S, pixels: &[[u8; 3]], even: &mut [u8], odd: &mut [u8]) {
+fn load_row<S: Simd>(simd: S, greys: &[u8], even: &mut [u8], odd: &mut [u8]) {
     simd.vectorize(
         #[inline(always)]
         || {
-            every_second(even, pixels, |&pixel| grey(pixel));
-            every_second(odd, &pixels[1..], |&pixel| grey(pixel));
+            every_second(even, greys, |&grey| grey);
+            every_second(odd, &greys[1..], |&grey| grey);
         },
     );
 }

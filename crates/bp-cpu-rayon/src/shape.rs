@@ -93,7 +93,7 @@ impl PlaneRow {
 
 /// Writes a value for every second pixel, starting with the first. These are the pixels of one plane.
 #[inline(always)]
-pub(crate) fn every_second(plane: &mut [u8], pixels: &[[u8; 3]], value: impl Fn(&[u8; 3]) -> u8) {
+pub(crate) fn every_second<T>(plane: &mut [u8], pixels: &[T], value: impl Fn(&T) -> u8) {
     plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
 }
 

@@ -223,8 +223,8 @@ proptest! {
         let pair = noise_pair(width, height, seed.into());
         let cut = Cut { seed_start: false, ..Cut::at_centre(pair.size()) };
         let inside = |node: usize| node % width < cut.x && node / width < cut.y;
-        let pixels = pair.left().pixels().iter().enumerate();
-        let changed = pixels.map(|(node, &pixel)| if inside(node) { pixel.map(|v| !v) } else { pixel }).collect();
+        let pixels = pair.left().pixels();
+        let changed = pixels.iter().enumerate().map(|(node, &pixel)| if inside(node) { pixel.map(|v| !v) } else { pixel }).collect();
         let left = Image::from_rgb(width, height, changed).unwrap();
         let other = StereoPair::new(left, pair.right().clone()).unwrap();
         for schedule in [Schedule::Checkerboard, Schedule::Sweep] {
@@ -242,7 +242,7 @@ fn a_shifted_random_dot_pair_gives_the_shift() {
     let dots = |x: usize, y: usize| if (x * x * 7 + x * y * 13 + y * 31 + x * 5) % 11 < 5 { 230 } else { 20 };
     let view = |shift: usize| {
         let pixels: Vec<u8> = (0..40 * 24).map(|i| dots(i % 40 + shift, i / 40)).collect();
-        Image::from_grey(40, 24, &pixels).unwrap()
+        Image::from_grey(40, 24, pixels).unwrap()
     };
     let pair = StereoPair::new(view(0), view(5)).unwrap();
     for (profile, algorithm) in Profile::ALL.into_iter().flat_map(|p| Algorithm::ALL.map(|a| (p, a))) {

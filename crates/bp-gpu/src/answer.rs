@@ -22,7 +22,12 @@ pub(crate) fn write_pair(pair: &StereoPair, seed: Option<Seed>, upload: &mut [u8
     let bytes = image_bytes(pair.size()) as usize;
     for (view, place) in [pair.left(), pair.right()].into_iter().zip(upload.chunks_mut(bytes)) {
         for (y, row) in (-(APRON as isize)..).zip(place.chunks_exact_mut(3 * view.size().width)) {
-            row.copy_from_slice(view.row_near(y).as_flattened());
+            match view.colours_near(y) {
+                Some(colours) => row.copy_from_slice(colours.as_flattened()),
+                None => {
+                    row.as_chunks_mut().0.iter_mut().zip(view.greys_near(y)).for_each(|(out, &grey)| *out = [grey; 3])
+                }
+            }
         }
     }
     let seed = seed.map_or([0; 4], |seed| [seed.x as u32, seed.y as u32, seed.label.into(), 1]);

@@ -60,7 +60,8 @@ fn decode_as(format: ImageFormat, path: &Path, bytes: &[u8], limit: Limits) -> R
         };
     let color = decoder.color_type();
     let value_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
-    check_memory(path, limit, file, &Decoded { pixels, total, value_bytes }, meanwhile)?;
+    let channels = if color.has_color() { 3 } else { 1 };
+    check_memory(path, limit, file, &Decoded { pixels, total, value_bytes, channels }, meanwhile)?;
     let mut decoding = image::Limits::no_limits();
     decoding.max_alloc = Some(2 * total + TILE);
     decoder.set_limits(decoding).map_err(undecoded)?;

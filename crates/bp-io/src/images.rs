@@ -1,6 +1,6 @@
 //! Reading images.
 
-use std::{borrow::Cow, path::Path};
+use std::path::Path;
 
 use bp_core::{Image, Size, image::narrow};
 use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
@@ -26,12 +26,11 @@ pub fn read_image(path: &Path, limit: Limits) -> Result<Image, Error> {
 /// [`Error::Write`].
 pub fn write_image(files: &Files, path: &Path, image: &Image) -> Result<(), Error> {
     let Size { width, height } = image.size();
-    let (bytes, kind) = if image.is_grey() {
-        (Cow::from(image.pixels().iter().map(|&[grey, ..]| grey).collect::<Vec<_>>()), ExtendedColorType::L8)
-    } else {
-        (Cow::from(image.pixels().as_flattened()), ExtendedColorType::Rgb8)
+    let (bytes, kind) = match image.colours() {
+        Some(colours) => (colours.as_flattened(), ExtendedColorType::Rgb8),
+        None => (image.greys(), ExtendedColorType::L8),
     };
-    files.whole(path, |file| PngEncoder::new(file).write_image(&bytes, width as u32, height as u32, kind))
+    files.whole(path, |file| PngEncoder::new(file).write_image(bytes, width as u32, height as u32, kind))
 }
 
 /// Parses an image in memory; messages call it `path`.
@@ -39,22 +38,26 @@ pub fn write_image(files: &Files, path: &Path, image: &Image) -> Result<(), Erro
 /// # Errors
 /// Those of [`read_image`].
 pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Error> {
-    let (size, pixels) = if pfm::is_pfm(bytes) {
-        let file = pfm::parse(path, bytes, limit)?;
-        (file.size, file.into_pixels(path)?)
-    } else {
-        let decoded = decoded(path, || decode(path, bytes, limit))?;
-        (size(path, &decoded)?, colours(decoded))
-    };
-    Image::from_rgb(size.width, size.height, pixels).map_err(|error| Error::reading(path, &error))
+    if pfm::is_pfm(bytes) {
+        return pfm::parse(path, bytes, limit)?.into_image(path);
+    }
+    let decoded = decoded(path, || decode(path, bytes, limit))?;
+    in_8_bits(decoded).map_err(|error| Error::reading(path, &error))
 }
 
-/// The colours, as 8-bit values.
-fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
-    if has_16_bits(&image) {
-        image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
-    } else {
-        image.into_rgb8().pixels().map(|pixel| pixel.0).collect()
+fn in_8_bits(image: DynamicImage) -> Result<Image, bp_core::Error> {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    match (has_16_bits(&image), image.color().has_color()) {
+        (true, true) => {
+            Image::from_rgb(width, height, image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect())
+        }
+        (true, false) => Image::from_grey(
+            width,
+            height,
+            image.into_luma16().into_iter().map(|&grey| narrow(grey)).collect::<Vec<_>>(),
+        ),
+        (false, true) => Image::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect()),
+        (false, false) => Image::from_grey(width, height, image.into_luma8().into_raw()),
     }
 }
 
@@ -108,7 +111,14 @@ pub(crate) fn stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<St
 /// SHA-256 of the decoded pixels, row by row, with one byte each for red, green and blue.
 #[must_use]
 pub fn pixels_sha256(image: &Image) -> String {
-    hex(&Sha256::digest(image.pixels().as_flattened()))
+    let mut hash = Sha256::new();
+    for y in 0..image.size().height as isize {
+        match image.colours_near(y) {
+            Some(colours) => hash.update(colours.as_flattened()),
+            None => hash.update(image.greys_near(y).iter().flat_map(|&grey| [grey; 3]).collect::<Vec<_>>()),
+        }
+    }
+    hex(&hash.finalize())
 }
 
 /// Bytes as hexadecimal digits.

@@ -3,7 +3,7 @@
 use std::{io::Write, path::Path};
 
 use bp_core::{
-    DisparityMap, Size,
+    DisparityMap, Image, Size,
     image::{factor_to_8_bits, scaled},
 };
 
@@ -59,8 +59,8 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Pfm, Err
         let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
         if order < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
-    // The file, its values and, of an image, their 8-bit colours.
-    limit.check_memory(path, (bytes.len() + needed + 3 * size.pixels()) as u64)?;
+    // The file, its values and, of an image, those in 8 bits.
+    limit.check_memory(path, (bytes.len() + needed + channels * size.pixels()) as u64)?;
     let rows = data.chunks_exact(4 * channels * size.width).rev();
     let mut values = Vec::with_capacity(channels * size.pixels());
     values.extend(rows.flat_map(|row| row.chunks_exact(4).map(value)));
@@ -89,16 +89,19 @@ impl Pfm {
         }
     }
 
-    /// The pixels of an image with values from 0 to 1 or from 0 to 255. If no value is above 1, all are multiplied by
-    /// 255.
-    pub(crate) fn into_pixels(self, path: &Path) -> Result<Vec<[u8; 3]>, Error> {
+    /// An image, from values from 0 to 1 or from 0 to 255. If no value is above 1, all are multiplied by 255.
+    pub(crate) fn into_image(self, path: &Path) -> Result<Image, Error> {
         let factor = factor_to_8_bits(self.values.iter().copied()).map_err(|wrong| {
             let is_map = if wrong.0 == DisparityMap::UNKNOWN { "; is it a disparity map?" } else { "" };
             Error::reading(path, &format!("{wrong}{is_map}"))
         })?;
-        let grey = self.channels == 1;
-        let pixel = |values: &[f32]| std::array::from_fn(|i| scaled(values[if grey { 0 } else { i }], factor));
-        Ok(self.values.chunks_exact(self.channels).map(pixel).collect())
+        let Size { width, height } = self.size;
+        let values = self.values.into_iter().map(|value| scaled(value, factor)).collect::<Vec<_>>();
+        let image = match self.channels {
+            1 => Image::from_grey(width, height, values),
+            _ => Image::from_rgb(width, height, values.as_chunks().0.to_vec()),
+        };
+        image.map_err(|error| Error::reading(path, &error))
     }
 }
 
@@ -153,7 +156,8 @@ mod tests {
     fn image_values_are_shares_of_white_or_8_bit_values() {
         let pixels = |values: [f32; 3], channels| {
             let size = Size { width: 3 / channels, height: 1 };
-            Pfm { size, channels, values: values.to_vec() }.into_pixels(Path::new("image.pfm"))
+            let image = Pfm { size, channels, values: values.to_vec() }.into_image(Path::new("image.pfm"))?;
+            Ok::<_, Error>(image.pixels().to_vec())
         };
         assert_eq!(pixels([0.0, 0.5, 1.0], 1).unwrap(), [[0; 3], [128; 3], [255; 3]]);
         assert_eq!(pixels([0.0, 127.6, 255.0], 3).unwrap(), [[0, 128, 255]]);

@@ -26,10 +26,12 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
     decoder.set_limits(Reserve { bytes: METADATA as usize + 8 * width as usize });
     let reader = decoder.read_info().map_err(undecoded)?;
     let file = bytes.len() as u64;
+    let (color, depth) = reader.output_color_type();
     let image = Decoded {
         pixels: u64::from(width) * u64::from(height),
         total: reader.output_buffer_size().map_or(u64::MAX, |bytes| bytes as u64),
-        value_bytes: if reader.output_color_type().1 == BitDepth::Sixteen { 2 } else { 1 },
+        value_bytes: if depth == BitDepth::Sixteen { 2 } else { 1 },
+        channels: if matches!(color, ColorType::Grayscale | ColorType::GrayscaleAlpha) { 1 } else { 3 },
     };
     let row = image.total.div_ceil(u64::from(height.max(1)));
     let meanwhile = ROWS.saturating_mul(row).saturating_add(2 * file.min(METADATA));

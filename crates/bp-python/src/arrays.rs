@@ -6,7 +6,7 @@ use bp_core::{
 };
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
-    ndarray::{ArrayViewD, Axis, Ix3},
+    ndarray::{ArrayViewD, Ix3},
 };
 use pyo3::{
     exceptions::{PyMemoryError, PyTypeError, PyValueError},
@@ -77,15 +77,40 @@ impl<'py> Pixels<'py> {
     }
 
     fn image(&self, factor: f32) -> PyResult<Image> {
-        let mut pixels = Vec::new();
-        let no_room = |_| PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size));
-        pixels.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
         match &self.values {
-            Values::Bytes(array) => colours(array, &mut pixels, |value| value),
-            Values::Words(array) => colours(array, &mut pixels, narrow),
-            Values::Floats(array) => colours(array, &mut pixels, |value| scaled(value, factor)),
-        }?;
-        let image = Image::from_rgb(self.size.width, self.size.height, pixels);
+            Values::Bytes(array) => self.converted(array, |value| value),
+            Values::Words(array) => self.converted(array, narrow),
+            Values::Floats(array) => self.converted(array, |value| scaled(value, factor)),
+        }
+    }
+
+    /// The image, with `stored` as the 8-bit value of each value.
+    fn converted<T: Element + Copy>(
+        &self,
+        array: &Bound<'_, PyArrayDyn<T>>,
+        stored: impl Fn(T) -> u8,
+    ) -> PyResult<Image> {
+        let Size { width, height } = self.size;
+        let array = array.try_readonly()?;
+        let (view, count) = (array.as_array(), self.size.pixels());
+        let no_room = |_| PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size));
+        let image = if let [_, _, 3] = view.shape() {
+            let mut colours = Vec::new();
+            colours.try_reserve_exact(count).map_err(no_room)?;
+            match view.as_slice() {
+                Some(values) => colours.extend(values.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored))),
+                None => strided(view, &mut colours, stored),
+            }
+            Image::from_rgb(width, height, colours)
+        } else {
+            let mut greys = Vec::new();
+            greys.try_reserve_exact(count).map_err(no_room)?;
+            match view.as_slice() {
+                Some(values) => greys.extend(values.iter().map(|&value| stored(value))),
+                None => greys.extend(view.iter().map(|&value| stored(value))),
+            }
+            Image::from_grey(width, height, greys)
+        };
         image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
     }
 }
@@ -104,31 +129,11 @@ fn array<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyU
     Ok(array.cast_into()?)
 }
 
-/// Adds the colours of all pixels, row by row.
-fn colours<T: Element + Copy>(
-    array: &Bound<'_, PyArrayDyn<T>>,
-    pixels: &mut Vec<[u8; 3]>,
-    stored: impl Fn(T) -> u8,
-) -> PyResult<()> {
-    let array = array.try_readonly()?;
-    let view = array.as_array();
-    match (view.as_slice(), view.shape()) {
-        (Some(values), [_, _, 3]) => {
-            pixels.extend(values.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored)))
-        }
-        (Some(values), _) => pixels.extend(values.iter().map(|&value| [stored(value); 3])),
-        (None, _) => strided(view, pixels, stored),
-    }
-    Ok(())
-}
-
 /// Adds the colours of an array whose values do not lie one after another.
-fn strided<T: Copy>(array: ArrayViewD<'_, T>, pixels: &mut Vec<[u8; 3]>, stored: impl Fn(T) -> u8) {
-    let array = if array.ndim() == 2 { array.insert_axis(Axis(2)) } else { array };
+fn strided<T: Copy>(array: ArrayViewD<'_, T>, colours: &mut Vec<[u8; 3]>, stored: impl Fn(T) -> u8) {
     let Ok(array) = array.into_dimensionality::<Ix3>() else { return };
-    let last = array.dim().2 - 1;
     for row in array.outer_iter() {
-        pixels.extend(row.outer_iter().map(|pixel| [0, 1, 2].map(|channel| stored(pixel[last.min(channel)]))));
+        colours.extend(row.outer_iter().map(|pixel| [0, 1, 2].map(|channel| stored(pixel[channel]))));
     }
 }
 

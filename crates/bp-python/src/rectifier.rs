@@ -135,6 +135,5 @@ fn bytes<'py>(py: Python<'py>, image: &Image, has_colours: bool) -> PyResult<Bou
             PyArray1::from_slice(py, image.pixels().as_flattened()).reshape([height, width, 3])?;
         return Ok(array.to_dyn().clone());
     }
-    let values: Vec<u8> = image.pixels().iter().map(|&[grey, ..]| grey).collect();
-    Ok(PyArray1::from_vec(py, values).reshape([height, width])?.to_dyn().clone())
+    Ok(PyArray1::from_slice(py, image.greys()).reshape([height, width])?.to_dyn().clone())
 }

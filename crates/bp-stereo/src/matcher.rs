@@ -1,7 +1,6 @@
 //! The matcher. It opens a device once, and prepares it again only if a pair needs a different plan.
 
 use std::{
-    borrow::Cow,
     fmt,
     sync::Arc,
     time::{Duration, Instant},
@@ -17,7 +16,7 @@ use crate::{
     Align, AnswerTimes, Beside, Ending, Error, Options, Tiles, Warning, Watch, description,
     devices::{self, Opened},
     finishing::{Finished, View, finished},
-    memory::{self, Fitted},
+    memory::{self, Fitted, Images},
     plan::{self, labels, quarter_of_width},
     system, warning,
     watch::ending,
@@ -35,8 +34,8 @@ pub struct Matcher {
 /// A tiled plan, prepared on the device.
 struct Prepared {
     tiled: Tiled,
-    /// Whether there is room for an aligned image.
-    is_aligned: bool,
+    /// What there is room for beside the tiles.
+    images: Images,
     /// Predicted peak memory of the program, in bytes.
     peak_bytes: u64,
 }
@@ -227,14 +226,13 @@ impl Matcher {
         let Planned { plan, alignment, warnings, time } = planned;
         // A different plan is freed before the new one is prepared.
         let applied = alignment.filter(|alignment| !alignment.is_negligible());
-        let is_aligned = applied.is_some();
-        let fits = |prepared: &Prepared| *prepared.tiled.plan() == plan && prepared.is_aligned == is_aligned;
+        let images = Images::of(pair, plan.model().profile(), applied.is_some());
+        let fits = |prepared: &Prepared| *prepared.tiled.plan() == plan && prepared.images == images;
         let before = prepared.take().filter(fits);
         let (ready, finished, energy) = pool.install(|| {
-            let mut ready =
-                before.map_or_else(|| Prepared::new(options, *beside, &plan, is_aligned, opened, watch), Ok)?;
+            let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, images, opened, watch), Ok)?;
             let begun = Instant::now();
-            let pair = aligned(pair, applied.as_ref())?;
+            let pair = aligned(pair.compared_by(plan.model().profile()), applied.as_ref())?;
             let planning = time + begun.elapsed();
             let mut finished = ready.solve(options, opened, &pair, start, watch)?;
             finished.times.planning = planning;
@@ -296,11 +294,8 @@ impl Matcher {
 }
 
 /// The pair with aligned rows, if there is an alignment.
-fn aligned<'a>(pair: &'a StereoPair, alignment: Option<&Alignment>) -> Result<Cow<'a, StereoPair>, Error> {
-    match alignment {
-        Some(alignment) => Ok(Cow::Owned(alignment.aligned(pair)?)),
-        None => Ok(Cow::Borrowed(pair)),
-    }
+fn aligned(pair: StereoPair, alignment: Option<&Alignment>) -> Result<StereoPair, Error> {
+    Ok(alignment.map_or(Ok(pair.clone()), |alignment| alignment.aligned(&pair))?)
 }
 
 impl fmt::Debug for Matcher {
@@ -315,12 +310,12 @@ impl Prepared {
         options: &Options,
         beside: Beside,
         plan: &Plan,
-        is_aligned: bool,
+        images: Images,
         opened: &Opened,
         watch: &Watch<'_>,
     ) -> Result<Self, Error> {
-        let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, is_aligned, opened, watch)?;
-        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, is_aligned, peak_bytes })
+        let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, images, opened, watch)?;
+        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, images, peak_bytes })
     }
 
     fn solve(
@@ -364,7 +359,7 @@ mod tests {
     #[test]
     fn the_caller_attends_while_its_pair_is_matched_and_may_stop_it() -> Result<(), Error> {
         let values: Vec<_> = (0..90 * 60_usize).map(|index| (index * index % 251) as u8).collect();
-        let image = Image::from_grey(90, 60, &values)?;
+        let image = Image::from_grey(90, 60, values)?;
         let pair = StereoPair::new(image.clone(), image)?;
         let mut matcher = Matcher::new(&Options::default().with_labels(16))?;
         let mut attended_by = None;

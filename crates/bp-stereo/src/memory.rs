@@ -1,6 +1,6 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Energy, Plan, Schedule, Size, Tiling, finish};
+use bp_core::{Energy, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
@@ -13,11 +13,9 @@ const KEPT: u64 = 32 << 20;
 /// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
 pub(crate) const LISTED: u64 = 3 << 10;
 
-/// Bytes per pixel of both images.
-const PAIR: u64 = 6;
-
-/// Bytes per pixel of the aligned right image.
-const ALIGNED: u64 = 3;
+/// Bytes per pixel of an image: its grey values, and those with its colours.
+const GREY: u64 = 1;
+pub(crate) const COLOUR: u64 = 4;
 
 /// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
@@ -31,7 +29,7 @@ const LABELS: u64 = 2;
 
 /// Bytes per pixel of a pair that is read while another is matched: one image, and the other as a file, decoded and
 /// copied.
-const READING: u64 = 12;
+const READING: u64 = COLOUR + 9;
 
 /// Bytes per pixel of the confidence.
 const TRUST: u64 = 4;
@@ -39,8 +37,8 @@ const TRUST: u64 = 4;
 /// Bytes per pixel of the depths.
 const DEPTH: u64 = 4;
 
-/// Bytes per pixel of the mirrored pair while the right image is matched. The right map that is kept later needs fewer.
-const RIGHT: u64 = 6;
+/// Bytes per pixel of the map of the right image.
+const RIGHT_MAP: u64 = 4;
 
 /// Temporary bytes per pixel for finishing a map: the next map and, for the confidence, both maps and the worth of each pixel.
 const FINISHING: u64 = 4;
@@ -69,6 +67,24 @@ pub struct Beside {
     pub whole: Option<&'static str>,
 }
 
+/// The images of a pair in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Images {
+    /// The bytes of both.
+    bytes: u64,
+    /// Bytes per pixel of what is compared of one of them.
+    compared: u64,
+    /// Whether there is an aligned image too.
+    is_aligned: bool,
+}
+
+impl Images {
+    pub(crate) fn of(pair: &StereoPair, profile: Profile, is_aligned: bool) -> Self {
+        let compared = if profile.compares_colours() { COLOUR } else { GREY };
+        Self { bytes: pair.bytes(), compared, is_aligned }
+    }
+}
+
 /// The tiling of a plan, and the memory it needs.
 pub(crate) struct Fitted {
     /// The tiles.
@@ -78,16 +94,16 @@ pub(crate) struct Fitted {
 }
 
 /// Tiles `plan` to stay within the options' limit and the available memory. Reports to `watch` if the image is not
-/// matched as a whole. `is_aligned` says whether there is an aligned image too. The plan itself does not change, because tiles cost less accuracy than a smaller plan.
+/// matched as a whole. The plan itself does not change, because tiles cost less accuracy than a smaller plan.
 pub(crate) fn fitted(
     options: &Options,
     beside: Beside,
     plan: &Plan,
-    is_aligned: bool,
+    images: Images,
     opened: &Opened,
     watch: &Watch<'_>,
 ) -> Result<Fitted, Error> {
-    let bytes = Bytes::beside(options, beside, is_aligned, plan.image_size());
+    let bytes = Bytes::beside(options, beside, images, plan.image_size());
     let limit = Limit::of(options, opened, bytes.held);
     let needed = |tile: &Plan| {
         opened.device.check(tile)?;
@@ -139,16 +155,18 @@ struct Bytes {
 }
 
 impl Bytes {
-    fn beside(options: &Options, beside: Beside, is_aligned: bool, size: Size) -> Self {
+    fn beside(options: &Options, beside: Beside, images: Images, size: Size) -> Self {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let if_so = |is_so: bool, bytes: u64| if is_so { bytes } else { 0 };
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
-        let (aligned, positions) = (if_so(is_aligned, ALIGNED), if_so(beside.rectified, POSITIONS));
-        let (right, trust) = (if_so(options.needs_right(), RIGHT), if_so(options.confidence, TRUST));
+        let (aligned, positions) = (if_so(images.is_aligned, images.compared), if_so(beside.rectified, POSITIONS));
+        // The mirrored pair while the right image is matched, and its map after that.
+        let right = if_so(options.needs_right(), RIGHT_MAP.max(2 * images.compared));
+        let trust = if_so(options.confidence, TRUST);
         // Assumes that the next and the previous pair of a batch have the same size as this one.
-        let others = if_so(beside.batch, READING + PAIR + MAP + trust + depth + WRITING);
+        let others = if_so(beside.batch, READING + 2 * COLOUR + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + LISTED * beside.pairs as u64 + a_pixel(PAIR + aligned + positions + truth),
+            held: PROGRAM + LISTED * beside.pairs as u64 + images.bytes + a_pixel(aligned + positions + truth),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }

@@ -5,13 +5,14 @@ use std::path::Path;
 use bp_core::{DeviceKind, Image, StereoPair};
 use bp_io::{Limits, read_image};
 
-use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
-
-/// Bytes per pixel of an image in memory.
-const IMAGE: u64 = 3;
+use crate::{
+    Error, Memory, Rectifying,
+    memory::{COLOUR, PROGRAM},
+    rectifying::POSITIONS,
+};
 
 /// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
-const RECTIFYING: u64 = 2 * IMAGE + POSITIONS;
+const RECTIFYING: u64 = 2 * COLOUR + POSITIONS;
 
 /// Bytes that may be read in any case: the threads and outputs that [`PROGRAM`] counts are not there yet. So small images
 /// are refused when their plan is known, with advice that suits it.
@@ -76,12 +77,12 @@ impl Room {
     ) -> Result<StereoPair, Error> {
         let [left, right] = images;
         let one = read(self, left)?;
-        let other = read(self.without(IMAGE * one.size().pixels() as u64), right)?;
+        let other = read(self.without(one.bytes()), right)?;
         let named = |error| Error::from(error).of(format!("{} and {}", left.display(), right.display()));
         let pair = StereoPair::new(one, other).map_err(named)?;
         match rectifying {
             Some(rectifying) => {
-                self.without(2 * IMAGE * pair.size().pixels() as u64).check(&pair, RECTIFYING, "rectifying")?;
+                self.without(pair.bytes()).check(&pair, RECTIFYING, "rectifying")?;
                 rectifying.rectified(&pair)
             }
             None => Ok(pair),
@@ -137,6 +138,6 @@ mod tests {
         assert_eq!(source.cause(), Cause::Memory);
         let Error::OutOfMemory { needed, .. } = *source else { panic!("{source}") };
         // The second image comes on top.
-        assert!(read(Some(needed)).is_err() && read(Some(needed + IMAGE * 1_000_000)).is_ok());
+        assert!(read(Some(needed)).is_err() && read(Some(needed + 1_000_000)).is_ok());
     }
 }

@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::weights;
-use crate::{Image, Size, StereoPair, image::grey, survey::points::Point};
+use crate::{Image, Size, StereoPair, survey::points::Point};
 
 /// Columns and rows of a window.
 const WIDTH: usize = 16;
@@ -259,7 +259,7 @@ impl Area {
         let size = image.size();
         let mut values = [[0.0; AREA[0]]; AREA[1]];
         for (y, values) in (first[1]..size.height).zip(&mut values) {
-            read(values, &image.pixels()[y * size.width..][first[0].min(size.width)..size.width]);
+            read(values, &image.greys()[y * size.width..][first[0].min(size.width)..size.width]);
         }
         Self { size, first, values }
     }
@@ -309,17 +309,15 @@ fn greys(image: &Image, x: usize, y: usize) -> Option<[[f32; WIDE]; HEIGHT + 3]>
     let mut greys = [[0.0; WIDE]; HEIGHT + 3];
     let [left, top] = before(x, y, image.size())?;
     for (row, greys) in (top..).zip(&mut greys) {
-        read(greys, &image.pixels()[row * image.size().width + left..][..WIDE]);
+        read(greys, &image.greys()[row * image.size().width + left..][..WIDE]);
     }
     Some(greys)
 }
 
-/// Writes the grey values of some pixels, as many as there is room for.
+/// Writes some grey values, as many as there is room for.
 #[inline(always)]
-fn read(greys: &mut [f32], pixels: &[[u8; 3]]) {
-    for (value, &pixel) in greys.iter_mut().zip(pixels) {
-        *value = f32::from(grey(pixel));
-    }
+fn read(values: &mut [f32], greys: &[u8]) {
+    values.iter_mut().zip(greys).for_each(|(value, &grey)| *value = f32::from(grey));
 }
 
 #[cfg(test)]
@@ -335,7 +333,7 @@ mod tests {
         let view = |shift: usize, gain: f32| -> Image {
             let pixels: Vec<u8> =
                 (0..200 * 90).map(|i| (128.0 + gain * wave(i % 200 + shift, i / 200)) as u8).collect();
-            Image::from_grey(200, 90, &pixels).unwrap()
+            Image::from_grey(200, 90, pixels).unwrap()
         };
         let pair = StereoPair::new(view(0, 90.0), view(5, 70.0)).unwrap();
         let points = Survey::of(&pair).unwrap().points;

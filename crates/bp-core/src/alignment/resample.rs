@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::Alignment;
-use crate::{Error, Image, memory};
+use crate::{Error, Image, Size, memory};
 
 /// Rows are taken in steps of 1 / `STEPS` of a pixel.
 const STEPS: usize = 64;
@@ -26,51 +26,57 @@ type Weights = [u16; 4];
 /// The image in which row y at column x is the cubic interpolation (Keys 1981) of row `y + rows_at(x, y)`. Border rows are
 /// repeated outward.
 pub(super) fn resampled(image: &Image, alignment: &Alignment) -> Result<Image, Error> {
-    let (size, level) = (image.size(), Level::new());
-    let weights: [Weights; STEPS] = array::from_fn(whole_weights);
-    let mut pixels = memory::filled("an aligned image", size.pixels(), [0; 3])?;
+    let Size { width, height } = image.size();
+    if image.is_grey() {
+        let greys = resampled_rows(image.size(), alignment, |y| image.greys_near(y).as_chunks::<1>().0)?;
+        return Image::from_grey(width, height, greys.into_flattened());
+    }
+    let colours = resampled_rows(image.size(), alignment, |y| image.colours_near(y).unwrap_or_default())?;
+    Image::from_rgb(width, height, colours)
+}
+
+fn resampled_rows<'a, const CHANNELS: usize>(
+    size: Size,
+    alignment: &'a Alignment,
+    row_near: impl Fn(isize) -> &'a [[u8; CHANNELS]] + Sync,
+) -> Result<Vec<[u8; CHANNELS]>, Error> {
+    let (level, weights) = (Level::new(), array::from_fn(whole_weights));
+    let resampling = Resampling { alignment, weights, row_near };
+    let mut pixels = memory::filled("an aligned image", size.pixels(), [0; CHANNELS])?;
     pixels.par_chunks_exact_mut(size.width).enumerate().for_each(|(y, row)| {
-        dispatch!(level, simd => write_row(simd, image, alignment, &weights, y, row));
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || resampling.write_row(y, row),
+        ));
     });
-    Image::from_rgb(size.width, size.height, pixels)
+    Ok(pixels)
 }
 
-#[inline(always)]
-fn write_row<S: Simd>(
-    simd: S,
-    image: &Image,
-    alignment: &Alignment,
-    weights: &[Weights; STEPS],
-    y: usize,
-    row: &mut [[u8; 3]],
-) {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            for (run, out) in row.chunks_mut(TOGETHER).enumerate() {
-                write_run(image, alignment, weights, [run * TOGETHER, y], out);
-            }
-        },
-    );
+struct Resampling<'a, R> {
+    alignment: &'a Alignment,
+    weights: [Weights; STEPS],
+    /// The pixels of a row, which may lie outside the image.
+    row_near: R,
 }
 
-/// Writes some pixels from column x of row y on.
-#[inline(always)]
-fn write_run(
-    image: &Image,
-    alignment: &Alignment,
-    weights: &[Weights; STEPS],
-    [x, y]: [usize; 2],
-    out: &mut [[u8; 3]],
-) {
-    let rows = alignment.rows_at((x + TOGETHER / 2) as f64, y as f64);
-    let step = (STEPS as f64 * rows + 0.5).floor() as isize;
-    let top = y as isize + step.div_euclid(STEPS as isize) - 1;
-    let rows = [0, 1, 2, 3].map(
-        #[inline(always)]
-        |i| image.row_near(top + i)[x..x + out.len()].as_flattened(),
-    );
-    write_mixed(rows, weights[step.rem_euclid(STEPS as isize) as usize], out.as_flattened_mut());
+impl<'a, R> Resampling<'a, R> {
+    #[inline(always)]
+    fn write_row<const CHANNELS: usize>(&self, y: usize, row: &mut [[u8; CHANNELS]])
+    where
+        R: Fn(isize) -> &'a [[u8; CHANNELS]],
+    {
+        for (run, out) in row.chunks_mut(TOGETHER).enumerate() {
+            let x = run * TOGETHER;
+            let rows = self.alignment.rows_at((x + TOGETHER / 2) as f64, y as f64);
+            let step = (STEPS as f64 * rows + 0.5).floor() as isize;
+            let top = y as isize + step.div_euclid(STEPS as isize) - 1;
+            let rows = [0, 1, 2, 3].map(
+                #[inline(always)]
+                |i| (self.row_near)(top + i)[x..x + out.len()].as_flattened(),
+            );
+            write_mixed(rows, self.weights[step.rem_euclid(STEPS as isize) as usize], out.as_flattened_mut());
+        }
+    }
 }
 
 #[inline(always)]

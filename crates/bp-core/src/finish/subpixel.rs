@@ -47,7 +47,7 @@ mod tests {
         };
         let mut view = |grey: &dyn Fn(usize, usize) -> f32| {
             let greys = (0..SIZE.pixels()).map(|i| (grey(i % SIZE.width, i / SIZE.width) + noise()).round() as u8);
-            Image::from_grey(SIZE.width, SIZE.height, &greys.collect::<Vec<_>>()).unwrap()
+            Image::from_grey(SIZE.width, SIZE.height, greys.collect::<Vec<_>>()).unwrap()
         };
         // The left view is resampled, because disparities belong to its pixels.
         let left = view(&|x, y| texture(x as f32 - disparity(x, y), y));
@@ -115,7 +115,7 @@ mod tests {
     #[cfg_attr(miri, ignore = "takes minutes")]
     fn a_blank_area_keeps_its_disparity() {
         let size = Size { width: 40, height: 20 };
-        let blank = || Image::from_grey(size.width, size.height, &vec![9; size.pixels()]).unwrap();
+        let blank = || Image::from_grey(size.width, size.height, vec![9; size.pixels()]).unwrap();
         let mut values = vec![5.0; size.pixels()];
         values[0] = 0.0;
         let map = DisparityMap::new(size, values).unwrap();

@@ -98,8 +98,10 @@ impl Around {
     #[inline(always)]
     fn of(image: &Image, positions: &[[u32; 2]]) -> Self {
         let (mut around, width) = (Self { corners: [[0; TOGETHER]; 4], parts: [[0; TOGETHER]; 2] }, image.size().width);
-        let colour = |at: usize| {
-            image.pixels().get(at).map_or(0, |&[red, green, blue]| u32::from_le_bytes([red, green, blue, 0]))
+        let (greys, colours) = (image.greys(), image.colours());
+        let colour = |at: usize| match colours {
+            Some(colours) => colours.get(at).map_or(0, |&[red, green, blue]| u32::from_le_bytes([red, green, blue, 0])),
+            None => greys.get(at).map_or(0, |&grey| u32::from_le_bytes([grey, grey, grey, 0])),
         };
         for (i, &position) in positions.iter().enumerate().filter(|(_, position)| **position != NOWHERE) {
             let [(x, right), (y, below)] = position.map(|side| ((side >> 8) as usize, side & 0xff));

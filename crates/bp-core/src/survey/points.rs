@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::coarse::{Found, Matches};
-use crate::{Image, StereoPair, image::grey};
+use crate::{Image, StereoPair};
 
 /// One point is chosen from each square of this many small pixels a side.
 const CELL: usize = 6;
@@ -82,10 +82,10 @@ fn places(small: &Image, look: &Matches, factor: usize) -> Vec<Place> {
 
 /// The sum of differences between the three pixels above and the three below.
 fn contrast(small: &Image, x: usize, y: usize) -> u16 {
-    let [above, below] = [-1, 1].map(|dy| small.row_near(y as isize + dy));
+    let [above, below] = [-1, 1].map(|dy| small.greys_near(y as isize + dy));
     let columns = x.saturating_sub(1)..(x + 2).min(above.len());
     let pairs = above[columns.clone()].iter().zip(&below[columns]);
-    pairs.map(|(&above, &below)| u16::from(grey(above).abs_diff(grey(below)))).sum()
+    pairs.map(|(&above, &below)| u16::from(above.abs_diff(below))).sum()
 }
 
 /// Matches some places.
@@ -189,7 +189,7 @@ impl Codes {
         for first in (0..self.columns).step_by(CODES) {
             let start = columns.start - 1 + first;
             for (row, greys) in (rows.start - 1..).zip(&mut self.greys) {
-                *greys = run_of_greys(&image.pixels()[row * size.width + start..]);
+                *greys = run_of_greys(&image.greys()[row * size.width + start..]);
             }
             let codes = self.codes.chunks_exact_mut(self.columns);
             for (rows, codes) in self.greys.windows(3).zip(codes) {
@@ -209,12 +209,12 @@ impl Codes {
 
 /// The grey values of some pixels; zeros beyond the last one.
 #[inline(always)]
-fn run_of_greys(pixels: &[[u8; 3]]) -> Run {
+fn run_of_greys(values: &[u8]) -> Run {
     let mut greys = [0; GREYS + 2];
-    // A known number of pixels takes vectors.
-    match pixels.first_chunk::<GREYS>() {
-        Some(pixels) => greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
-        None => greys.iter_mut().zip(pixels).for_each(|(out, &pixel)| *out = grey(pixel)),
+    // A known number of values takes vectors.
+    match values.first_chunk::<GREYS>() {
+        Some(values) => greys[..GREYS].copy_from_slice(values),
+        None => greys[..values.len()].copy_from_slice(values),
     }
     greys
 }

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{Error, Image, Size, StereoPair, image::grey, memory};
+use crate::{Error, Image, Size, StereoPair, memory};
 
 /// The longest side of the shrunk images in pixels. Disparities of up to half of it, in both directions, fit 8 bits.
 pub const LONGEST_SIDE: usize = 200;
@@ -26,7 +26,7 @@ pub(super) fn factor(size: Size) -> usize {
     size.width.max(size.height).div_ceil(LONGEST_SIDE)
 }
 
-/// Shrinks both images to grey: a pixel is the luma of the mean colour of a `factor` by `factor` block. Incomplete blocks
+/// Shrinks both images in grey: a pixel is the mean of a `factor` by `factor` block. Incomplete blocks
 /// at the right and bottom are left out, unless there is no complete one.
 pub(super) fn shrunk(pair: &StereoPair, factor: usize) -> Result<StereoPair, Error> {
     StereoPair::new(mean_of_blocks(pair.left(), factor)?, mean_of_blocks(pair.right(), factor)?)
@@ -42,7 +42,7 @@ fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
             || write_means(image, factor, row, means),
         ));
     });
-    Image::from_grey(columns, rows, &means)
+    Image::from_grey(columns, rows, means)
 }
 
 /// Writes the means of a row of blocks.
@@ -57,17 +57,17 @@ fn write_means(image: &Image, factor: usize, row: usize, means: &mut [u8]) {
         let first = part * together * factor;
         let last = width.min(first + means.len() * factor);
         // Rows are added up first, then the columns of blocks. Both take vectors.
-        let mut sums = vec![0_u16; (last - first) * 3];
+        let mut sums = vec![0_u16; last - first];
         let mut totals = vec![0_u32; sums.len()];
         for y in ys.clone() {
-            let line = image.pixels()[y * width + first..y * width + last].as_flattened();
+            let line = &image.greys()[y * width + first..y * width + last];
             sums.iter_mut().zip(line).for_each(|(sum, &value)| *sum += u16::from(value));
             if (y + 1 - ys.start) % FIT == 0 || y + 1 == ys.end {
                 add_blocks(&mut sums, factor, &mut totals);
             }
         }
-        for (mean, total) in means.iter_mut().zip(totals.as_chunks().0.iter().step_by(factor)) {
-            *mean = grey(total.map(|sum| (((u64::from(sum) + count / 2) * inverse) >> SHIFT) as u8));
+        for (mean, &total) in means.iter_mut().zip(totals.iter().step_by(factor)) {
+            *mean = (((u64::from(total) + count / 2) * inverse) >> SHIFT) as u8;
         }
     }
 }
@@ -82,7 +82,7 @@ fn inverse(count: u64) -> u64 {
 #[inline(always)]
 fn add_blocks(sums: &mut [u16], factor: usize, totals: &mut [u32]) {
     for column in 0..factor {
-        let from = sums.get(3 * column..).unwrap_or_default();
+        let from = sums.get(column..).unwrap_or_default();
         totals.iter_mut().zip(from).for_each(|(total, &sum)| *total += u32::from(sum));
     }
     sums.fill(0);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::{Cut, Error, Plan, Settings, Size, StereoPair, image::APRON};
+use crate::{Cut, Error, Plan, Profile, Settings, Size, StereoPair, image::APRON};
 
 /// The columns or the rows of a tile: all that it matches, and those whose labels are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,9 +54,11 @@ impl Tile {
         pair.part(self.columns.all.clone(), self.rows.all.clone())
     }
 
-    /// The bytes of such a copy.
-    pub(super) fn pair_bytes(&self) -> u64 {
-        2 * 3 * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
+    /// The bytes of such a copy of what a profile compares.
+    pub(super) fn pair_bytes(&self, profile: Profile) -> u64 {
+        // Grey values, and colours beside them.
+        let a_pixel = if profile.compares_colours() { 4 } else { 1 };
+        2 * a_pixel * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
     }
 }
 

@@ -106,7 +106,7 @@ impl Tiling {
 
     /// The bytes that matching a tile must not exceed, if it could.
     pub(super) fn limit(&self, tile: &Tile) -> Option<u64> {
-        let beside = tile.pair_bytes().saturating_add(self.label_bytes());
+        let beside = tile.pair_bytes(self.plan.model().profile()).saturating_add(self.label_bytes());
         self.likely.as_ref().map(|likely| likely.bytes.saturating_sub(beside))
     }
 
@@ -177,7 +177,7 @@ impl Tiling {
             for rows in distinct(&self.rows) {
                 let tile = Tile { columns: columns.clone(), rows: rows.clone() };
                 let bytes = needed(&tile.plan(&self.plan)?)?;
-                most = most.max(bytes.saturating_add(tile.pair_bytes()));
+                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
             }
         }
         let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);

@@ -18,8 +18,8 @@ use crate::{Error, Limits};
 /// The longest header of a stream, in bytes.
 const MOST_HEADER: u64 = 1024;
 
-/// The most bytes of memory for a pixel of a frame: its samples, its brightness and its image.
-const PIXEL: u64 = 6 + 1 + 3;
+/// The most bytes of memory for a pixel of a frame: its samples, its brightness and its images.
+const PIXEL: u64 = 6 + 1 + 1;
 
 /// Where the two images of a frame are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,8 +151,8 @@ struct Grey {
 }
 
 impl Grey {
-    fn image(&self, path: &Path) -> Result<Image, Error> {
-        Image::from_grey(self.width, self.height, &self.values).map_err(|error| Error::reading(path, &error))
+    fn image(self, path: &Path) -> Result<Image, Error> {
+        Image::from_grey(self.width, self.height, self.values).map_err(|error| Error::reading(path, &error))
     }
 
     /// The two halves.
@@ -252,7 +252,7 @@ mod tests {
 
     /// The grey values of all pairs.
     fn pairs(mut frames: PairFrames) -> Result<Vec<[Vec<u8>; 2]>, Error> {
-        let grey = |image: &Image| image.pixels().iter().map(|&[grey, ..]| grey).collect();
+        let grey = |image: &Image| image.greys().to_vec();
         let mut found = Vec::new();
         while let Some(pair) = frames.next_pair()? {
             found.push([grey(pair.left()), grey(pair.right())]);

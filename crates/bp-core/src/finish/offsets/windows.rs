@@ -9,7 +9,7 @@ use super::{
     best::write_best,
     compared::{LANES, UNIT, differences, first_steps, interpolate},
 };
-use crate::{Error, StereoPair, image::grey, memory};
+use crate::{Error, StereoPair, memory};
 
 /// The columns that interpolation reads beyond the left and right border.
 const BORDER: [usize; 2] = [1, 2];
@@ -95,11 +95,11 @@ impl Windows {
     /// Reads the grey values of row y.
     #[inline(always)]
     fn read_greys(&mut self, pair: &StereoPair, y: usize) {
-        let [left, right] = [pair.left(), pair.right()].map(|image| &image.pixels()[y * self.width..][..self.width]);
-        self.left.iter_mut().zip(left).for_each(|(out, &pixel)| *out = UNIT * i16::from(grey(pixel)));
+        let [left, right] = [pair.left(), pair.right()].map(|image| &image.greys()[y * self.width..][..self.width]);
+        self.left.iter_mut().zip(left).for_each(|(out, &grey)| *out = UNIT * i16::from(grey));
         let (before, greys) = self.greys.split_at_mut(BORDER[0]);
         let (greys, after) = greys.split_at_mut(self.width);
-        greys.iter_mut().zip(right).for_each(|(out, &pixel)| *out = grey(pixel));
+        greys.copy_from_slice(right);
         before.fill(greys[0]);
         after.fill(greys[self.width - 1]);
     }
