@@ -7,6 +7,9 @@ use crate::{MAX_LABELS, Patch, Plan};
 /// Neighbouring nodes are counted apart. They mostly have the same label, so each would wait for the one before.
 const LANES: usize = 8;
 
+/// How many nodes have each label, up to 255, and room after them: CPUs take places 4096 bytes apart for the same at first.
+type Counts = [u8; MAX_LABELS + 64];
+
 /// Some of a plan's labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LabelSet {
@@ -23,7 +26,7 @@ impl LabelSet {
 
     /// How many nodes must have such a label. The labels of fewer are mostly mistakes in hidden areas, each of which would add
     /// three labels; four nodes are as small as what the coarser grids find at all.
-    const AGREEING: u16 = 4;
+    const AGREEING: u8 = 4;
 
     /// All labels below `labels`, which is at most [`MAX_LABELS`].
     #[must_use]
@@ -49,38 +52,29 @@ impl LabelSet {
         }
         let size = plan.size(grid + 1);
         let region = patch.region(size);
-        let mut nodes = [[0_u8; LANES]; MAX_LABELS];
+        let mut lanes: [Counts; LANES] = [[0; _]; LANES];
         for y in region.rows {
             for neighbours in coarser(y)[region.columns.clone()].chunks(LANES) {
-                for (lane, &label) in neighbours.iter().enumerate() {
-                    let count = &mut nodes[usize::from(label)][lane];
+                for (lane, &label) in lanes.iter_mut().zip(neighbours) {
+                    let count = &mut lane[usize::from(label)];
                     *count = count.saturating_add(1);
                 }
             }
         }
-        let nodes = &nodes[..labels];
-        Some(Self::near(nodes, Self::AGREEING)).filter(|set| set.count() > 0).unwrap_or_else(|| Self::near(nodes, 1))
+        let reached = reached(lanes.each_ref().map(|lane| &lane[..labels]));
+        let reached = &reached[..labels];
+        Some(Self::at_least(reached, Self::AGREEING))
+            .filter(|set| set.count() > 0)
+            .unwrap_or_else(|| Self::at_least(reached, 1))
     }
 
-    /// The labels that differ by at most 1 from those of at least so many nodes, given how many have each label.
-    fn near(nodes: &[[u8; LANES]], least: u16) -> Self {
-        let mut reached = [0; MAX_LABELS + 2 * Self::REACH];
-        for (label, lanes) in nodes.iter().enumerate() {
-            let count: u16 = lanes.iter().copied().map(u16::from).sum();
-            for reached in &mut reached[label..=label + 2 * Self::REACH] {
-                *reached += count;
-            }
-        }
+    /// The labels that so many nodes reach.
+    fn at_least(reached: &[u8], least: u8) -> Self {
         let mut set = Self { words: [0; MAX_LABELS / 64] };
-        for (label, _) in reached[Self::REACH..][..nodes.len()].iter().enumerate().filter(|(_, count)| **count >= least)
-        {
-            set.insert(label);
+        for (word, reached) in set.words.iter_mut().zip(reached.chunks(64)) {
+            *word = reached.iter().rev().fold(0, |word, &count| word << 1 | u64::from(count >= least));
         }
         set
-    }
-
-    fn insert(&mut self, label: usize) {
-        self.words[label / 64] |= 1 << (label % 64);
     }
 
     /// Whether it holds a label.
@@ -106,6 +100,21 @@ impl LabelSet {
             })
         })
     }
+}
+
+/// By label, how many nodes have a label that differs by at most [`LabelSet::REACH`], up to 255.
+fn reached(lanes: [&[u8]; LANES]) -> Counts {
+    let labels = lanes[0].len();
+    let (mut counts, mut reached): (Counts, Counts) = ([0; _], [0; _]);
+    // Whole rows of counts at once, which takes vectors.
+    for lane in lanes {
+        let counts = counts[LabelSet::REACH..].iter_mut().zip(lane);
+        counts.for_each(|(count, &more)| *count = count.saturating_add(more));
+    }
+    for near in counts.windows(labels).take(2 * LabelSet::REACH + 1) {
+        reached.iter_mut().zip(near).for_each(|(reached, &count)| *reached = reached.saturating_add(count));
+    }
+    reached
 }
 
 #[cfg(test)]

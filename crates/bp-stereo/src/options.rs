@@ -238,6 +238,12 @@ impl Options {
         self.check.unwrap_or(self.quality == Quality::Best)
     }
 
+    /// What is compared of a pair: without colours, unless they count. Only point clouds need more of the images.
+    #[must_use]
+    pub fn compared(&self, pair: &StereoPair) -> StereoPair {
+        pair.compared_by(self.profile_for(pair))
+    }
+
     /// The profile for a pair: colours count only if the left image has some.
     pub(crate) fn profile_for(&self, pair: &StereoPair) -> Profile {
         let in_colour = || self.quality == Quality::Best && !pair.left().is_grey();

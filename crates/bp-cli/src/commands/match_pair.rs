@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
+use bp_core::{DisparityMap, GroundTruth, StereoPair};
 use bp_io::{MapFormat, Raster};
 use bp_stereo::{
     Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, Start,
@@ -77,7 +77,9 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
     outputs.check(&making, &inputs)?;
     let pair = read(args, files.map(PathBuf::as_path), &making)?;
-    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, pair.size(), &options)).transpose()?;
+    // Colours that nobody needs are freed.
+    let pair = if outputs.points.is_some() { pair } else { options.compared(&pair) };
+    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, &pair, &options)).transpose()?;
     interrupt::listen()?;
     if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {
         options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
@@ -187,11 +189,12 @@ fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }
 
-/// Bytes per pixel beside ground truth that is read: the pair, and truth of the left image.
-const PAIR_AND_TRUTH: u64 = 10;
+/// Bytes per pixel of the left image's truth, beside further truth that is read.
+const TRUTH: u64 = 4;
 
-fn read_truth(args: &MatchArgs, path: &Path, size: Size, options: &Options) -> Result<GroundTruth, Failure> {
-    let held = PAIR_AND_TRUTH * size.pixels() as u64;
+fn read_truth(args: &MatchArgs, path: &Path, pair: &StereoPair, options: &Options) -> Result<GroundTruth, Failure> {
+    let size = pair.size();
+    let held = pair.bytes() + TRUTH * size.pixels() as u64;
     let limits = reading_limits(args.max_megapixels, options.max_memory, held);
     let truth = evaluate::read_truth(path, &args.truth, limits)?;
     let found = truth.disparities().size();

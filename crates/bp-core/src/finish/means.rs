@@ -2,7 +2,7 @@
 
 use std::array;
 
-use fearless_simd::{Level, Select, Simd, SimdBase, dispatch};
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
 use super::{IsStopped, check::AGREE, go_on};
@@ -212,17 +212,17 @@ impl Value for u16 {
                 for (at, means) in (MARGIN..).step_by(S::u16s::LEN).zip(means.chunks_mut(S::u16s::LEN)) {
                     let middle = load(rows[1], at);
                     let least = middle - near;
-                    // What is not near counts as FAR, which is subtracted in the end.
-                    let (mut sums, mut fars) = (none, none);
+                    // From 1 to FAR where it is near, otherwise 0.
+                    let (mut sums, mut counts) = (none, none);
                     for row in rows {
                         for column in 0..SIDE {
-                            let above = (load(row, at + column * spacing - spacing) - least).min(far);
-                            sums += above;
-                            fars += above.simd_eq(far).select(one, none);
+                            let above = load(row, at + column * spacing - spacing) - least;
+                            let below = far.saturating_sub(above);
+                            sums += below;
+                            counts += below.min(one);
                         }
                     }
-                    let counts = S::u16s::splat(simd, (SIDE * SIDE) as u16) - fars;
-                    let sums = sums - fars * far - counts * near;
+                    let sums = counts * (far - near) - sums;
                     let sums = sums.as_slice().iter().zip(counts.as_slice());
                     for ((mean, &middle), (&sum, &count)) in means.iter_mut().zip(middle.as_slice()).zip(sums) {
                         *mean = M::at(middle, f32::from(sum as i16) / f32::from(count));

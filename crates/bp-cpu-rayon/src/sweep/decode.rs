@@ -204,8 +204,7 @@ impl Undecided<'_> {
         let from = usize::from(self.list.labels[entries.start]);
         let decided = if ODD { 0..3 } else { 2..3 };
         let near = known.each_ref().map(|labels| near(simd, labels, from));
-        let exist = self.masks.map(|mask| Bytes::from_slice(simd, &mask[self.lane..self.lane + LANES]));
-        let smoothness = Edges::<S>::new::<LEVELS>(simd, self.model, self.greys, self.lane);
+        let smoothness = Edges::<S>::new::<LEVELS>(simd, self);
         let len = entries.len();
         let (labels, costs) = (&self.list.labels[entries.clone()], &self.costs[entries.clone()]);
         let (same, next) = (&self.same[entries.clone()], &self.next[entries.clone()]);
@@ -221,7 +220,7 @@ impl Undecided<'_> {
             }
             for side in decided.clone() {
                 let distance = here.saturating_sub(near[side]) | near[side].saturating_sub(here);
-                sum += smoothness.of(side, distance) & exist[side];
+                sum += smoothness.of(side, distance);
             }
             // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
             let belief = costs[i].load(simd).saturating_add(sum);
@@ -232,7 +231,7 @@ impl Undecided<'_> {
     }
 }
 
-/// The smoothness costs of the edges of a block's nodes to the neighbours that have labels.
+/// The smoothness costs of the edges of a block's nodes to the neighbours that have labels; 0 where there is no neighbour.
 struct Edges<S: Simd> {
     /// The distance from which on an edge costs its truncation.
     far: [Bytes<S>; 3],
@@ -242,14 +241,18 @@ struct Edges<S: Simd> {
 
 impl<S: Simd> Edges<S> {
     #[inline(always)]
-    fn new<const LEVELS: bool>(simd: S, model: &Model, greys: Option<Around<'_>>, lane: usize) -> Self {
-        let levels = levels(simd, greys.filter(|_| LEVELS), lane, [0, 1, 2]);
-        let edges = model.edges().smoothness();
+    fn new<const LEVELS: bool>(simd: S, nodes: &Undecided<'_>) -> Self {
+        let levels = levels(simd, nodes.greys.filter(|_| LEVELS), nodes.lane, [0, 1, 2]);
+        let edges = nodes.model.edges().smoothness();
+        let mut truncations = of_sides::<S, LEVELS>(simd, levels, edges.map(|edge| edge.truncation));
+        for (truncation, mask) in truncations.iter_mut().zip(nodes.masks) {
+            *truncation = *truncation & Bytes::from_slice(simd, &mask[nodes.lane..nodes.lane + LANES]);
+        }
         let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
         Self {
             far: of_sides::<S, LEVELS>(simd, levels, edges.map(far)),
             steps: of_sides::<S, LEVELS>(simd, levels, edges.map(Smoothness::step)),
-            truncations: of_sides::<S, LEVELS>(simd, levels, edges.map(|edge| edge.truncation)),
+            truncations,
         }
     }
 

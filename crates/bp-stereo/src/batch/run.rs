@@ -16,7 +16,7 @@ use bp_core::StereoPair;
 use bp_io::{Contents, parse_image};
 
 use super::{
-    BatchOptions,
+    Also, BatchOptions,
     job::Job,
     record::{Done, FileState, PairRecord, PairTimes, history},
     summary::Failed,
@@ -171,7 +171,10 @@ impl Run<'_> {
 
     fn read<'a>(&self, job: &'a Job, room: Room) -> Result<Read<'a>, Stopped> {
         let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
-        let images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
+        let mut images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
+        if !self.options.also.contains(&Also::Points) {
+            images.pair = images.pair.map(|pair| self.options.matching.compared(&pair));
+        }
         Ok(Read { job, images, read_ms: milliseconds_since(start) })
     }
 
@@ -187,7 +190,7 @@ impl Run<'_> {
     }
 
     fn matcher(&self) -> Result<Matcher, Error> {
-        let depth = self.options.also.contains(&super::Also::Depth);
+        let depth = self.options.also.contains(&Also::Depth);
         let whole = self.options.warm_start.map(|_| "warm_start");
         let batch = self.options.matching.max_memory.is_none();
         // Records have it.
