@@ -60,7 +60,7 @@ impl Image {
         Ok(Self { size, above: 0, below: 0, greys: greys.into(), colours })
     }
 
-    /// An image from grey values, `[height][width]`.
+    /// An image from grey values, `[height][width]`, in a vector or a slice, which is copied.
     ///
     /// # Errors
     /// As [`Image::from_rgb`].
@@ -82,8 +82,8 @@ impl Image {
 
     /// The image in grey.
     #[must_use]
-    pub fn without_colours(&self) -> Self {
-        Self { greys: Arc::clone(&self.greys), colours: None, ..*self }
+    pub fn without_colours(self) -> Self {
+        Self { colours: None, ..self }
     }
 
     /// Width and height.
@@ -223,7 +223,7 @@ impl PartialEq for Image {
         let is_same = |y: isize| (0..self.size.width as isize).all(|x| self.rgb_near(x, y) == other.rgb_near(x, y));
         shape(self) == shape(other)
             && self.greys == other.greys
-            && (self.is_grey() && other.is_grey() || self.colours == other.colours || rows.into_iter().all(is_same))
+            && (self.colours == other.colours || rows.into_iter().all(is_same))
     }
 }
 
@@ -344,9 +344,11 @@ impl StereoPair {
 
     /// What a profile compares of the pair: its colours, or grey values only.
     #[must_use]
-    pub fn compared_by(&self, profile: Profile) -> Self {
-        let of = |image: &Image| if profile.compares_colours() { image.clone() } else { image.without_colours() };
-        Self { left: of(&self.left), right: of(&self.right) }
+    pub fn compared_by(self, profile: Profile) -> Self {
+        if profile.compares_colours() {
+            return self;
+        }
+        Self { left: self.left.without_colours(), right: self.right.without_colours() }
     }
 
     /// The size of both images.

@@ -184,7 +184,8 @@ impl Tiled {
         if self.tiling.is_whole() {
             return (way.solve)(driver, pair, observer);
         }
-        let times = (way.solve)(driver, &tile.pair(&pair.compared_by(driver.plan().model().profile())), observer)?;
+        let part = tile.pair(&pair.clone().compared_by(driver.plan().model().profile()));
+        let times = (way.solve)(driver, &part, observer)?;
         let rows = driver.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
         for (labels, y) in rows.filter(|(_, y)| tile.rows.kept.contains(y)) {
             let Span { all, kept } = &tile.columns;

@@ -232,7 +232,7 @@ impl Matcher {
         let (ready, finished, energy) = pool.install(|| {
             let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, images, opened, watch), Ok)?;
             let begun = Instant::now();
-            let pair = aligned(pair.compared_by(plan.model().profile()), applied.as_ref())?;
+            let pair = aligned(pair.clone().compared_by(plan.model().profile()), applied.as_ref())?;
             let planning = time + begun.elapsed();
             let mut finished = ready.solve(options, opened, &pair, start, watch)?;
             finished.times.planning = planning;

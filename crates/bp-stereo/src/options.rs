@@ -240,8 +240,9 @@ impl Options {
 
     /// What is compared of a pair: without colours, unless they count. Only point clouds need more of the images.
     #[must_use]
-    pub fn compared(&self, pair: &StereoPair) -> StereoPair {
-        pair.compared_by(self.profile_for(pair))
+    pub fn compared(&self, pair: StereoPair) -> StereoPair {
+        let profile = self.profile_for(&pair);
+        pair.compared_by(profile)
     }
 
     /// The profile for a pair: colours count only if the left image has some.

@@ -78,7 +78,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     outputs.check(&making, &inputs)?;
     let pair = read(args, files.map(PathBuf::as_path), &making)?;
     // Colours that nobody needs are freed.
-    let pair = if outputs.points.is_some() { pair } else { options.compared(&pair) };
+    let pair = if outputs.points.is_some() { pair } else { options.compared(pair) };
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, &pair, &options)).transpose()?;
     interrupt::listen()?;
     if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {

@@ -173,7 +173,7 @@ impl Run<'_> {
         let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
         let mut images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
         if !self.options.also.contains(&Also::Points) {
-            images.pair = images.pair.map(|pair| self.options.matching.compared(&pair));
+            images.pair = images.pair.map(|pair| self.options.matching.compared(pair));
         }
         Ok(Read { job, images, read_ms: milliseconds_since(start) })
     }
