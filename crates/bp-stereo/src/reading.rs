@@ -130,14 +130,14 @@ mod tests {
     fn images_beyond_the_allowed_memory_are_refused_with_the_least_that_would_do() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("image.pgm");
-        fs::write(&path, [&b"P5 1000 1000 255\n"[..], &[7; 1_000_000]].concat()).unwrap();
-        let read = |max_memory| read_pair([&path, &path], 1, max_memory);
+        fs::write(&path, [&b"P5 1000 2000 255\n"[..], &[7; 2_000_000]].concat()).unwrap();
+        let read = |max_memory| read_pair([&path, &path], 2, max_memory);
         assert!(read(None).is_ok());
         let refused = read(Some(PROGRAM)).unwrap_err();
         let Error::Of { source, .. } = refused else { panic!("{refused}") };
         assert_eq!(source.cause(), Cause::Memory);
         let Error::OutOfMemory { needed, .. } = *source else { panic!("{source}") };
         // The second image comes on top.
-        assert!(read(Some(needed)).is_err() && read(Some(needed + 1_000_000)).is_ok());
+        assert!(read(Some(needed)).is_err() && read(Some(needed + 2_000_000)).is_ok());
     }
 }
