@@ -196,9 +196,9 @@ mod tests {
 
     #[test]
     fn bits_come_in_row_order_and_ties_give_0() {
-        let image = Image::from_grey(3, 3, &[6, 5, 4, 5, 5, 9, 1, 7, 5]).unwrap();
+        let image = Image::from_grey(3, 3, [6, 5, 4, 5, 5, 9, 1, 7, 5]).unwrap();
         assert_eq!(code(&image, 1, 1), 0b1000_1010);
-        let flat = Image::from_grey(1, 1, &[5]).unwrap();
+        let flat = Image::from_grey(1, 1, [5]).unwrap();
         assert_eq!(code(&flat, 0, 0), 0);
     }
 
@@ -229,7 +229,7 @@ mod tests {
     fn the_outer_code_compares_a_cross_of_two_and_four_pixels() {
         let mut pixels = [7; 81];
         (pixels[4], pixels[38], pixels[42], pixels[76]) = (8, 9, 3, 10);
-        let image = Image::from_grey(9, 9, &pixels).unwrap();
+        let image = Image::from_grey(9, 9, pixels).unwrap();
         assert_eq!(outer_code(&image, 4, 4), 0b1001_0001);
         // The pixel at (8, 4) is the right border; the one at (6, 4) is darker, so brighter are all others within reach.
         assert_eq!(outer_code(&image, 6, 4), 0b1111_1111);

@@ -208,7 +208,7 @@ mod tests {
         // In the middle of the left image all neighbours are brighter, in the right one none.
         let mut views = [[9; 81], [9; 81]];
         (views[0][40], views[1][40]) = (0, 10);
-        let [left, right] = views.map(|view| Image::from_grey(9, 9, &view).unwrap());
+        let [left, right] = views.map(|view| Image::from_grey(9, 9, view).unwrap());
         let pair = StereoPair::new(left, right).unwrap();
         let at = |profile, x, y| DataCost::of_pair(&pair, Model::new(profile, 1).unwrap()).unwrap().at(x, y, 0);
         assert_eq!([Profile::Census16, Profile::Census32].map(|profile| at(profile, 4, 4)), [15, 32]);

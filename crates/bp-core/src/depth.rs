@@ -143,12 +143,12 @@ mod tests {
     fn points_lie_on_the_rays_of_their_pixels() {
         let size = Size { width: 3, height: 2 };
         let map = DisparityMap::new(size, vec![2.0, f32::INFINITY, 2.0, 0.0, 4.0, 1.0]).unwrap();
-        let image = Image::from_grey(3, 2, &[1, 2, 3, 4, 5, 6]).unwrap();
+        let image = Image::from_grey(3, 2, [1, 2, 3, 4, 5, 6]).unwrap();
         let points: Vec<Point> = points(&map, &image, &calibration(0.0)).unwrap().collect();
         let expected =
             [([-10.0, -5.0, 1000.0], 1), ([10.0, -5.0, 1000.0], 3), ([0.0, 2.5, 500.0], 5), ([20.0, 10.0, 2000.0], 6)];
         assert_eq!(points, expected.map(|(position, grey)| Point { position, colour: [grey; 3] }));
-        let other = Image::from_grey(2, 3, &[0; 6]).unwrap();
+        let other = Image::from_grey(2, 3, [0; 6]).unwrap();
         assert!(matches!(super::points(&map, &other, &calibration(0.0)), Err(Error::WrongSize { .. })));
     }
 

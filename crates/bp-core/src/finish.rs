@@ -139,7 +139,7 @@ mod tests {
     fn a_map_of_unknown_pixels_stays_one() {
         let all = Finish { check: true, speckles: Some(2), fill: true, median: Some(5), subpixel: true };
         let unknown = map(2, &[NONE; 4]);
-        let image = || Image::from_grey(2, 2, &[0; 4]).unwrap();
+        let image = || Image::from_grey(2, 2, [0; 4]).unwrap();
         let blank = StereoPair::new(image(), image()).unwrap();
         assert_eq!(all.apply(&blank, unknown.clone(), Some(&unknown), &never).unwrap(), unknown);
     }

@@ -436,15 +436,15 @@ mod tests {
     fn a_strip_of_a_strip_is_a_strip_of_the_image() {
         assert_eq!(rows().strip(1..4).strip(0..2), rows().strip(1..3));
         assert_eq!(rows().strip(0..7), rows());
-        assert_ne!(rows().strip(1..2), Image::from_grey(2, 1, &[1, 1]).unwrap());
+        assert_ne!(rows().strip(1..2), Image::from_grey(2, 1, [1, 1]).unwrap());
     }
 
     #[test]
     fn bad_sizes_are_refused() {
-        assert!(matches!(Image::from_grey(0, 3, &[]), Err(Error::Empty { .. })));
-        assert!(matches!(Image::from_grey(2, 2, &[1, 2, 3]), Err(Error::PixelCount { found: 3, .. })));
+        assert!(matches!(Image::from_grey(0, 3, []), Err(Error::Empty { .. })));
+        assert!(matches!(Image::from_grey(2, 2, [1, 2, 3]), Err(Error::PixelCount { found: 3, .. })));
         assert!(matches!(Size::new(MAX_SIDE + 1, 1), Err(Error::TooLarge { .. })));
-        let (a, b) = (Image::from_grey(1, 2, &[0, 0]), Image::from_grey(2, 1, &[0, 0]));
+        let (a, b) = (Image::from_grey(1, 2, [0, 0]), Image::from_grey(2, 1, [0, 0]));
         assert!(matches!(StereoPair::new(a.unwrap(), b.unwrap()), Err(Error::SizesDiffer { .. })));
     }
 }

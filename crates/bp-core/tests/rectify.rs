@@ -94,7 +94,7 @@ fn a_rectified_pair_stays_as_it_is() {
     let pair = rectifier.rectified(&left, &right).unwrap();
     assert!(*pair.left() == left && *pair.right() == right);
     assert_eq!(rectifier.rectification().principal_points, [[48.0, 30.0]; 2]);
-    let small = Image::from_grey(5, 5, &[0; 25]).unwrap();
+    let small = Image::from_grey(5, 5, [0; 25]).unwrap();
     assert!(matches!(rectifier.rectified(&left, &small), Err(Error::WrongSize { what: "the right image", .. })));
 }
 

@@ -257,7 +257,7 @@ fn a_shifted_random_dot_pair_gives_the_shift() {
 /// Black against white gives the highest costs, and 14 grids reach the widest sums.
 #[test]
 fn sums_hold_the_extreme_costs() {
-    let view = |value| Image::from_grey(67, 33, &[value; 67 * 33]).unwrap();
+    let view = |value| Image::from_grey(67, 33, [value; 67 * 33]).unwrap();
     let pair = StereoPair::new(view(255), view(0)).unwrap();
     for profile in Profile::ALL {
         let plan = Plan::new(pair.size(), Model::new(profile, 4).unwrap(), plan_settings(14, 1, Schedule::Sync));

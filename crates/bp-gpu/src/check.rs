@@ -19,8 +19,8 @@ pub fn check(device: &dyn Device) -> Result<(), String> {
 }
 
 fn solve(device: &dyn Device) -> Result<Vec<u16>, Error> {
-    let left = Image::from_grey(3, 2, &[40, 52, 60, 40, 45, 60])?;
-    let right = Image::from_grey(3, 2, &[52, 60, 61, 40, 60, 60])?;
+    let left = Image::from_grey(3, 2, [40, 52, 60, 40, 45, 60])?;
+    let right = Image::from_grey(3, 2, [52, 60, 61, 40, 60, 60])?;
     let pair = StereoPair::new(left, right)?;
     let (schedule, message_start) = (Schedule::Sync, MessageStart::Receiver);
     let settings =

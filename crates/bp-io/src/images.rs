@@ -51,11 +51,9 @@ fn in_8_bits(image: DynamicImage) -> Result<Image, bp_core::Error> {
         (true, true) => {
             Image::from_rgb(width, height, image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect())
         }
-        (true, false) => Image::from_grey(
-            width,
-            height,
-            image.into_luma16().into_iter().map(|&grey| narrow(grey)).collect::<Vec<_>>(),
-        ),
+        (true, false) => {
+            Image::from_grey(width, height, image.into_luma16().iter().map(|&grey| narrow(grey)).collect::<Vec<_>>())
+        }
         (false, true) => Image::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect()),
         (false, false) => Image::from_grey(width, height, image.into_luma8().into_raw()),
     }

@@ -127,7 +127,7 @@ mod tests {
     fn edges_and_unknown_pixels_stay() {
         let values = vec![3.0, 3.0, DisparityMap::UNKNOWN, f32::MAX, f32::MIN];
         let map = DisparityMap::new(Size { width: 5, height: 1 }, values).unwrap();
-        let blank = || Image::from_grey(5, 1, &[9; 5]).unwrap();
+        let blank = || Image::from_grey(5, 1, [9; 5]).unwrap();
         let pair = StereoPair::new(blank(), blank()).unwrap();
         assert_eq!(subpixel(&pair, map.clone(), &never).unwrap(), map);
         assert!(subpixel(&pair, DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap(), &never).is_err());

@@ -105,10 +105,10 @@ mod tests {
 
     #[test]
     fn a_pixel_is_the_mean_of_its_block() {
-        let image = Image::from_grey(5, 3, &[1, 2, 9, 9, 77, 3, 5, 9, 9, 77, 77, 77, 77, 77, 77]).unwrap();
-        assert_eq!(mean_of_blocks(&image, 2).unwrap(), Image::from_grey(2, 1, &[3, 9]).unwrap());
+        let image = Image::from_grey(5, 3, [1, 2, 9, 9, 77, 3, 5, 9, 9, 77, 77, 77, 77, 77, 77]).unwrap();
+        assert_eq!(mean_of_blocks(&image, 2).unwrap(), Image::from_grey(2, 1, [3, 9]).unwrap());
         assert_eq!(mean_of_blocks(&image, 1).unwrap(), image);
-        let line = Image::from_grey(1, 4, &[1, 3, 5, 8]).unwrap();
-        assert_eq!(mean_of_blocks(&line, 2).unwrap(), Image::from_grey(1, 2, &[2, 7]).unwrap());
+        let line = Image::from_grey(1, 4, [1, 3, 5, 8]).unwrap();
+        assert_eq!(mean_of_blocks(&line, 2).unwrap(), Image::from_grey(1, 2, [2, 7]).unwrap());
     }
 }

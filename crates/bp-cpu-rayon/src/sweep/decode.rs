@@ -246,7 +246,7 @@ impl<S: Simd> Edges<S> {
         let edges = nodes.model.edges().smoothness();
         let mut truncations = of_sides::<S, LEVELS>(simd, levels, edges.map(|edge| edge.truncation));
         for (truncation, mask) in truncations.iter_mut().zip(nodes.masks) {
-            *truncation = *truncation & Bytes::from_slice(simd, &mask[nodes.lane..nodes.lane + LANES]);
+            *truncation &= Bytes::from_slice(simd, &mask[nodes.lane..nodes.lane + LANES]);
         }
         let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
         Self {
