@@ -9,7 +9,7 @@
 //! # let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * x * 31 + x * y * 17) % 251) as u8;
 //! # let view = |shift| (0..32 * 20).map(|i| noise(i % 32 + shift, i / 32)).collect::<Vec<u8>>();
 //! # let (left, right) = (view(0), view(3));
-//! let pair = StereoPair::new(Image::from_grey(32, 20, &left)?, Image::from_grey(32, 20, &right)?)?;
+//! let pair = StereoPair::new(Image::from_grey(32, 20, left)?, Image::from_grey(32, 20, right)?)?;
 //! let model = Model::new(Profile::Census, 16)?;
 //! let settings = Algorithm::Cfcsbp.settings(pair.size(), 16, 2, Schedule::Checkerboard);
 //! let plan = Plan::new(pair.size(), model, settings)?;

@@ -46,8 +46,8 @@
 //! use bp_core::{Backend, DataCost};
 //!
 //! # fn main() -> Result<(), bp_core::Error> {
-//! let left = Image::from_grey(3, 2, &[40, 52, 60, 40, 45, 60])?;
-//! let right = Image::from_grey(3, 2, &[52, 60, 61, 40, 60, 60])?;
+//! let left = Image::from_grey(3, 2, [40, 52, 60, 40, 45, 60])?;
+//! let right = Image::from_grey(3, 2, [52, 60, 61, 40, 60, 60])?;
 //! let pair = StereoPair::new(left, right)?;
 //! let model = Model::new(Profile::Thesis, 3)?;
 //!

@@ -7,8 +7,8 @@
 //! # let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * x * 31 + x * y * 17) % 251) as u8;
 //! # let view = |shift| (0..64 * 48).map(|i| noise(i % 64 + shift, i / 64)).collect::<Vec<u8>>();
 //! # let (grey_left, grey_right) = (view(0), view(3));
-//! let left = Image::from_grey(64, 48, &grey_left)?;
-//! let right = Image::from_grey(64, 48, &grey_right)?;
+//! let left = Image::from_grey(64, 48, grey_left)?;
+//! let right = Image::from_grey(64, 48, grey_right)?;
 //! let mut matcher = Matcher::new(&Options::default().with_labels(16).with_check(true))?;
 //! let disparity = matcher.compute(&left, &right)?;
 //! assert!(disparity.map.at(40, 20).is_some_and(|pixels| (pixels - 3.0).abs() < 0.1));
