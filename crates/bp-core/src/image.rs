@@ -409,6 +409,22 @@ mod tests {
     }
 
     #[test]
+    fn an_image_holds_colours_only_if_it_has_some() {
+        let [equal, red] = [[[7; 3], [9; 3]].as_slice(), [[7; 3], [9; 3], [255, 0, 0]].as_slice()];
+        let (grey, equal) = (Image::from_grey(2, 1, [7, 9]).unwrap(), Image::from_rgb(2, 1, equal.to_vec()).unwrap());
+        assert!(grey == equal && equal.is_grey() && equal.bytes() == 2 && equal.rgb(1, 0) == [9; 3]);
+        let coloured = Image::from_rgb(3, 1, red.to_vec()).unwrap();
+        assert_eq!((coloured.greys(), coloured.colours()), ([7, 9, 76].as_slice(), Some(red)));
+        // A part that happens to be grey is the same image.
+        assert_eq!(coloured.part(0..2, 0..1), grey);
+        let without = coloured.clone().without_colours();
+        assert!(without != coloured && without.bytes() < coloured.bytes() && *without.pixels() != *red);
+        // Another colour of the same grey.
+        let other = Image::from_rgb(3, 1, vec![[7; 3], [9; 3], [254, 0, 0]]).unwrap();
+        assert!(other.greys() == coloured.greys() && other != coloured);
+    }
+
+    #[test]
     fn narrow_inverts_widening_by_257() {
         assert!((0..=255u8).all(|v| narrow(u16::from(v) * 257) == v));
         assert_eq!([narrow(128), narrow(129), narrow(u16::MAX)], [0, 1, 255]);

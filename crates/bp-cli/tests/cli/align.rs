@@ -3,6 +3,7 @@
 use std::fs;
 
 use bp_core::{Alignment, Size};
+use bp_io::{Files, Limits, read_image, write_image};
 use bp_testkit::synthetic;
 use serde_json::Value;
 
@@ -40,6 +41,27 @@ fn rows_are_aligned_unless_that_is_off() {
     assert!(report.contains(&format!("rows      differ by {least:.2} to {largest:.2} px; corrected")), "{report}");
     let same = text(&folder.run("match left.png left.png --labels 16 -o a.pfm").stdout);
     assert!(same.contains("rows      agree"), "{same}");
+}
+
+/// Rows are aligned in grey: between rows, the grey value of a colour is not always that of the grey rows.
+#[test]
+fn colours_that_a_profile_does_not_compare_change_nothing() {
+    let folder = views();
+    for name in ["left", "right"] {
+        let grey = read_image(&folder.path(&format!("{name}.png")), Limits::default()).unwrap().without_colours();
+        write_image(&Files::default(), &folder.path(&format!("grey-{name}.png")), &grey).unwrap();
+    }
+    for (options, is_same) in [("", true), ("--check left-right", true), ("--profile census32", false)] {
+        assert_eq!(rows(&folder, &format!("coloured.pfm {options}"))["corrected"], true);
+        assert!(
+            folder
+                .run(&format!("match grey-left.png grey-right.png --labels 32 -o grey.pfm {options}"))
+                .status
+                .success()
+        );
+        let [coloured, grey] = ["coloured", "grey"].map(|name| fs::read(folder.path(&format!("{name}.pfm"))).unwrap());
+        assert_eq!(coloured == grey, is_same, "{options}");
+    }
 }
 
 #[test]
