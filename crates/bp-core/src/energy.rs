@@ -5,16 +5,13 @@ use std::ops::Range;
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{DataCost, EdgeLevels, Error, Model, Size, StereoPair, image::APRON};
+use crate::{DataCost, EdgeLevels, Error, Image, Model, Size, StereoPair, image::APRON};
 
 /// Rows that one thread adds up. Only their features are held.
 const ROWS: usize = 32;
 
 /// The most bytes that a profile compares for each pixel.
 const MOST_FEATURES: usize = 4;
-
-/// The most bytes of a pixel: three channels and its grey value.
-const MOST_BYTES: usize = 4;
 
 /// The energy of a labelling in the units of its profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,7 +46,7 @@ impl Energy {
     #[must_use]
     pub fn temporary_bytes(size: Size, threads: usize) -> u64 {
         let (rows, known) = (size.height.min(ROWS), size.height.min(ROWS + 2 * APRON));
-        let a_column = 2 * (MOST_BYTES * known + MOST_FEATURES * rows);
+        let a_column = 2 * (Image::COLOUR_BYTES as usize * known + MOST_FEATURES * rows);
         size.height.div_ceil(ROWS).min(threads) as u64 * (a_column * size.width) as u64
     }
 
@@ -127,7 +124,7 @@ pub fn cheapest_labels(pair: &StereoPair, model: &Model) -> Result<Vec<u16>, Err
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, Profile};
+    use crate::Profile;
 
     #[test]
     fn energy_counts_every_pixel_and_edge_once() {

@@ -44,6 +44,11 @@ pub struct Image {
 }
 
 impl Image {
+    /// Bytes per pixel of a grey image, and of one with colours.
+    pub const GREY_BYTES: u64 = 1;
+    /// See [`Image::GREY_BYTES`].
+    pub const COLOUR_BYTES: u64 = 4;
+
     /// An image from its colours, `[height][width]`.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The model: labels, data cost profile and smoothness of a Markov random field on a grid.
 
 use crate::{
-    EdgeLevels, Error, Smoothness,
+    EdgeLevels, Error, Image, Smoothness,
     limits::{MAX_LABELS, MAX_SIDE, MAX_TRUNCATION},
 };
 
@@ -69,6 +69,12 @@ impl Profile {
     #[must_use]
     pub fn compares_colours(self) -> bool {
         matches!(self, Self::Mrf | Self::Census32)
+    }
+
+    /// Bytes per pixel of what it compares of an image.
+    #[must_use]
+    pub fn image_bytes(self) -> u64 {
+        if self.compares_colours() { Image::COLOUR_BYTES } else { Image::GREY_BYTES }
     }
 
     /// The largest data cost.

@@ -47,15 +47,29 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
 
 fn in_8_bits(image: DynamicImage) -> Result<Image, bp_core::Error> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    match (has_16_bits(&image), image.color().has_color()) {
-        (true, true) => {
-            Image::from_rgb(width, height, image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect())
-        }
-        (true, false) => {
-            Image::from_grey(width, height, image.into_luma16().iter().map(|&grey| narrow(grey)).collect::<Vec<_>>())
-        }
-        (false, true) => Image::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect()),
-        (false, false) => Image::from_grey(width, height, image.into_luma8().into_raw()),
+    // What was decoded is freed before the image is made.
+    if image.color().has_color() {
+        let colours = colours(image);
+        Image::from_rgb(width, height, colours)
+    } else {
+        let greys = greys(image);
+        Image::from_grey(width, height, greys)
+    }
+}
+
+fn colours(image: DynamicImage) -> Vec<[u8; 3]> {
+    if has_16_bits(&image) {
+        image.into_rgb16().pixels().map(|pixel| pixel.0.map(narrow)).collect()
+    } else {
+        image.into_rgb8().pixels().map(|pixel| pixel.0).collect()
+    }
+}
+
+fn greys(image: DynamicImage) -> Vec<u8> {
+    if has_16_bits(&image) {
+        image.into_luma16().iter().map(|&grey| narrow(grey)).collect()
+    } else {
+        image.into_luma8().into_raw()
     }
 }
 

@@ -295,7 +295,10 @@ impl Matcher {
 
 /// The pair with aligned rows, if there is an alignment.
 fn aligned(pair: StereoPair, alignment: Option<&Alignment>) -> Result<StereoPair, Error> {
-    Ok(alignment.map_or(Ok(pair.clone()), |alignment| alignment.aligned(&pair))?)
+    match alignment {
+        Some(alignment) => Ok(alignment.aligned(&pair)?),
+        None => Ok(pair),
+    }
 }
 
 impl fmt::Debug for Matcher {

@@ -1,6 +1,6 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Energy, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish};
+use bp_core::{Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
@@ -12,10 +12,6 @@ const KEPT: u64 = 32 << 20;
 
 /// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
 pub(crate) const LISTED: u64 = 3 << 10;
-
-/// Bytes per pixel of an image: its grey values, and those with its colours.
-const GREY: u64 = 1;
-pub(crate) const COLOUR: u64 = 4;
 
 /// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
@@ -29,7 +25,7 @@ const LABELS: u64 = 2;
 
 /// Bytes per pixel of a pair that is read while another is matched: one image, and the other as a file, decoded and
 /// copied.
-const READING: u64 = COLOUR + 9;
+const READING: u64 = Image::COLOUR_BYTES + 9;
 
 /// Bytes per pixel of the confidence.
 const TRUST: u64 = 4;
@@ -80,8 +76,7 @@ pub(crate) struct Images {
 
 impl Images {
     pub(crate) fn of(pair: &StereoPair, profile: Profile, is_aligned: bool) -> Self {
-        let compared = if profile.compares_colours() { COLOUR } else { GREY };
-        Self { bytes: pair.bytes(), compared, is_aligned }
+        Self { bytes: pair.bytes(), compared: profile.image_bytes(), is_aligned }
     }
 }
 
@@ -164,7 +159,7 @@ impl Bytes {
         let right = if_so(options.needs_right(), RIGHT_MAP.max(2 * images.compared));
         let trust = if_so(options.confidence, TRUST);
         // Assumes that the next and the previous pair of a batch have the same size as this one.
-        let others = if_so(beside.batch, READING + 2 * COLOUR + MAP + trust + depth + WRITING);
+        let others = if_so(beside.batch, READING + 2 * Image::COLOUR_BYTES + MAP + trust + depth + WRITING);
         Self {
             held: PROGRAM + LISTED * beside.pairs as u64 + images.bytes + a_pixel(aligned + positions + truth),
             coming: a_pixel(right + others),

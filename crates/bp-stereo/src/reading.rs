@@ -5,14 +5,10 @@ use std::path::Path;
 use bp_core::{DeviceKind, Image, StereoPair};
 use bp_io::{Limits, read_image};
 
-use crate::{
-    Error, Memory, Rectifying,
-    memory::{COLOUR, PROGRAM},
-    rectifying::POSITIONS,
-};
+use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
 
 /// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
-const RECTIFYING: u64 = 2 * COLOUR + POSITIONS;
+const RECTIFYING: u64 = 2 * Image::COLOUR_BYTES + POSITIONS;
 
 /// Bytes that may be read in any case: the threads and outputs that [`PROGRAM`] counts are not there yet. So small images
 /// are refused when their plan is known, with advice that suits it.

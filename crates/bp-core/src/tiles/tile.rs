@@ -56,9 +56,7 @@ impl Tile {
 
     /// The bytes of such a copy of what a profile compares.
     pub(super) fn pair_bytes(&self, profile: Profile) -> u64 {
-        // Grey values, and colours beside them.
-        let a_pixel = if profile.compares_colours() { 4 } else { 1 };
-        2 * a_pixel * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
+        2 * profile.image_bytes() * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
     }
 }
 
