@@ -67,3 +67,30 @@ impl<T: Copy> Rows<T> {
         self.first.wrapping_offset(y as isize * self.stride).cast()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Miri runs this, too: it would notice a value outside the rows, or one that was never written.
+    #[test]
+    #[expect(unsafe_code, reason = "as the interface calls them")]
+    fn rows_lie_apart_and_may_end_where_memory_begins() -> Result<(), String> {
+        let size = Size { width: 2, height: 3 };
+        let values: Vec<u16> = (0..6).collect();
+        for stride in [2, 5, -2, -5_isize] {
+            let last = 2 * stride.unsigned_abs();
+            let mut memory = vec![u16::MAX; last + 2];
+            let first = if stride < 0 { last } else { 0 };
+            let start = memory.as_mut_ptr().wrapping_add(first);
+            let rows = Rows::new("rows", start, 2 * stride, size, 1).map_err(|Failure(_, what)| what)?;
+            // SAFETY: the rows lie in the memory.
+            unsafe { rows.write(values.iter().copied()) };
+            // SAFETY: as above.
+            let read: Vec<u16> = (0..3).flat_map(|y| unsafe { rows.read(y) }).collect();
+            assert_eq!(read, values, "{stride}");
+            assert_eq!(memory.iter().filter(|&&value| value == u16::MAX).count(), memory.len() - 6, "{stride}");
+        }
+        Ok(())
+    }
+}

@@ -1,5 +1,6 @@
 """The plug-in for Pandora, in its own pipeline and through its own command."""
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -24,8 +25,8 @@ def save(path, array, **profile):
     return str(path)
 
 
-def run(folder, pipeline, disparity, left=None, right=None, mask=None):
-    """Pandora's own command on a pair with the disparity 5: -5 in Pandora's sign."""
+def run(folder, pipeline, disparity, mask=None):
+    """The map of a pair with the disparity 5: -5 in Pandora's sign."""
     one, other = shifted(60, 100, 5)
     inputs = {
         side: {"img": save(folder / f"{side}.tif", image.astype(numpy.float32) * 7 + 300), "disp": disparity, "nodata": -9999}
@@ -34,6 +35,11 @@ def run(folder, pipeline, disparity, left=None, right=None, mask=None):
     inputs["right"].pop("disp")
     if mask is not None:
         inputs["left"]["mask"] = save(folder / "mask.tif", mask.astype(numpy.uint8))
+    return answer(folder, inputs, pipeline)
+
+
+def answer(folder, inputs, pipeline):
+    """The map that Pandora's own command makes."""
     (folder / "config.json").write_text(json.dumps({"input": inputs, "pipeline": pipeline}))
     command = pathlib.Path(sys.executable).with_name("pandora")
     done = subprocess.run([command, "config.json", "out"], cwd=folder, capture_output=True, text=True)
@@ -67,3 +73,31 @@ def test_cross_checking_uses_it_for_the_right_image_too(tmp_path):
     found = run(tmp_path, pipeline, [-12, 0])
     assert abs(numpy.median(found[found != -9999]) + 5) < 0.1
     assert (tmp_path / "out" / "right_disparity.tif").exists()
+
+
+@pytest.mark.skipif("BP_DATA" not in os.environ, reason="BP_DATA is not set")
+def test_on_pandoras_example_ours_is_right_more_often(tmp_path):
+    """Cones (Scharstein and Szeliski 2003) with the configuration that Pandora gives as its example of block matching."""
+    cones = pathlib.Path(os.environ["BP_DATA"]) / "middlebury2001-2003" / "cones"
+
+    def grey(name):
+        with rasterio.open(cones / name) as file:
+            return file.read().mean(axis=0).astype(numpy.float32)
+
+    inputs = {side: {"img": save(tmp_path / f"{side}.tif", grey(name))} for side, name in (("left", "imL.png"), ("right", "imR.png"))}
+    inputs["left"]["disp"] = [-60, 0]
+    truth, is_seen_by_both = grey("groundtruth.png") / 4, (grey("groundtruth.png") > 0) & (grey("nonocc.png") > 0)
+    example = {
+        "matching_cost": {"matching_cost_method": "zncc", "window_size": 5, "subpix": 4},
+        "disparity": {"disparity_method": "wta", "invalid_disparity": "NaN"},
+        "refinement": {"refinement_method": "quadratic"},
+        "validation": {"validation_method": "cross_checking_accurate"},
+    }
+    ours = {step: example[step] for step in example if step != "refinement"}
+    ours["disparity"] = {"disparity_method": "bpstereo", "invalid_disparity": "NaN"}
+
+    def bad(pipeline):
+        """The share of pixels seen by both cameras that have no disparity within 1 px of the truth. Pandora's sign is negative."""
+        return 1 - (abs(answer(tmp_path, inputs, pipeline) + truth) <= 1)[is_seen_by_both].mean()
+
+    assert bad(ours) < bad(example) / 2

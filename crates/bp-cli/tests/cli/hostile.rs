@@ -10,6 +10,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
 use crate::{
     folder::{Folder, MATCH, text},
     many::{TINY, names, place},
@@ -81,6 +84,23 @@ fn a_record_that_is_a_pipe_stops_no_other_pair() {
     let output = folder.run(&format!("match --pairs list --output out {TINY}"));
     assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
     assert_eq!(names(&folder.path("out")), ["b"]);
+}
+
+/// Of two reads, the second one could meet another image. A pipe gives its bytes once.
+#[test]
+fn a_record_names_the_bytes_that_were_matched() {
+    let folder = Folder::new();
+    let image = fs::read(folder.path("left.png")).unwrap();
+    pipe(&folder.path("pipe.png"));
+    fs::write(folder.path("list"), "pipe.png right.png a\n").unwrap();
+    let (path, sent) = (folder.path("pipe.png"), image.clone());
+    let sender = thread::spawn(move || fs::write(path, sent));
+    let output = folder.run(&format!("match --pairs list --output out {TINY}"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    sender.join().unwrap().unwrap();
+    let record: Value = serde_json::from_slice(&fs::read(folder.path("out/records/a.json")).unwrap()).unwrap();
+    let of_bytes: String = Sha256::digest(&image).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(record["inputs"][0]["sha256"], of_bytes.as_str());
 }
 
 #[test]
