@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use crate::{Error, Plan, Seed, Side, Stage, StereoPair};
+use crate::{Error, IsStopped, Plan, Seed, Side, Stage, StereoPair};
 
 /// A way to run plans: the CPU, or an API with several devices.
 pub trait Backend: Sync {
@@ -90,11 +90,13 @@ impl DeviceKind {
 
 /// An open device.
 pub trait Device: Send + Sync {
-    /// Allocates everything that solving `plan` needs.
+    /// Allocates everything that solving `plan` needs, unless it is stopped. A device that cannot be stopped here ignores
+    /// `is_stopped`.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] and [`Error::Unsupported`], if possible before any allocation, and errors of the device.
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error>;
+    /// [`Error::OutOfMemory`] and [`Error::Unsupported`], if possible before any allocation, [`Error::Stopped`], and errors of
+    /// the device.
+    fn prepare(&self, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Box<dyn Solver>, Error>;
 
     /// Checks that the device can run a plan, without allocating anything. The default accepts every plan.
     ///

@@ -5,7 +5,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{Device, DisparityMap, Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, census, memory};
+use crate::{
+    Device, DisparityMap, Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, census, memory,
+    never,
+};
 
 /// The times of one solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,11 +63,19 @@ impl Driver {
     /// # Errors
     /// Those of [`Device::prepare`].
     pub fn new(device: &dyn Device, plan: Plan) -> Result<Self, Error> {
+        Self::new_unless(&never, device, plan)
+    }
+
+    /// [`Driver::new`] unless it is stopped.
+    ///
+    /// # Errors
+    /// As [`Driver::new`], and [`Error::Stopped`].
+    pub fn new_unless(is_stopped: IsStopped<'_>, device: &dyn Device, plan: Plan) -> Result<Self, Error> {
         let start = Instant::now();
-        let solver = device.prepare(&plan)?;
+        let solver = device.prepare(&plan, is_stopped)?;
         let (size, labels, bytes) = (plan.image_size(), plan.model().labels(), solver.allocated_bytes());
         log::debug!("prepared for {size} pixels and {labels} labels in {:?}, {bytes} bytes", start.elapsed());
-        let labels = memory::filled("labels", plan.image_size().pixels(), 0)?;
+        let labels = memory::filled_unless(is_stopped, "labels", plan.image_size().pixels(), 0)?;
         Ok(Self { plan, solver, labels, has_messages: false })
     }
 

@@ -22,20 +22,7 @@ pub use offsets::window_bytes;
 pub use speckles::remove_speckles;
 pub use subpixel::subpixel;
 
-use crate::{DisparityMap, Error, StereoPair};
-
-/// Asked before every row of operations that take long, by several threads: whether to end with [`Error::Stopped`].
-pub type IsStopped<'a> = &'a (dyn Fn() -> bool + Sync);
-
-/// An [`IsStopped`] for work that is never stopped.
-#[must_use]
-pub fn never() -> bool {
-    false
-}
-
-fn go_on(is_stopped: IsStopped<'_>) -> Result<(), Error> {
-    if is_stopped() { Err(Error::Stopped) } else { Ok(()) }
-}
+use crate::{DisparityMap, Error, IsStopped, StereoPair};
 
 /// The operations that a disparity map goes through after matching; by default none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -89,7 +76,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
-    use crate::{Image, Size};
+    use crate::{Image, Size, never};
 
     const NONE: f32 = DisparityMap::UNKNOWN;
 

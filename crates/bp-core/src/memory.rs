@@ -4,7 +4,7 @@ use std::{hint::black_box, mem::MaybeUninit, time::Instant};
 
 use rayon::prelude::*;
 
-use crate::Error;
+use crate::{Error, IsStopped, never, stop::go_on};
 
 /// Allocates a vector of `len` copies of `value`. Writes its memory now, so that no page is first touched while a solve
 /// is timed.
@@ -12,13 +12,31 @@ use crate::Error;
 /// # Errors
 /// [`Error::OutOfMemory`] if the allocator refuses; `what` names the buffer in the error.
 pub fn filled<T: Clone + Send + Sync>(what: &'static str, len: usize, value: T) -> Result<Vec<T>, Error> {
+    filled_unless(&never, what, len, value)
+}
+
+/// [`filled`] unless it is stopped: some systems take seconds to hand out much memory.
+///
+/// # Errors
+/// As [`filled`], and [`Error::Stopped`].
+pub fn filled_unless<T: Clone + Send + Sync>(
+    is_stopped: IsStopped<'_>,
+    what: &'static str,
+    len: usize,
+    value: T,
+) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
     reserve(what, &mut values, len)?;
-    // Most of the time is the system's, to hand out memory. So the threads of a pool ask for much of it together.
-    if len.saturating_mul(size_of::<T>()) >= MUCH && rayon::current_thread_index().is_some() {
-        values.par_extend(rayon::iter::repeat_n(value, len));
-    } else {
-        values.resize(len, value);
+    let much = MUCH / size_of::<T>().max(1);
+    while values.len() < len {
+        go_on(is_stopped)?;
+        let more = much.min(len - values.len());
+        // Most of the time is the system's, to hand out memory. So the threads of a pool ask for much of it together.
+        if more == much && rayon::current_thread_index().is_some() {
+            values.par_extend(rayon::iter::repeat_n(value.clone(), more));
+        } else {
+            values.resize(values.len() + more, value.clone());
+        }
     }
     Ok(values)
 }
@@ -43,7 +61,7 @@ fn reserve<T>(what: &'static str, values: &mut Vec<T>, len: usize) -> Result<(),
     Ok(())
 }
 
-/// Threads share the writing of this many bytes.
+/// Threads share the writing of this many bytes. In between it may be stopped.
 const MUCH: usize = 32 << 20;
 
 /// Fewer bytes are not worth a large page, which usually has 2 MiB.
@@ -98,4 +116,24 @@ pub fn copy_rate(copy: impl Fn(&[u8], &mut [u8])) -> Result<f64, Error> {
     let mut times = [(); COPIES].map(|()| time());
     times.sort_unstable();
     Ok(2.0 * COPIED as f64 / times[COPIES / 2].as_secs_f64().max(f64::MIN_POSITIVE))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_long_allocation_can_be_stopped_now_and_then() {
+        let asked = AtomicUsize::new(0);
+        let fill = |len, most| {
+            asked.store(0, Ordering::Relaxed);
+            filled_unless(&|| asked.fetch_add(1, Ordering::Relaxed) == most, "bytes", len, 7_u8)
+                .map(|values| values.len())
+        };
+        assert_eq!((fill(3 * MUCH + 1, usize::MAX), asked.load(Ordering::Relaxed)), (Ok(3 * MUCH + 1), 4));
+        assert_eq!((fill(3 * MUCH + 1, 2), asked.load(Ordering::Relaxed)), (Err(Error::Stopped), 3));
+        assert_eq!([fill(0, 0), fill(1, 0)], [Ok(0), Err(Error::Stopped)]);
+    }
 }

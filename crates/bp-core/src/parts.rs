@@ -9,8 +9,7 @@ use std::{
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::{
-    Device, Driver, Error, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census, finish::IsStopped,
-    memory,
+    Device, Driver, Error, IsStopped, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census, memory,
 };
 
 /// A part of a cut image with a plan of its own. No message crosses the cut, so its messages and labels are the same bits as
@@ -236,7 +235,7 @@ impl PartDriver {
             if self.drivers.first().is_none_or(|driver| *driver.plan() != part.plan) {
                 // The old one goes before the new one comes: there is room for one.
                 self.drivers.clear();
-                self.drivers.push(Driver::new(device, part.plan.clone())?);
+                self.drivers.push(Driver::new_unless(is_stopped, device, part.plan.clone())?);
             }
             let driver = &mut self.drivers[0];
             times += part.solve(driver, pair, seed, is_stopped)?;

@@ -3,12 +3,14 @@
 mod tile;
 mod tiling;
 
-use std::{ops::ControlFlow, time::Instant};
+use std::{ops::ControlFlow, sync::Mutex, time::Instant};
 
 pub use tile::{Span, Tile};
 pub use tiling::{HALO, Needed, Tiling};
 
-use crate::{Device, DisparityMap, Driver, Error, Observer, Plan, Progress, Side, StereoPair, Times, memory};
+use crate::{
+    Device, DisparityMap, Driver, Error, IsStopped, Observer, Plan, Progress, Side, StereoPair, Times, memory, never,
+};
 
 /// A way to solve tiles.
 #[derive(Clone, Copy)]
@@ -40,11 +42,19 @@ impl Tiled {
     /// # Errors
     /// Those of [`Device::prepare`].
     pub fn new(device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
+        Self::new_unless(&never, device, tiling)
+    }
+
+    /// [`Tiled::new`] unless it is stopped.
+    ///
+    /// # Errors
+    /// As [`Tiled::new`], and [`Error::Stopped`].
+    pub fn new_unless(is_stopped: IsStopped<'_>, device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
         let pixels = if tiling.is_whole() { 0 } else { tiling.plan().image_size().pixels() };
-        let labels = memory::filled("labels", pixels, 0)?;
+        let labels = memory::filled_unless(is_stopped, "labels", pixels, 0)?;
         let mut tiled = Self { tiling, driver: None, labels, most_bytes: 0, updates: 0 };
         if let Some(tile) = tiled.tiling.tiles().first() {
-            tiled.driver = Some(tiled.prepared(device, tile)?);
+            tiled.driver = Some(tiled.prepared(is_stopped, device, tile)?);
         }
         Ok(tiled)
     }
@@ -132,7 +142,11 @@ impl Tiled {
         self.updates = 0;
         let (mut times, mut done, total) = (Times::default(), 0, self.tiling.sum_of_updates(way.updates));
         for tile in self.tiling.tiles() {
-            let mut driver = self.prepared(device, &tile)?;
+            let mut driver = {
+                let report = Mutex::new(&mut *observer);
+                let is_stopped = || report.lock().is_ok_and(|mut report| report(Progress { done, total }).is_break());
+                self.prepared(&is_stopped, device, &tile)?
+            };
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
             let solved = self.solve_tile(way, &mut driver, pair, &tile, observe);
             done += (way.updates)(driver.plan());
@@ -197,11 +211,11 @@ impl Tiled {
     }
 
     /// Takes the current driver if it fits the tile. Otherwise frees it and prepares the tile's plan.
-    fn prepared(&mut self, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
+    fn prepared(&mut self, is_stopped: IsStopped<'_>, device: &dyn Device, tile: &Tile) -> Result<Driver, Error> {
         let plan = tile.plan(self.tiling.plan())?;
         let mut driver = match self.driver.take().filter(|driver| *driver.plan() == plan) {
             Some(driver) => driver,
-            None => Driver::new(device, plan)?,
+            None => Driver::new_unless(is_stopped, device, plan)?,
         };
         driver.limit_bytes(self.tiling.limit(tile).unwrap_or(u64::MAX));
         self.most_bytes = self.most_bytes.max(driver.allocated_bytes());

@@ -1,6 +1,6 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, Plan, memory};
+use bp_core::{Error, IsStopped, Plan, memory};
 use fearless_simd::{Bytes as _, Simd, SimdBase, u16x16};
 use rayon::prelude::*;
 
@@ -29,16 +29,16 @@ pub(crate) enum Sums {
 
 impl Costs {
     /// Allocates room for the costs of `grid`.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
             _ if !plan.keeps_sums(grid) => Sums::None,
-            1 => Sums::U8(memory::filled(what, len, Block::ZERO)?),
-            2 => Sums::U16(memory::filled(what, len, Block([0; LANES]))?),
-            4 => Sums::U32(memory::filled(what, len, Block([0; LANES]))?),
-            _ => Sums::U64(memory::filled(what, len, Block([0; LANES]))?),
+            1 => Sums::U8(memory::filled_unless(is_stopped, what, len, Block::ZERO)?),
+            2 => Sums::U16(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
+            4 => Sums::U32(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
+            _ => Sums::U64(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
         };
-        Ok(Self { stored: memory::filled("data cost", len, Block::ZERO)?, sums })
+        Ok(Self { stored: memory::filled_unless(is_stopped, "data cost", len, Block::ZERO)?, sums })
     }
 
     /// Allocates nothing.

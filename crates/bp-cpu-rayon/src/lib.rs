@@ -29,7 +29,7 @@ mod shape;
 mod solver;
 mod sweep;
 
-use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Solver, memory};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, IsStopped, Plan, Solver, memory};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
@@ -92,8 +92,8 @@ struct RayonDevice {
 }
 
 impl Device for RayonDevice {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
-        Ok(Box::new(solver::RayonSolver::new(self.level, plan)?))
+    fn prepare(&self, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
+        Ok(Box::new(solver::RayonSolver::new(self.level, plan, is_stopped)?))
     }
 
     fn planned_bytes(&self, plan: &Plan) -> u64 {

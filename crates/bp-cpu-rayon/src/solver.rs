@@ -2,7 +2,7 @@
 
 use std::ops::{ControlFlow, Range};
 
-use bp_core::{Error, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
+use bp_core::{Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
 use fearless_simd::Level;
 
 use crate::{
@@ -84,10 +84,11 @@ fn bytes(plan: &Plan, labels: usize) -> u64 {
 
 impl RayonSolver {
     /// Allocates all buffers.
-    pub(crate) fn new(level: Level, plan: &Plan) -> Result<Self, Error> {
-        let set = |grid| if has_sets(plan) && grid < plan.grids() { Edges::new(plan, grid) } else { Ok(Edges::none()) };
+    pub(crate) fn new(level: Level, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
+        let has_set = |grid| has_sets(plan) && grid < plan.grids();
+        let set = |grid| if has_set(grid) { Edges::new(plan, grid, is_stopped) } else { Ok(Edges::none()) };
         let messages = |grid| Ok::<_, Error>(Messages { sets: [set(grid)?, set(grid)?] });
-        let costs = |grid| if is_stored(plan, grid) { Costs::new(plan, grid) } else { Ok(Costs::none()) };
+        let costs = |grid| if is_stored(plan, grid) { Costs::new(plan, grid, is_stopped) } else { Ok(Costs::none()) };
         Ok(Self {
             level,
             layouts: (0..plan.grids()).map(|grid| Layout::new(plan, grid)).collect::<Result<_, _>>()?,

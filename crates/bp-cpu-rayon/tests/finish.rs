@@ -3,7 +3,8 @@
 
 use bp_core::{
     Algorithm, Backend, DisparityMap, Driver, GroundTruth, MapErrors, Model, Plan, Profile, Schedule, StereoPair,
-    finish::{self, Finish, never},
+    finish::{self, Finish},
+    never,
 };
 use bp_cpu_rayon::Rayon;
 use bp_testkit::synthetic::{self, Scene};

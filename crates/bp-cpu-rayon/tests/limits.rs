@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use bp_core::{Algorithm, Backend, Error, Model, Plan, Profile, Schedule, Settings, Size, Solver};
+use bp_core::{Algorithm, Backend, Error, Model, Plan, Profile, Schedule, Settings, Size, Solver, never};
 use bp_cpu_rayon::Rayon;
 use bp_testkit::noise_pair;
 
@@ -13,7 +13,7 @@ fn solve_within(bytes: u64) -> Result<(u64, Result<(), Error>), Error> {
     let settings = Settings { label_sets: true, ..Algorithm::Sweep.settings(SIZE, 1, 1, Schedule::Sweep) };
     let plan = Plan::new(SIZE, Model::new(Profile::Census, 90)?, settings)?;
     rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("three threads").install(|| {
-        let mut solver: Box<dyn Solver> = Rayon.open(0)?.prepare(&plan)?;
+        let mut solver: Box<dyn Solver> = Rayon.open(0)?.prepare(&plan, &never)?;
         solver.limit_bytes(bytes);
         solver.match_cost(&noise_pair(SIZE.width, SIZE.height, 1), None)?;
         (1..plan.grids()).try_for_each(|grid| solver.coarsen(grid))?;

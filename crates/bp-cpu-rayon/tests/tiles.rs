@@ -1,9 +1,14 @@
 //! Compares tiles with the whole image.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+use std::{
+    ops::ControlFlow,
+    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
+};
+
 use bp_core::{
-    Algorithm, Backend, Cut, Device, Driver, HALO, MessageStart, Model, Plan, Profile, Progress, Schedule, Settings,
-    Side, Size, StereoPair, Tiled, Tiling,
+    Algorithm, Backend, Cut, Device, Driver, Error, HALO, IsStopped, MessageStart, Model, Plan, Profile, Progress,
+    Schedule, Settings, Side, Size, Solver, StereoPair, Tiled, Tiling,
 };
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
@@ -80,6 +85,44 @@ fn one_tile_is_the_matcher_itself() {
     assert!(tiled.messages(Side::Left).unwrap() == driver.messages(Side::Left).unwrap());
 }
 
+/// Wants to stop when it prepares its second tile.
+struct Impatient {
+    device: Box<dyn Device>,
+    prepared: AtomicUsize,
+    wants_to_stop: AtomicBool,
+}
+
+impl Device for Impatient {
+    fn prepare(&self, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
+        let is_second = self.prepared.fetch_add(1, Ordering::Relaxed) == 1;
+        self.wants_to_stop.store(is_second, Ordering::Relaxed);
+        let prepared = self.device.prepare(plan, is_stopped);
+        assert_eq!(prepared.as_ref().err(), is_second.then_some(&Error::Stopped));
+        prepared
+    }
+}
+
+/// Some systems take seconds to hand out memory.
+#[test]
+fn preparing_a_tile_can_be_stopped() {
+    let pair = noise_pair(90, 140, 3);
+    let plan = Plan::new(pair.size(), Model::new(Profile::Census, 9).unwrap(), swept(3, 1)).unwrap();
+    for device in [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()] {
+        let device = Impatient { device, prepared: AtomicUsize::default(), wants_to_stop: AtomicBool::default() };
+        let tiling = Tiling::cut(plan.clone(), Size { width: 32, height: 32 }, 32);
+        let mut tiled = Tiled::new(&device, tiling).unwrap();
+        let observer = &mut |_| {
+            if device.wants_to_stop.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        assert_eq!(tiled.solve_observed(&device, &pair, observer).err(), Some(Error::Stopped));
+        assert_eq!(device.prepared.load(Ordering::Relaxed), 2);
+    }
+}
+
 #[test]
 fn progress_is_of_all_tiles_and_the_answer_outlives_them() {
     let pair = noise_pair(90, 140, 3);
@@ -93,7 +136,7 @@ fn progress_is_of_all_tiles_and_the_answer_outlives_them() {
     let mut seen = vec![];
     let observer = &mut |progress: Progress| {
         seen.push((progress.done, progress.total));
-        std::ops::ControlFlow::Continue(())
+        ControlFlow::Continue(())
     };
     let times = tiled.solve_observed(device.as_ref(), &pair, observer).unwrap();
     assert!(seen.is_sorted() && seen.last() == Some(&(total, total)));

@@ -1,6 +1,6 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, LabelSet, Plan, memory};
+use bp_core::{Error, IsStopped, LabelSet, Plan, memory};
 
 use crate::sums::{self, Sums};
 
@@ -15,12 +15,12 @@ pub(crate) struct Costs {
 
 impl Costs {
     /// Allocates room for the costs of `grid`.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         Ok(Self {
             labels: plan.model().labels(),
             clip: plan.clip(grid).into(),
-            stored: memory::filled("data cost", plan.volume(grid), 0)?,
-            sums: plan.keeps_sums(grid).then(|| Sums::new(plan, grid)).transpose()?,
+            stored: memory::filled_unless(is_stopped, "data cost", plan.volume(grid), 0)?,
+            sums: plan.keeps_sums(grid).then(|| Sums::new(plan, grid, is_stopped)).transpose()?,
         })
     }
 
@@ -69,7 +69,7 @@ impl Costs {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::{Algorithm, Model, Profile, Schedule, Size};
+    use bp_core::{Algorithm, Model, Profile, Schedule, Size, never};
 
     use super::*;
 
@@ -79,7 +79,7 @@ mod tests {
         let size = Size { width: 2, height: 1 };
         let settings = Algorithm::Bp.settings(size, 1, 1, Schedule::Sync);
         let plan = Plan::new(size, Model::new(Profile::Mrf, 4).unwrap(), settings).unwrap();
-        let mut costs = Costs::new(&plan, 0).unwrap();
+        let mut costs = Costs::new(&plan, 0, &never).unwrap();
         costs.store(0, &[7, 500, 9, 168]);
         costs.store(1, &[7, 500, 9, 168].map(|cost| cost + 1_000_000));
         assert_eq!(costs.of(0), [0, 161, 2, 161]);

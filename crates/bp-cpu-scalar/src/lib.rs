@@ -22,7 +22,7 @@ mod sums;
 mod sweep;
 mod update_messages;
 
-use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, Plan, Schedule, Solver, memory};
+use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, IsStopped, Plan, Schedule, Solver, memory};
 
 /// The reference backend, which is also its only device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,8 +49,8 @@ impl Backend for Scalar {
 }
 
 impl Device for Scalar {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
-        Ok(Box::new(solver::ScalarSolver::new(plan)?))
+    fn prepare(&self, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
+        Ok(Box::new(solver::ScalarSolver::new(plan, is_stopped)?))
     }
 
     /// Every edge has a slot for each direction, even under `sweep`, where it holds only one message at a time.

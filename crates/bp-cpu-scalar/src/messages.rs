@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Plan, Schedule, Side, memory};
+use bp_core::{Error, IsStopped, Plan, Schedule, Side, memory};
 
 /// Adds a message to the sums of one node, label by label.
 #[inline(always)]
@@ -21,8 +21,8 @@ pub(crate) struct Messages {
 
 impl Messages {
     /// Allocates room for the messages of `grid`, which is also enough for every second coarser grid.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        let volume = || memory::filled("messages", plan.volume(grid), 0);
+    pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
+        let volume = || memory::filled_unless(is_stopped, "messages", plan.volume(grid), 0);
         let sync = plan.settings().schedule == Schedule::Sync;
         let next = || if sync { volume() } else { Ok(Vec::new()) };
         Ok(Self {

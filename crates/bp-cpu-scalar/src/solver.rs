@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, DataCost, Error, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory};
+use bp_core::{
+    BAND_ROWS, DataCost, Error, IsStopped, Plan, Schedule, Seam, Seed, Side, Solver, Stage, StereoPair, memory,
+};
 
 use crate::{
     coarsen::coarsen, costs::Costs, greys::Greys, grid::Grid, label_sets, match_cost::match_cost, messages::Messages,
@@ -27,13 +29,14 @@ pub(crate) struct ScalarSolver {
 
 impl ScalarSolver {
     /// Allocates all buffers.
-    pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         let labels = plan.model().labels();
+        let messages = (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid, is_stopped));
         Ok(Self {
             data_cost: DataCost::new(plan.pair_size(), *plan.model())?,
-            costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid)).collect::<Result<_, _>>()?,
+            costs: (0..plan.grids()).map(|grid| Costs::new(plan, grid, is_stopped)).collect::<Result<_, _>>()?,
             greys: (0..plan.grids()).map(|grid| Greys::new(plan, grid)).collect::<Result<_, _>>()?,
-            messages: (0..plan.grids().min(2)).map(|grid| Messages::new(plan, grid)).collect::<Result<_, _>>()?,
+            messages: messages.collect::<Result<_, _>>()?,
             seams: Seams::new(plan)?,
             coarser: memory::filled("labels", plan.coarser_labels(), 0)?,
             scratch: memory::filled("one node's costs", labels, 0)?,

@@ -1,6 +1,6 @@
 //! Data costs before clipping, in the narrowest integer that holds them.
 
-use bp_core::{Error, Plan, memory};
+use bp_core::{Error, IsStopped, Plan, memory};
 
 /// Costs `[node][label]` of one grid.
 pub(crate) enum Sums {
@@ -12,13 +12,13 @@ pub(crate) enum Sums {
 
 impl Sums {
     /// Allocates room for the costs of `grid`.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         let (what, len) = ("data cost sums", plan.volume(grid));
         Ok(match plan.sum_bytes(grid) {
-            1 => Self::U8(memory::filled(what, len, 0)?),
-            2 => Self::U16(memory::filled(what, len, 0)?),
-            4 => Self::U32(memory::filled(what, len, 0)?),
-            _ => Self::U64(memory::filled(what, len, 0)?),
+            1 => Self::U8(memory::filled_unless(is_stopped, what, len, 0)?),
+            2 => Self::U16(memory::filled_unless(is_stopped, what, len, 0)?),
+            4 => Self::U32(memory::filled_unless(is_stopped, what, len, 0)?),
+            _ => Self::U64(memory::filled_unless(is_stopped, what, len, 0)?),
         })
     }
 

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use bp_core::{
-    DisparityMap, StereoPair, Times,
-    finish::{self, Finish, IsStopped},
+    DisparityMap, IsStopped, StereoPair, Times,
+    finish::{self, Finish},
 };
 
 use crate::{Error, Options};

@@ -318,7 +318,8 @@ impl Prepared {
         watch: &Watch<'_>,
     ) -> Result<Self, Error> {
         let Fitted { tiling, peak_bytes } = memory::fitted(options, beside, plan, images, opened, watch)?;
-        Ok(Self { tiled: Tiled::new(opened.device.as_ref(), tiling)?, images, peak_bytes })
+        let tiled = Tiled::new_unless(&|| watch.is_stopped(), opened.device.as_ref(), tiling)?;
+        Ok(Self { tiled, images, peak_bytes })
     }
 
     fn solve(

@@ -7,7 +7,7 @@ mod sweep;
 
 use std::ops::Range;
 
-use bp_core::{DataCost, Device, Error, MessageStart, Node, Plan, Schedule, Seed, Side, Solver, StereoPair};
+use bp_core::{DataCost, Device, Error, IsStopped, MessageStart, Node, Plan, Schedule, Seed, Side, Solver, StereoPair};
 use state::{Grid, State};
 
 /// A device that computes in `i64` and takes O(L^2) time for a message. It neither normalises nor clips data costs,
@@ -16,7 +16,7 @@ use state::{Grid, State};
 pub struct Oracle;
 
 impl Device for Oracle {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+    fn prepare(&self, plan: &Plan, _: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
         Ok(Box::new(State::new(plan)))
     }
 }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use bp_core::{
     Algorithm, Cut, Device, Driver, Error, Model, Part, PartDriver, Parting, Profile, Schedule, Settings, Side, census,
-    finish::never,
+    never,
 };
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use bp_core::{Device, Error, Plan, Solver};
+use bp_core::{Device, Error, IsStopped, Plan, Solver};
 use bp_gpu::{GpuSolver, Limits, Program};
 
 use crate::{adapter::Adapter, gpu::Gpu, instance::Instance, limits, pipelines::Pipelines, queue::VulkanQueue};
@@ -32,7 +32,7 @@ impl VulkanDevice {
 }
 
 impl Device for VulkanDevice {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+    fn prepare(&self, plan: &Plan, _: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
         self.gpu.check()?;
         let program = Program::new(plan, &self.limits())?;
         let queue = VulkanQueue::new(&self.gpu, &self.pipelines, &program)?;
@@ -79,7 +79,7 @@ mod tests {
         let mut driver = Driver::new(&device, plan.clone()).unwrap();
         device.gpu.abandon();
         assert!(matches!(driver.solve(&pair), Err(Error::DeviceLost { .. })));
-        assert!(matches!(device.prepare(&plan).err(), Some(Error::DeviceLost { .. })));
+        assert!(matches!(device.prepare(&plan, &bp_core::never).err(), Some(Error::DeviceLost { .. })));
         drop(device);
         drop(driver);
     }

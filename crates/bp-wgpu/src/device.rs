@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bp_core::{Device, Error, Plan, Solver};
+use bp_core::{Device, Error, IsStopped, Plan, Solver};
 use bp_gpu::{GpuSolver, Limits, Program, Shape};
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints};
 
@@ -66,7 +66,7 @@ fn limits(adapter: &Adapter) -> Result<Limits, String> {
 }
 
 impl Device for WgpuDevice {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+    fn prepare(&self, plan: &Plan, _: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
         let program = Program::new(plan, &self.limits())?;
         let queue = WgpuQueue::new(&self.gpu, &self.pipelines, &program)?;
         Ok(Box::new(GpuSolver::new(plan, program, Box::new(queue))?))

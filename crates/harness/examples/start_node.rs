@@ -7,7 +7,9 @@
 use std::{error::Error, fmt::Write as _, fs, path::Path};
 
 use bp_charts::{Axis, Line, Plot, Point, Series, Style};
-use bp_core::{Algorithm, Backend, DisparityMap, Energy, Model, Node, Plan, Profile, Schedule, Settings, Size, census};
+use bp_core::{
+    Algorithm, Backend, DisparityMap, Energy, Model, Node, Plan, Profile, Schedule, Settings, Size, census, never,
+};
 use bp_cpu_scalar::Scalar;
 use harness::{
     machine,
@@ -98,7 +100,7 @@ fn settings(order: &str, size: Size) -> Settings {
 fn run(order: &str, scene: &Scene, labels: usize) -> Result<Run> {
     let pair = &scene.pair;
     let plan = Plan::new(pair.size(), Model::new(Profile::Thesis, labels)?, settings(order, pair.size()))?;
-    let mut solver = Scalar.open(0)?.prepare(&plan)?;
+    let mut solver = Scalar.open(0)?.prepare(&plan, &never)?;
     solver.match_cost(pair, census::seed(pair, &plan))?;
     solver.refine(0)?;
     let mut found = Run { order: order.to_owned(), scene: scene.record.name.clone(), energies: vec![], bad: vec![] };

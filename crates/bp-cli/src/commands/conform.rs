@@ -2,7 +2,7 @@
 
 use std::{io::Write, time::Instant};
 
-use bp_core::{Device, Error, Plan, Solver};
+use bp_core::{Device, Error, IsStopped, Plan, Solver};
 use bp_stereo::devices;
 
 use crate::{args::ConformArgs, failure::Failure, interrupt, notes::tell, terminal};
@@ -11,8 +11,9 @@ use crate::{args::ConformArgs, failure::Failure, interrupt, notes::tell, termina
 struct Stoppable<'a>(&'a dyn Device);
 
 impl Device for Stoppable<'_> {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
-        if terminal::watch().is_stopped() { Err(Error::Stopped) } else { self.0.prepare(plan) }
+    fn prepare(&self, plan: &Plan, _: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
+        let is_stopped = || terminal::watch().is_stopped();
+        if is_stopped() { Err(Error::Stopped) } else { self.0.prepare(plan, &is_stopped) }
     }
 
     fn check(&self, plan: &Plan) -> Result<(), Error> {

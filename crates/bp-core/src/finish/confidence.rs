@@ -4,12 +4,10 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    IsStopped,
     check::{AGREE, difference},
-    go_on,
     window::{Frame, Framed, window},
 };
-use crate::{DisparityMap, Error, memory, metrics::check_size};
+use crate::{DisparityMap, Error, IsStopped, memory, metrics::check_size, stop::go_on};
 
 /// How far the window reaches from its centre.
 const REACH: usize = 4;
@@ -118,8 +116,9 @@ fn add_worths<S: Simd>(simd: S, row: &[f32], neighbours: &[f32], worths: &[f32],
 
 #[cfg(test)]
 mod tests {
-    use super::{super::never, *};
+    use super::*;
     use crate::Size;
+    use crate::never;
 
     #[test]
     fn confidence_grows_with_the_share_of_the_window_that_agrees() {

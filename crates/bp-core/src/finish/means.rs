@@ -5,8 +5,8 @@ use std::array;
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use super::{IsStopped, check::AGREE, go_on};
-use crate::{DisparityMap, Error, memory};
+use super::check::AGREE;
+use crate::{DisparityMap, Error, IsStopped, memory, stop::go_on};
 
 /// Windows are 3x3 pixels that lie this far apart, in one pass after the other. Two passes make means over 9x9 pixels of two
 /// ninths of the differences, with the same errors. Such windows are the edge-avoiding wavelets of Dammertz et al. 2010.
@@ -257,7 +257,8 @@ fn rounded(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::never, *};
+    use super::*;
+    use crate::never;
 
     /// The mean of one window less the disparity in its middle, in the same order of additions.
     fn offset(width: usize, map: &[f32], spacing: usize, at: usize) -> f32 {

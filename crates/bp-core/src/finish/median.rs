@@ -5,11 +5,8 @@ use std::array;
 use fearless_simd::{Level, Select, Simd, SimdBase, dispatch, f32x16};
 use rayon::prelude::*;
 
-use super::{
-    IsStopped, go_on,
-    window::{Frame, Framed},
-};
-use crate::{DisparityMap, Error};
+use super::window::{Frame, Framed};
+use crate::{DisparityMap, Error, IsStopped, stop::go_on};
 
 /// The window sides that [`median`] supports.
 pub const MEDIANS: [usize; 3] = [3, 5, 7];
@@ -125,8 +122,9 @@ fn of_known(values: impl Iterator<Item = f32>, own: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::never, *};
+    use super::*;
     use crate::Size;
+    use crate::never;
 
     const NONE: f32 = DisparityMap::UNKNOWN;
 

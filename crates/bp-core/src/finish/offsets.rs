@@ -10,8 +10,8 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use self::windows::Windows;
-use super::{IsStopped, go_on, means};
-use crate::{Error, Size, StereoPair};
+use super::means;
+use crate::{Error, IsStopped, Size, StereoPair, stop::go_on};
 
 /// Disparities are tried in steps of a quarter of a pixel.
 const STEPS: usize = 4;

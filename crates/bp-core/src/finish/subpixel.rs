@@ -1,7 +1,7 @@
 //! Sub-pixel refinement.
 
-use super::{IsStopped, means::write_means, offsets::write_offsets};
-use crate::{DisparityMap, Error, StereoPair, memory, metrics::check_size};
+use super::{means::write_means, offsets::write_offsets};
+use crate::{DisparityMap, Error, IsStopped, StereoPair, memory, metrics::check_size};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
@@ -15,7 +15,7 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
     let width = map.size().width;
-    let mut other = memory::filled("a map", map.values().len(), 0.0)?;
+    let mut other = memory::filled_unless(is_stopped, "a map", map.values().len(), 0.0)?;
     write_means(width, map.values(), &mut other, is_stopped)?;
     let mut refined = Ok(());
     let map = map.replaced(|values| refined = write_offsets(pair, &other, least..=largest, values, is_stopped));
@@ -26,7 +26,8 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
 
 #[cfg(test)]
 mod tests {
-    use super::{super::never, *};
+    use super::*;
+    use crate::never;
     use crate::{Image, Size};
 
     const SIZE: Size = Size { width: 160, height: 60 };

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Node, Plan, Side, memory};
+use bp_core::{Error, IsStopped, Node, Plan, Side, memory};
 use fearless_simd::{Simd, SimdBase};
 
 use crate::{
@@ -28,8 +28,9 @@ pub(crate) struct Edges {
 
 impl Edges {
     /// Allocates room for the edges of `grid`, which is also enough for every coarser grid.
-    pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        Ok(Self { values: memory::filled("messages", volume(&Shape::new(plan, grid)), Block::ZERO)? })
+    pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
+        let blocks = volume(&Shape::new(plan, grid));
+        Ok(Self { values: memory::filled_unless(is_stopped, "messages", blocks, Block::ZERO)? })
     }
 
     /// Allocates nothing.

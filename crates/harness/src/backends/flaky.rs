@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bp_core::{Backend, Device, DeviceInfo, Error, Plan, Solver};
+use bp_core::{Backend, Device, DeviceInfo, Error, IsStopped, Plan, Solver};
 
 use super::Opened;
 
@@ -34,11 +34,11 @@ struct Once {
 }
 
 impl Device for Once {
-    fn prepare(&self, plan: &Plan) -> Result<Box<dyn Solver>, Error> {
+    fn prepare(&self, plan: &Plan, is_stopped: IsStopped<'_>) -> Result<Box<dyn Solver>, Error> {
         if self.asked.fetch_add(1, Ordering::Relaxed) > 0 {
             return Err(Error::Timeout { device: "flaky".to_owned(), seconds: 60 });
         }
-        self.device.prepare(plan)
+        self.device.prepare(plan, is_stopped)
     }
 }
 

@@ -4,7 +4,8 @@ use arbitrary::Unstructured;
 use bp_core::{
     Algorithm, Alignment, Backend, Calibration, Cut, Device, DisparityMap, Energy, Error, Image, MAX_GRIDS,
     MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size, StereoPair, Tiled, Tiling, depth_map,
-    finish::{Finish, MEDIANS, confidence, never},
+    finish::{Finish, MEDIANS, confidence},
+    never,
     survey::Survey,
 };
 use bp_cpu_rayon::Rayon;
