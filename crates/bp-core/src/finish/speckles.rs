@@ -106,6 +106,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
     fn surfaces_of_any_form_count_as_a_whole() {
         let mut seed = 1_u32;
         let mut random = |values: u32| {
