@@ -159,10 +159,10 @@ impl Plan {
     }
 
     /// The number of grids that have label sets with so many labels, from the finest one on, if there are coarser ones: two, and
-    /// from 448 on three, because the third one's labels would be most of the work.
+    /// from 224 on three, because the third one's labels would be most of the work.
     #[must_use]
     pub const fn most_grids_with_label_sets(labels: usize) -> usize {
-        if labels < 448 { 2 } else { 3 }
+        if labels < 224 { 2 } else { 3 }
     }
 
     /// Whether the nodes of a grid have label sets, under [`Settings::label_sets`]: those finer than
