@@ -27,7 +27,7 @@ pub fn filled_unless<T: Clone + Send + Sync>(
 ) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();
     reserve(what, &mut values, len)?;
-    let much = MUCH / size_of::<T>().max(1);
+    let much = (MUCH / size_of::<T>().max(1)).max(1);
     while values.len() < len {
         go_on(is_stopped)?;
         let more = much.min(len - values.len());
