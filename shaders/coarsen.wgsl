@@ -43,10 +43,6 @@ fn fine_pair(colour: u32, index: u32, parity: u32) -> Pair {
         } else {
             bytes = odd_costs[index];
         }
-        if ONE_NODE {
-            let words = select(bytes.xz, bytes.yw, parity == 1);
-            return Pair(unpack(words.x), unpack(words.y));
-        }
         bytes = bytes >> vec4(8 * parity);
         return Pair(bytes & vec4(0xffu), (bytes >> vec4(16u)) & vec4(0xffu));
     }
@@ -90,14 +86,12 @@ fn by_label(at: array<vec4<u32>, 4>) -> array<vec4<u32>, 4> {
     );
 }
 
-@compute @workgroup_size(64)
-fn coarsen(@builtin(global_invocation_id) id: vec3<u32>) {
-    let nodes = nodes(id.x);
-    if !nodes.exist {
-        return;
-    }
+@compute @workgroup_size(GROUP_WORDS, SLICES)
+fn coarsen(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let nodes = nodes_of(group, local);
+    let quads = quads_of(local.y);
     var least = vec4(0xffffffffu);
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    for (var quad = quads.x; quad < quads.y; quad++) {
         let costs = by_label(children(nodes, quad));
         for (var i = 0u; i < 4; i++) {
             if 4 * quad + i < parameters.labels {
@@ -105,7 +99,11 @@ fn coarsen(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    least = least_of_slices(local, least);
+    if !nodes.exist {
+        return;
+    }
+    for (var quad = quads.x; quad < quads.y; quad++) {
         store(nodes, quad, by_label(children(nodes, quad)), least);
     }
 }

@@ -17,12 +17,12 @@ fn stored(nodes: Nodes, label: u32, unclipped: vec4<u32>, least: vec4<u32>) -> u
 
 fn store(nodes: Nodes, quad: u32, unclipped: array<vec4<u32>, 4>, least: vec4<u32>) {
     let index = plane_index(nodes.row, nodes.word) + quad * parameters.words;
-    cost[index] = in_plane(vec4(
+    cost[index] = vec4(
         stored(nodes, 4 * quad, unclipped[0], least),
         stored(nodes, 4 * quad + 1, unclipped[1], least),
         stored(nodes, 4 * quad + 2, unclipped[2], least),
         stored(nodes, 4 * quad + 3, unclipped[3], least),
-    ));
+    );
     for (var i = 0u; i < 4; i++) {
         let s = unclipped[i];
         if SUM_BYTES == 2 {

@@ -1,4 +1,4 @@
-// Finds the levels of edges, for update_messages and select_labels, by how much the grey values of their nodes differ. The
+// Finds the levels of edges, for kernels that update messages and for select_labels, by how much the grey values of their nodes differ. The
 // kernel's `greys` holds the grey values of the whole grid: [colour][row][word], one byte per node.
 
 // Whether the model has more than one level.

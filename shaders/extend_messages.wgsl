@@ -58,22 +58,22 @@ fn extend_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     var offer = vec4(0xffffffffu);
     for (var quad = 0u; quad < parameters.quads; quad++) {
         let index = first + quad * parameters.words;
-        var h = in_plane(messages[index]);
+        var h = messages[index];
         for (var i = 0u; i < 4; i++) {
             h[i] |= ~in_sets(to, 4 * quad + i);
             h[i] = minimum(vec4(h[i]), offer).x;
             offer = sum(vec4(h[i]), step);
         }
-        messages[index] = in_plane(h);
+        messages[index] = h;
     }
     offer = vec4(0xffffffffu);
     for (var quad = parameters.quads; quad > 0; quad--) {
         let index = first + (quad - 1) * parameters.words;
-        var h = in_plane(messages[index]);
+        var h = messages[index];
         for (var i = 4u; i > 0; i--) {
             h[i - 1] = minimum(vec4(h[i - 1]), offer).x;
             offer = sum(vec4(h[i - 1]), step);
         }
-        messages[index] = in_plane(minimum(h, splat(parameters.truncations[0])) & vec4(to.exist));
+        messages[index] = minimum(h, splat(parameters.truncations[0])) & vec4(to.exist);
     }
 }

@@ -94,20 +94,22 @@ fn costs(nodes: Nodes, at_left: vec4<u32>, seeded: vec4<bool>, label: u32) -> ve
     return select(vec4(0u), cost, x < vec4(parameters.width));
 }
 
-@compute @workgroup_size(64)
-fn match_cost(@builtin(global_invocation_id) id: vec3<u32>) {
-    let nodes = nodes(id.x);
-    if !nodes.exist {
-        return;
-    }
+@compute @workgroup_size(GROUP_WORDS, SLICES)
+fn match_cost(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let nodes = nodes_of(group, local);
+    let quads = quads_of(local.y);
     let x = MARGIN + min(columns(nodes), vec4(parameters.width - 1)) + nodes.y * pair_width();
     let at_left = vec4(left[x.x], left[x.y], left[x.z], left[x.w]);
     let seeded = touches_seed(nodes);
     var least = vec4(0xffffffffu);
-    for (var label = 0u; label < parameters.labels; label++) {
+    for (var label = 4 * quads.x; label < min(4 * quads.y, parameters.labels); label++) {
         least = min(least, costs(nodes, at_left, seeded, label));
     }
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    least = least_of_slices(local, least);
+    if !nodes.exist {
+        return;
+    }
+    for (var quad = quads.x; quad < quads.y; quad++) {
         var unclipped: array<vec4<u32>, 4>;
         for (var i = 0u; i < 4; i++) {
             unclipped[i] = costs(nodes, at_left, seeded, 4 * quad + i);

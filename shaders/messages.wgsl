@@ -1,5 +1,5 @@
 // Reads the data costs of the nodes of one colour and the messages that they received from the other colour, for
-// update_messages and select_labels.
+// kernels that update messages and for select_labels.
 
 @group(0) @binding(1) var<storage, read> cost: array<vec4<u32>>;
 // The messages that all nodes of the other colour sent to their left, right, upper and lower neighbours.
@@ -13,33 +13,45 @@
 // column has the next one.
 
 fn from_left(index: u32, nodes: Nodes) -> vec4<u32> {
-    let aligned = in_plane(sent_right[index]);
+    let aligned = sent_right[index];
     if nodes.parity == 1 {
         return aligned;
     }
     var before = vec4(0u);
     if nodes.word > 0 {
-        before = in_plane(sent_right[index - 1]);
+        before = sent_right[index - 1];
     }
     return (aligned << vec4(8u)) | (before >> vec4(24u));
 }
 
 fn from_right(index: u32, nodes: Nodes) -> vec4<u32> {
-    let aligned = in_plane(sent_left[index]);
+    let aligned = sent_left[index];
     if nodes.parity == 0 {
         return aligned;
     }
     var behind = vec4(0u);
     if nodes.word + 1 < parameters.words {
-        behind = in_plane(sent_left[index + 1]);
+        behind = sent_left[index + 1];
     }
     return (aligned >> vec4(8u)) | (behind << vec4(24u));
 }
 
 fn from_above(index: u32) -> vec4<u32> {
-    return in_plane(sent_down[index - parameters.quads * parameters.words]);
+    return sent_down[index - parameters.quads * parameters.words];
 }
 
 fn from_below(index: u32) -> vec4<u32> {
-    return in_plane(sent_up[index + parameters.quads * parameters.words]);
+    return sent_up[index + parameters.quads * parameters.words];
+}
+
+// A mask of the nodes that have a neighbour to send to, for each side. Nodes beyond the right border need no mask: they
+// cost nothing and receive zeros, so they send zeros.
+fn receivers(nodes: Nodes) -> vec4<u32> {
+    let x = columns(nodes);
+    let left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
+    let right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
+    let up = nodes.y != 0 && nodes.y != parameters.cut_y;
+    let down = nodes.y + 1 != parameters.height && nodes.y + 1 != parameters.cut_y;
+    let all = vec2(0xffffffffu);
+    return vec4(bytes_where(left), bytes_where(right), select(vec2(0u), all, vec2(up, down)));
 }

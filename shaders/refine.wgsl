@@ -63,9 +63,9 @@ fn coarse_quad(colour: i32, row: u32, word: i32, quad: u32) -> vec4<u32> {
     }
     let index = (row * parameters.quads + quad) * parameters.other_words + u32(word);
     if colour == 0 {
-        return in_plane(even[index]);
+        return even[index];
     }
-    return in_plane(odd[index]);
+    return odd[index];
 }
 
 // As coarse_nodes, for columns x, x + 2, x + 4 and x + 6 of coarse row y.
@@ -146,12 +146,13 @@ fn starting(nodes: Nodes) -> u32 {
     return bytes_where(start);
 }
 
-// An invocation computes two words of a fine row.
-@compute @workgroup_size(64)
-fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
+// An invocation computes two words of a fine row, for a slice of the labels.
+@compute @workgroup_size(GROUP_WORDS, SLICES)
+fn refine(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let item = group.x * GROUP_WORDS + local.x;
     let row_pairs = (parameters.words + 1) / 2;
-    let line = id.x / row_pairs;
-    let nodes = nodes_at(line, 2 * (id.x - line * row_pairs));
+    let line = item / row_pairs;
+    let nodes = nodes_at(line, 2 * (item - line * row_pairs));
     if !nodes.exist {
         return;
     }
@@ -167,7 +168,8 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let exists = select(0u, 0xffffffffu, START != SWEEP || near < i32(parameters.other_height));
     let mask = vec4(starting(nodes) & exists);
     let next_mask = vec4(starting(nodes_at(line, nodes.word + 1)) & exists);
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    let quads = quads_of(local.y);
+    for (var quad = quads.x; quad < quads.y; quad++) {
         var messages: Alternate;
         if START == SWEEP {
             messages = Alternate(between_rows(even, y, quad), between_rows(odd, y, quad));
@@ -178,10 +180,10 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
             messages = Alternate(coarse_messages(even.x, y.x, quad), coarse_messages(odd.x, y.x, quad));
         }
         let index = first + quad * parameters.words;
-        fine[index] = in_plane((apart(messages.even) | (apart(messages.odd) << vec4(8u))) & mask);
+        fine[index] = (apart(messages.even) | (apart(messages.odd) << vec4(8u))) & mask;
         if is_pair {
             let half = vec4(16u);
-            fine[index + 1] = in_plane((apart(messages.even >> half) | (apart(messages.odd >> half) << vec4(8u))) & next_mask);
+            fine[index + 1] = (apart(messages.even >> half) | (apart(messages.odd >> half) << vec4(8u))) & next_mask;
         }
     }
 }

@@ -44,6 +44,6 @@ fn restrict_costs(@builtin(global_invocation_id) id: vec3<u32>) {
                 costs[i] = pack(min(unclipped(index, i) - least, vec4(parameters.clip)));
             }
         }
-        cost[index] = in_plane(costs & vec4(inside));
+        cost[index] = costs & vec4(inside);
     }
 }

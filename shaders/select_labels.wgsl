@@ -12,7 +12,7 @@ override SWEEP: bool = false;
 
 // Data cost plus the messages that count, for a quad of labels.
 fn belief(index: u32, nodes: Nodes) -> vec4<u32> {
-    var total = sum(in_plane(cost[index]), from_below(index));
+    var total = sum(cost[index], from_below(index));
     if !SWEEP || parameters.colour == 0 {
         total = sum(total, sum(from_left(index, nodes), from_right(index, nodes)));
     }
@@ -78,12 +78,9 @@ fn decided_neighbours(nodes: Nodes) -> Decided {
     return known;
 }
 
-@compute @workgroup_size(64)
-fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
-    let nodes = nodes(id.x);
-    if !nodes.exist {
-        return;
-    }
+@compute @workgroup_size(GROUP_WORDS, SLICES)
+fn select_labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let nodes = nodes_of(group, local);
     var known: Decided;
     if SWEEP {
         known = decided_neighbours(nodes);
@@ -92,7 +89,8 @@ fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
     // Each entry holds the total in the high bits and the label in the low bits. So the least entry has the least total
     // and, among equal totals, the smallest label.
     var best = vec4(0xffffffffu);
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    let quads = quads_of(local.y);
+    for (var quad = quads.x; quad < quads.y; quad++) {
         let packed = belief(first + quad * parameters.words, nodes);
         for (var i = 0u; i < 4; i++) {
             let label = 4 * quad + i;
@@ -103,7 +101,10 @@ fn select_labels(@builtin(global_invocation_id) id: vec3<u32>) {
             best = min(best, (total << vec4(LABEL_BITS)) | vec4(label));
         }
     }
-    best &= vec4((1u << LABEL_BITS) - 1);
+    best = least_of_slices(local, best) & vec4((1u << LABEL_BITS) - 1);
+    if !nodes.exist || local.y > 0 {
+        return;
+    }
     let pairs = best.xz | (best.yw << vec2(16u));
     labels[grid_index(parameters.colour, nodes.y, nodes.word)] = pairs;
 }

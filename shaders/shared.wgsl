@@ -10,10 +10,6 @@
 // node lie in the plane of the other colour, at most one byte away. The rows above the first and below the last row
 // hold zeros, or a row of the adjacent strip.
 //
-// With ONE_NODE, the bytes of a vector lie the other way around: its components are the four nodes, and their bytes the
-// labels of the quad. So a plane is also [row][quad][node] u32, and neighbouring invocations that compute one node each read
-// neighbouring words.
-//
 // Bytes of nodes beyond the image's right border are zero in all planes. Labels that pad the last quad have data costs
 // so high that they change no message.
 
@@ -50,6 +46,8 @@ struct Parameters {
     labels_above: u32,
     // Kernels of label sets: 1 if the sets are those of seams, 0 if they are those of bands.
     seams: u32,
+    // update_messages_of_slice: the labels that an offer may pass before it costs more than the truncation.
+    reach: u32,
     // refine and extend_messages: the side that the messages are sent to, with the same numbering.
     side: u32,
     // coarsen, coarsen_greys, refine and label_sets: size, words and strip of the grid that is read.
@@ -113,24 +111,6 @@ fn plane_index(row: u32, word: u32) -> u32 {
 // Index of a word in a buffer of the whole grid: [colour][row][word].
 fn grid_index(colour: u32, y: u32, word: u32) -> u32 {
     return (colour * parameters.height + y) * parameters.words + word;
-}
-
-override ONE_NODE: bool = false;
-
-// A vector as it lies in a plane, made from labels of nodes; or labels of nodes, made from how they lie.
-fn in_plane(labels: vec4<u32>) -> vec4<u32> {
-    if !ONE_NODE {
-        return labels;
-    }
-    // Turns bytes around in pairs, then pairs of bytes.
-    let even = (labels.xz & vec2(0x00ff00ffu)) | ((labels.yw & vec2(0x00ff00ffu)) << vec2(8u));
-    let odd = ((labels.xz >> vec2(8u)) & vec2(0x00ff00ffu)) | (labels.yw & vec2(0xff00ff00u));
-    return vec4(
-        (even.x & 0xffff) | (even.y << 16),
-        (odd.x & 0xffff) | (odd.y << 16),
-        (even.x >> 16) | (even.y & 0xffff0000),
-        (odd.x >> 16) | (odd.y & 0xffff0000),
-    );
 }
 
 // A mask of whole bytes from four conditions.

@@ -25,8 +25,8 @@ wgsl! {
     REFINE = "refine.wgsl";
     /// Updates messages.
     UPDATE_MESSAGES = "update_messages.wgsl";
-    /// Updates messages, one node an invocation.
-    UPDATE_MESSAGES_OF_NODE = "update_messages_of_node.wgsl";
+    /// Updates messages, a slice of labels an invocation.
+    UPDATE_MESSAGES_OF_SLICE = "update_messages_of_slice.wgsl";
     /// Selects labels.
     SELECT_LABELS = "select_labels.wgsl";
     /// Finds the label sets of a grid.
@@ -41,6 +41,8 @@ wgsl! {
 wgsl! {
     /// The parameters and helpers of all kernels.
     SHARED = "shared.wgsl";
+    /// Shares out the labels of nodes among invocations.
+    SLICES = "slices.wgsl";
     /// Reads the pixels of an image.
     IMAGE = "image.wgsl";
     /// Writes data costs.

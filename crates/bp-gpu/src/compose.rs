@@ -14,7 +14,7 @@ use composer::{Composer, PARAMETERS_ALIGNMENT};
 use indexmap::IndexSet;
 use recorder::Recorder;
 
-use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout};
+use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout, shape::Group};
 
 /// The number of full dispatches in a submission: few enough for watchdogs, progress reports and quick stopping, but
 /// enough to make the cost of submitting negligible.
@@ -101,8 +101,8 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
         return unsupported("a part with a plan of its own needs edges of one cost here".to_owned());
     }
     let width = plan.pair_size().width;
-    if width.div_ceil(WORKGROUP as usize) > limits.workgroups as usize {
-        let most = limits.workgroups as usize * WORKGROUP as usize;
+    let most = limits.workgroups as usize * least_row_pixels(plan, limits);
+    if width > most {
         return unsupported(format!("a row has {width} pixels and it computes at most {most} at a time"));
     }
     // Kernels never bind the buffers that the host reads and writes.
@@ -117,6 +117,12 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
         }
         None => Ok(()),
     }
+}
+
+/// The least number of pixels of a row that a workgroup of any kernel covers.
+fn least_row_pixels(plan: &Plan, limits: &Limits) -> usize {
+    let sliced = 2 * layout::WORD_NODES * Group::of(Kernel::UpdateMessagesOfSlice, plan, limits).words as usize;
+    sliced.min(WORKGROUP as usize)
 }
 
 impl Composer<'_> {

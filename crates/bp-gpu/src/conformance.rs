@@ -29,8 +29,8 @@ pub fn opened(device: Result<Box<dyn Device>, Error>) -> Option<Box<dyn Device>>
 /// Changes the shape of the kernels to that which suits other devices.
 pub fn reshape(limits: &mut Limits) {
     limits.shape = match limits.shape {
-        Shape::FourNodes => Shape::OneNode,
-        Shape::OneNode => Shape::FourNodes,
+        Shape::Words => Shape::Slices,
+        Shape::Slices => Shape::Words,
     };
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// The invocations of a workgroup. The WGSL files contain the same number.
+/// The invocations of a workgroup, if labels are not shared out. The WGSL files contain the same number.
 pub const WORKGROUP: u32 = 64;
 
 /// What a kernel does with a buffer.
@@ -33,8 +33,8 @@ pub enum Kernel {
     Refine,
     /// Message passing, four nodes an invocation.
     UpdateMessages,
-    /// Message passing, one node an invocation; part of the stage `update_messages`.
-    UpdateMessagesOfNode,
+    /// Message passing, a slice of labels an invocation; part of the stage `update_messages`.
+    UpdateMessagesOfSlice,
     /// Labels.
     SelectLabels,
     /// The label sets of a grid.
@@ -55,7 +55,7 @@ impl Kernel {
         Self::Coarsen,
         Self::Refine,
         Self::UpdateMessages,
-        Self::UpdateMessagesOfNode,
+        Self::UpdateMessagesOfSlice,
         Self::SelectLabels,
         Self::LabelSets,
         Self::RestrictCosts,
@@ -73,7 +73,7 @@ impl Kernel {
             Self::Coarsen => "coarsen",
             Self::Refine => "refine",
             Self::UpdateMessages => "update_messages",
-            Self::UpdateMessagesOfNode => "update_messages_of_node",
+            Self::UpdateMessagesOfSlice => "update_messages_of_slice",
             Self::SelectLabels => "select_labels",
             Self::LabelSets => "label_sets",
             Self::RestrictCosts => "restrict_costs",
@@ -92,20 +92,22 @@ impl Kernel {
             Self::Coarsen => bp_shaders::COARSEN,
             Self::Refine => bp_shaders::REFINE,
             Self::UpdateMessages => bp_shaders::UPDATE_MESSAGES,
-            Self::UpdateMessagesOfNode => bp_shaders::UPDATE_MESSAGES_OF_NODE,
+            Self::UpdateMessagesOfSlice => bp_shaders::UPDATE_MESSAGES_OF_SLICE,
             Self::SelectLabels => bp_shaders::SELECT_LABELS,
             Self::LabelSets => bp_shaders::LABEL_SETS,
             Self::RestrictCosts => bp_shaders::RESTRICT_COSTS,
             Self::ExtendMessages => bp_shaders::EXTEND_MESSAGES,
         };
-        let of_several = match self {
-            Self::Features | Self::Greys => [bp_shaders::IMAGE, ""],
-            Self::MatchCost | Self::Coarsen => [bp_shaders::COSTS, ""],
-            Self::UpdateMessages | Self::SelectLabels => [bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
-            Self::CoarsenGreys | Self::Refine | Self::UpdateMessagesOfNode => ["", ""],
-            Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => [bp_shaders::SETS, ""],
+        let of_several: &[&str] = match self {
+            Self::Features | Self::Greys => &[bp_shaders::IMAGE],
+            Self::MatchCost | Self::Coarsen => &[bp_shaders::SLICES, bp_shaders::COSTS],
+            Self::UpdateMessages | Self::UpdateMessagesOfSlice => &[bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
+            Self::SelectLabels => &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
+            Self::CoarsenGreys => &[],
+            Self::Refine => &[bp_shaders::SLICES],
+            Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => &[bp_shaders::SETS],
         };
-        [bp_shaders::SHARED, of_several[0], of_several[1], own].concat()
+        [bp_shaders::SHARED, &of_several.concat(), own].concat()
     }
 
     /// How it accesses the storage buffers of group 0, from binding 1 on. Binding 0 is a read-only block of parameters
@@ -118,16 +120,27 @@ impl Kernel {
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine | Self::RestrictCosts => &[Write, Read, Read],
-            Self::UpdateMessages | Self::UpdateMessagesOfNode => {
+            Self::UpdateMessages | Self::UpdateMessagesOfSlice => {
                 &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read]
             }
             Self::SelectLabels => &[Read, Read, Read, Read, Read, Write, Read],
         }
     }
 
-    /// How many invocations share the nodes of a word, if the kernel passes messages.
-    pub(crate) fn invocations_of_word(self) -> usize {
-        if matches!(self, Self::UpdateMessagesOfNode) { 4 } else { 1 }
+    /// Whether a pipeline's constants say how many words of nodes and slices of labels a workgroup has. The others have
+    /// [`WORKGROUP`] invocations.
+    #[must_use]
+    pub fn is_sliced(self) -> bool {
+        match self {
+            Self::MatchCost | Self::Coarsen | Self::Refine | Self::UpdateMessagesOfSlice | Self::SelectLabels => true,
+            Self::Features
+            | Self::Greys
+            | Self::CoarsenGreys
+            | Self::UpdateMessages
+            | Self::LabelSets
+            | Self::RestrictCosts
+            | Self::ExtendMessages => false,
+        }
     }
 
     /// The most storage buffers that a kernel binds, including the parameters.

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use bp_core::{BAND_ROWS, Error, Node, Plan, Schedule, Size};
 
-use crate::{Limits, Shape};
+use crate::Limits;
 
 /// The number of nodes of one colour whose bytes share a word.
-const WORD_NODES: usize = 4;
+pub(crate) const WORD_NODES: usize = 4;
 /// The number of labels that share a vector.
 const QUAD_LABELS: usize = 4;
 /// The bytes of a vector: four labels at four nodes.
@@ -33,24 +33,15 @@ pub(crate) struct Grid {
     /// The bytes of a sum kept for the coarser grid: 2, 4, or 0 if none are kept.
     pub(crate) sum_bytes: usize,
     pub(crate) strips: Vec<Strip>,
-    /// Whether the bytes of a word are labels of one node.
-    one_node: bool,
 }
 
 impl Grid {
-    fn new(plan: &Plan, grid: usize, shape: Shape) -> Self {
+    fn new(plan: &Plan, grid: usize) -> Self {
         let size = plan.size(grid);
         let sum_bytes = if plan.keeps_sums(grid) { plan.sum_bytes(grid).clamp(2, 4) } else { 0 };
         let quads = plan.model().labels().div_ceil(QUAD_LABELS);
         let words = size.width.div_ceil(2 * WORD_NODES);
-        Self {
-            size,
-            words,
-            quads,
-            sum_bytes,
-            strips: vec![Strip { first: 0, rows: size.height }],
-            one_node: shape != Shape::FourNodes,
-        }
+        Self { size, words, quads, sum_bytes, strips: vec![Strip { first: 0, rows: size.height }] }
     }
 
     /// Bytes of one row of a plane.
@@ -94,9 +85,7 @@ impl Grid {
         let Node { x, y } = node;
         let node = x / 2;
         let vector = ((y - strip.first + 1) * self.quads + label / QUAD_LABELS) * self.words + node / WORD_NODES;
-        let (label, node) = (label % QUAD_LABELS, node % WORD_NODES);
-        VECTOR_BYTES as usize * vector
-            + if self.one_node { QUAD_LABELS * node + label } else { WORD_NODES * label + node }
+        VECTOR_BYTES as usize * vector + WORD_NODES * (label % QUAD_LABELS) + node % WORD_NODES
     }
 }
 
@@ -111,7 +100,7 @@ pub(crate) fn colour(node: Node) -> usize {
 /// # Errors
 /// [`Error::Unsupported`] if even the smallest strip is too large.
 pub(crate) fn grids(plan: &Plan, limits: &Limits) -> Result<Vec<Grid>, Error> {
-    let mut grids: Vec<_> = (0..plan.grids()).map(|grid| Grid::new(plan, grid, limits.shape)).collect();
+    let mut grids: Vec<_> = (0..plan.grids()).map(|grid| Grid::new(plan, grid)).collect();
     let bytes = limits.binding_bytes.min(limits.buffer_bytes);
     let too_large = |grid: &Grid| grid.most_rows(bytes) < grid.size.height;
     let cut = 0..grids.iter().position(|grid| !too_large(grid)).unwrap_or(grids.len());

@@ -17,6 +17,8 @@ pub struct Limits {
     pub bindings: u32,
     /// The most workgroups of a dispatch.
     pub workgroups: u32,
+    /// The most invocations of a workgroup.
+    pub invocations: u32,
     /// The bytes that all buffers together may take, if known.
     pub memory_bytes: Option<u64>,
     /// The shape of the kernels that suits it.
@@ -35,8 +37,9 @@ impl Limits {
             buffer_bytes: 1 << 32,
             bindings: 16,
             workgroups: 65_535,
+            invocations: 1024,
             memory_bytes: None,
-            shape: Shape::FourNodes,
+            shape: Shape::Words,
             dispatch_entries: 1 << 30,
         }
     }

@@ -64,7 +64,7 @@ fn no_dispatch_and_no_buffer_passes_a_limit() {
 
 /// Limits that cut a plan up, and the other shape.
 fn tight() -> Limits {
-    let shape = Shape::OneNode;
+    let shape = Shape::Slices;
     Limits { binding_bytes: 600_000, workgroups: 7, dispatch_entries: 1 << 16, shape, ..Limits::roomy() }
 }
 
@@ -88,10 +88,10 @@ fn expected(kernel: Kernel, schedule: Schedule, height: u32, (row, colour): (u32
         (Kernel::SelectLabels, Schedule::Sweep) => 1 + u32::from(has_seam_below(height, row) && row % 32 >= 26),
         (Kernel::SelectLabels, _) => 1,
         // A program contains two steps.
-        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Sync) => 2,
-        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Checkerboard) => 1,
-        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Outward { .. }) => 0,
-        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfNode, Schedule::Sweep) => sweeps(height, row, colour),
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfSlice, Schedule::Sync) => 2,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfSlice, Schedule::Checkerboard) => 1,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfSlice, Schedule::Outward { .. }) => 0,
+        (Kernel::UpdateMessages | Kernel::UpdateMessagesOfSlice, Schedule::Sweep) => sweeps(height, row, colour),
         (Kernel::Refine, Schedule::Sweep) => restored(height, row, colour),
         (Kernel::CoarsenGreys | Kernel::Coarsen | Kernel::Refine, _) => 0,
         (Kernel::LabelSets | Kernel::RestrictCosts | Kernel::ExtendMessages, _) => 0,

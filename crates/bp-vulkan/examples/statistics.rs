@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| plan | kernel | {} |\n|---|---|{}", FIGURES.join(" | "), "---:|".repeat(FIGURES.len()));
     let mut known = Vec::new();
     for (name, plan) in plans()? {
-        for shape in [Shape::FourNodes, Shape::OneNode] {
+        for shape in [Shape::Words, Shape::Slices] {
             for of in statistics(device, &plan, shape)?.into_iter().filter(|of| !of.figures.is_empty()) {
                 if !known.contains(&of.pipeline) {
                     println!(

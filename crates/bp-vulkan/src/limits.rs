@@ -18,6 +18,7 @@ pub(crate) fn of(gpu: &Gpu) -> Result<Limits, String> {
         buffer_bytes: gpu.most_bytes.buffer,
         bindings: bindings.into_iter().min().unwrap_or(0),
         workgroups: limits.max_compute_work_group_count[0],
+        invocations: limits.max_compute_work_group_invocations,
         memory_bytes: device_heap(&gpu.memory).map(|heap| gpu.memory.memory_heaps[heap].size),
         shape: Shape::of(gpu.adapter.info.kind)?,
         dispatch_entries: Limits::dispatch_entries(gpu.adapter.info.kind),

@@ -8,7 +8,7 @@ use naga::{
     back::{
         PipelineConstants,
         pipeline_constants::process_overrides,
-        spv::{self, Capability},
+        spv::{self, Capability, ZeroInitializeWorkgroupMemoryMode},
     },
     proc::{BoundsCheckPolicies, BoundsCheckPolicy},
     valid::{Capabilities, ValidationFlags, Validator},
@@ -52,6 +52,8 @@ fn options() -> spv::Options<'static> {
             binding_array: unchecked,
         },
         force_loop_bounding: false,
+        // Kernels write what they read.
+        zero_initialize_workgroup_memory: ZeroInitializeWorkgroupMemoryMode::None,
         ..spv::Options::default()
     }
 }
@@ -68,7 +70,7 @@ mod tests {
     /// Every pipeline that plans of all profiles, schedules and algorithms need.
     fn pipelines() -> HashSet<Pipeline> {
         let size = Size { width: 90, height: 70 };
-        let limits = [Shape::FourNodes, Shape::OneNode].map(|shape| Limits { shape, ..Limits::roomy() });
+        let limits = [Shape::Words, Shape::Slices].map(|shape| Limits { shape, ..Limits::roomy() });
         let settings = Schedule::ALL.into_iter().flat_map(|s| Algorithm::ALL.map(|a| a.settings(size, 9, 2, s)));
         let plans = settings.flat_map(|settings| Profile::ALL.map(|profile| (profile, settings)));
         let plans = plans.map(|(profile, settings)| Plan::new(size, Model::new(profile, 20).unwrap(), settings));

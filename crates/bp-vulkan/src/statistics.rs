@@ -105,11 +105,11 @@ mod tests {
         let settings = Algorithm::Cfbp.settings(size, 2, 2, Schedule::Checkerboard);
         let plan = Plan::new(size, Model::new(Profile::Census, 4).unwrap(), settings).unwrap();
         for device in 0..Vulkan.devices().len() {
-            match statistics(device, &plan, Shape::FourNodes) {
+            match statistics(device, &plan, Shape::Words) {
                 Ok(all) => assert!(all.iter().any(|of| of.pipeline.to_string().starts_with("update_messages"))),
                 Err(error) => assert!(error.to_string().contains("VK_KHR_pipeline_executable_properties"), "{error}"),
             }
         }
-        assert!(matches!(statistics(99, &plan, Shape::FourNodes), Err(Error::Unavailable { device: 99, .. })));
+        assert!(matches!(statistics(99, &plan, Shape::Words), Err(Error::Unavailable { device: 99, .. })));
     }
 }

@@ -59,6 +59,7 @@ fn limits(adapter: &Adapter) -> Result<Limits, String> {
         buffer_bytes: limits.max_buffer_size,
         bindings: limits.max_storage_buffers_per_shader_stage,
         workgroups: limits.max_compute_workgroups_per_dimension,
+        invocations: limits.max_compute_invocations_per_workgroup,
         memory_bytes: vulkan::memory_bytes(adapter),
         shape: Shape::of(instance::kind(adapter))?,
         dispatch_entries: Limits::dispatch_entries(instance::kind(adapter)),

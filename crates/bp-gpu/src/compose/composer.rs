@@ -1,13 +1,13 @@
 //! Builds a program: records dispatches with their buffers and parameters.
 
-use bp_core::{Plan, Schedule};
+use bp_core::{Model, Plan, Schedule, Smoothness};
 use indexmap::IndexSet;
 
 use super::{
     buffers::{Buffers, StripBuffers},
     recorder::PartRecorder,
 };
-use crate::{BindGroup, Command, Limits, Parameters, Pipeline, Shape, WORKGROUP, layout::Grid};
+use crate::{BindGroup, Command, Limits, Parameters, Pipeline, layout::Grid, shape::Group};
 
 /// The alignment of dynamic offsets: the largest of any device.
 pub(super) const PARAMETERS_ALIGNMENT: usize = 256;
@@ -28,6 +28,16 @@ pub(super) struct Rows {
     pub(super) count: usize,
 }
 
+/// How many labels an offer may pass before it costs more than the truncation, on edges of any level.
+fn reach(model: &Model) -> u32 {
+    let of_level = |level: Smoothness| match (level.truncation, level.step()) {
+        (0, _) => 0,
+        (_, 0) => model.labels() as u32,
+        (truncation, step) => u32::from(truncation.div_ceil(step)),
+    };
+    model.edges().smoothness().map(of_level).into_iter().max().unwrap_or(0)
+}
+
 /// A program under construction.
 pub(super) struct Composer<'a> {
     pub(super) plan: &'a Plan,
@@ -39,11 +49,11 @@ pub(super) struct Composer<'a> {
     pub(super) bind_groups: IndexSet<BindGroup>,
 }
 
-/// The parameters of a dispatch, its rows, and the number of invocations per row.
+/// The parameters of a dispatch, its rows, and the number of items in a row: words, unless a kernel says otherwise.
 pub(super) struct Work {
     pub(super) parameters: Parameters,
     pub(super) rows: Rows,
-    pub(super) row_invocations: usize,
+    pub(super) row_items: usize,
 }
 
 impl Composer<'_> {
@@ -61,35 +71,35 @@ impl Composer<'_> {
         work: Work,
     ) {
         let kernel = pipeline.kernel;
-        if self.limits.shape != Shape::FourNodes {
-            pipeline.constants.push(("ONE_NODE", 1));
+        let group = Group::of(kernel, self.plan, self.limits);
+        if kernel.is_sliced() {
+            pipeline.constants.extend([("GROUP_WORDS", group.words), ("SLICES", group.slices)]);
         }
         let pipeline = self.pipelines.insert_full(pipeline).0;
         let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
-        let row_invocations = work.row_invocations * kernel.invocations_of_word();
-        let most = self.rows_per_dispatch(&work, row_invocations);
+        let most = self.rows_per_dispatch(&work, group);
         for done in (0..work.rows.count).step_by(most) {
             let rows = most.min(work.rows.count - done);
             let row = work.rows.first + done * work.rows.step;
             let row_step = work.rows.step as u32;
             let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
-            let workgroups = (rows * row_invocations).div_ceil(WORKGROUP as usize) as u32;
+            let workgroups = (rows * work.row_items).div_ceil(group.words as usize) as u32;
             let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
             part.push(command, rows as u64 * self.row_entries(&work));
         }
     }
 
-    /// The message entries that a row of this work counts as. The invocations of a word compute four messages at four nodes for
-    /// every label, or do less work.
+    /// The message entries that a row of this work counts as. For an item, a kernel computes four messages at four nodes for every
+    /// label, or does less work.
     fn row_entries(&self, work: &Work) -> u64 {
-        work.row_invocations as u64 * 16 * self.plan.model().labels() as u64
+        work.row_items as u64 * 16 * self.plan.model().labels() as u64
     }
 
     /// How many rows a dispatch may compute.
-    fn rows_per_dispatch(&self, work: &Work, row_invocations: usize) -> usize {
+    fn rows_per_dispatch(&self, work: &Work, group: Group) -> usize {
         let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
-        let by_count = self.limits.workgroups as usize * WORKGROUP as usize / row_invocations.max(1);
+        let by_count = self.limits.workgroups as usize * group.words as usize / work.row_items.max(1);
         usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
     }
 
@@ -111,12 +121,13 @@ impl Composer<'_> {
             most: model.edges().most().map(u32::from),
             clip: self.plan.clip(nodes.grid).into(),
             min_disparity: model.min_disparity(),
+            reach: reach(model),
             padding_cost: model.clip().into(),
             cut_x: cut.map_or(0, |cut| cut.x as u32),
             cut_y: cut.map_or(0, |cut| cut.y as u32),
             ..Parameters::default()
         };
-        Work { parameters, rows, row_invocations: grid.words }
+        Work { parameters, rows, row_items: grid.words }
     }
 
     /// All rows of a strip.

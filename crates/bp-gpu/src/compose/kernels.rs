@@ -6,7 +6,7 @@ use super::{
     composer::{Composer, Nodes, Work},
     recorder::PartRecorder,
 };
-use crate::{Kernel, Pipeline, Shape};
+use crate::{Kernel, Pipeline, Shape, shape::Group};
 
 impl Composer<'_> {
     /// The buffer of the grid's grey values. If all edges have the same cost, no kernel reads it, and a buffer of costs is bound.
@@ -19,17 +19,21 @@ impl Composer<'_> {
         ("LEVELS", self.buffers.greys.is_some().into())
     }
 
-    pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
-        let constants = vec![
-            ("SATURATING", self.saturates(3, self.plan.model().smoothness().step())),
-            ("SELECTIVE", selective.into()),
-            self.finds_levels(),
-        ];
-        let kernel = match self.limits.shape {
-            Shape::FourNodes => Kernel::UpdateMessages,
-            Shape::OneNode => Kernel::UpdateMessagesOfNode,
-        };
-        Pipeline { kernel, constants }
+    /// The kernel that sends to this many sides. `selective` says that the parameters name them.
+    pub(super) fn update_pipeline(&self, sides: usize, selective: bool) -> Pipeline {
+        let saturating = ("SATURATING", self.saturates(3, self.plan.model().smoothness().step()));
+        match self.limits.shape {
+            Shape::Words => {
+                let constants = vec![saturating, self.finds_levels(), ("SELECTIVE", selective.into())];
+                Pipeline { kernel: Kernel::UpdateMessages, constants }
+            }
+            Shape::Slices => {
+                let (kernel, sides) = (Kernel::UpdateMessagesOfSlice, sides as u32);
+                let Group { words, slices } = Group::of(kernel, self.plan, self.limits);
+                let size = [("SIDES", sides), ("INVOCATIONS", words * slices * sides)];
+                Pipeline { kernel, constants: [&[saturating, self.finds_levels()], size.as_slice()].concat() }
+            }
+        }
     }
 
     /// The buffers of the data costs, of the messages from the other colour, of the messages that these nodes send, and

@@ -87,8 +87,8 @@ impl Composer<'_> {
         let nodes = Nodes { grid, strip: 0, colour: 0 };
         let from = self.grids[grid + 1].strips[0];
         let work = self.reading(self.work(nodes, Rows { first: 0, step: 1, count }), grid + 1, from);
-        let row_invocations = size.width.div_ceil(Patch::COLUMNS) * label_set_words(self.plan);
-        let mut work = Work { row_invocations, ..work };
+        let row_items = size.width.div_ceil(Patch::COLUMNS) * label_set_words(self.plan);
+        let mut work = Work { row_items, ..work };
         work.parameters.seams = seams.into();
         let pipeline = Pipeline { kernel: Kernel::LabelSets, constants: Vec::new() };
         self.dispatch(part, pipeline, vec![sets, self.buffers.labels[grid + 1]], work);

@@ -34,7 +34,7 @@ impl Composer<'_> {
             let parameters =
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
             let rows = Rows { first: 0, step: 1, count: size.height };
-            let work = Work { parameters, rows, row_invocations: size.width };
+            let work = Work { parameters, rows, row_items: size.width };
             let constants = vec![profile, ("APRON", APRON as u32)];
             let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
@@ -157,7 +157,7 @@ impl Composer<'_> {
         let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
         let mut work = self.work(nodes, rows);
         work.parameters.side = side as u32;
-        work.row_invocations = work.row_invocations.div_ceil(2);
+        work.row_items = work.row_items.div_ceil(2);
         let (start, planes) = match self.grids.get(nodes.grid + 1) {
             Some(coarse) => {
                 let from = coarse.strip_of(self.grids[nodes.grid].strips[nodes.strip].first / 2);
@@ -196,7 +196,7 @@ impl Composer<'_> {
     }
 
     fn update(&mut self, part: &mut PartRecorder, nodes: Nodes, read: usize, written: usize) {
-        let pipeline = self.update_pipeline(false);
+        let pipeline = self.update_pipeline(Side::ALL.len(), false);
         let bound = self.messages(nodes, read, written);
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }

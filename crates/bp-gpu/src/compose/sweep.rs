@@ -115,7 +115,7 @@ impl Composer<'_> {
 
     /// Records that these nodes send to these sides.
     fn send(&mut self, part: &mut PartRecorder, at: BandRow, sides: &[Side]) {
-        let pipeline = self.update_pipeline(true);
+        let pipeline = self.update_pipeline(sides.len(), true);
         for (nodes, rows) in self.band_rows(at) {
             let mut work = self.work(nodes, rows);
             work.parameters.sends = sides.iter().map(|&side| 1 << side as u32).sum();
