@@ -46,8 +46,6 @@ struct Parameters {
     labels_above: u32,
     // Kernels of label sets: 1 if the sets are those of seams, 0 if they are those of bands.
     seams: u32,
-    // update_messages_of_slice: the labels that an offer may pass before it costs more than the truncation.
-    reach: u32,
     // refine and extend_messages: the side that the messages are sent to, with the same numbering.
     side: u32,
     // coarsen, coarsen_greys, refine and label_sets: size, words and strip of the grid that is read.
@@ -130,7 +128,7 @@ fn unpack(word: u32) -> vec4<u32> {
 }
 
 fn pack(bytes: vec4<u32>) -> u32 {
-    return bytes.x | (bytes.y << 8) | (bytes.z << 16) | (bytes.w << 24);
+    return bytes.x + (bytes.y << 8) + (bytes.z << 16) + (bytes.w << 24);
 }
 
 const HIGH = vec4<u32>(0x80808080u);

@@ -1,9 +1,9 @@
 // As update_messages, but an invocation computes the messages to one side, for a slice of sixteen labels at four nodes, whose
-// values it keeps in registers. A vector has a component for each node.
+// values it keeps in registers. A vector of values has a component for each node.
 //
 // First it computes the lower envelope of its slice alone. Then the slices of a message exchange the two ends of their
-// envelopes, and each lets in what others offer. An offer that has passed `reach` labels costs more than the truncation and
-// counts for nothing.
+// envelopes, and each lets in what others offer. After at most REACH labels, an offer costs as much as the
+// truncation and counts for nothing.
 
 // The messages that these nodes send.
 @group(0) @binding(6) var<storage, read_write> to_left: array<vec4<u32>>;
@@ -19,6 +19,8 @@ override SLICES: u32 = 1;
 override SIDES: u32 = 4;
 // The product of these.
 override INVOCATIONS: u32 = 32;
+// The labels that an offer may pass, at least.
+override REACH: u32 = 15;
 
 const SLICE_QUADS: u32 = 4;
 const SLICE_LABELS: u32 = 16;
@@ -33,6 +35,14 @@ struct Quad {
     b: vec4<u32>,
     c: vec4<u32>,
     d: vec4<u32>,
+}
+
+// The four vectors of a slice in a plane.
+struct Vectors {
+    first: vec4<u32>,
+    second: vec4<u32>,
+    third: vec4<u32>,
+    fourth: vec4<u32>,
 }
 
 struct Slice {
@@ -60,22 +70,51 @@ fn side_of(index: u32) -> u32 {
     return firstTrailingBit(rest);
 }
 
-// The messages from one side.
-fn received(from_side: u32, index: u32, nodes: Nodes) -> vec4<u32> {
-    switch from_side {
-        case LEFT: {
-            return from_left(index, nodes);
-        }
-        case RIGHT: {
-            return from_right(index, nodes);
-        }
-        case UP: {
-            return from_above(index);
-        }
-        default: {
-            return from_below(index);
-        }
+// `at` holds the places of a slice's vectors in a plane. Everything is read without branches between quads, so that all of it is
+// on its way at the same time.
+
+fn from_left_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
+    let aligned = Vectors(sent_right[at.x], sent_right[at.y], sent_right[at.z], sent_right[at.w]);
+    if nodes.parity == 1 {
+        return aligned;
     }
+    let before = Vectors(sent_right[at.x - 1], sent_right[at.y - 1], sent_right[at.z - 1], sent_right[at.w - 1]);
+    let exists = vec4(select(0u, 0xffu, nodes.word > 0));
+    let eight = vec4(8u);
+    let high = vec4(24u);
+    return Vectors(
+        (aligned.first << eight) | ((before.first >> high) & exists),
+        (aligned.second << eight) | ((before.second >> high) & exists),
+        (aligned.third << eight) | ((before.third >> high) & exists),
+        (aligned.fourth << eight) | ((before.fourth >> high) & exists),
+    );
+}
+
+fn from_right_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
+    let aligned = Vectors(sent_left[at.x], sent_left[at.y], sent_left[at.z], sent_left[at.w]);
+    if nodes.parity == 0 {
+        return aligned;
+    }
+    let behind = Vectors(sent_left[at.x + 1], sent_left[at.y + 1], sent_left[at.z + 1], sent_left[at.w + 1]);
+    let exists = vec4(select(0u, 0xff000000u, nodes.word + 1 < parameters.words));
+    let eight = vec4(8u);
+    let high = vec4(24u);
+    return Vectors(
+        (aligned.first >> eight) | ((behind.first << high) & exists),
+        (aligned.second >> eight) | ((behind.second << high) & exists),
+        (aligned.third >> eight) | ((behind.third << high) & exists),
+        (aligned.fourth >> eight) | ((behind.fourth << high) & exists),
+    );
+}
+
+fn from_above_of(at: vec4<u32>) -> Vectors {
+    let row = parameters.quads * parameters.words;
+    return Vectors(sent_down[at.x - row], sent_down[at.y - row], sent_down[at.z - row], sent_down[at.w - row]);
+}
+
+fn from_below_of(at: vec4<u32>) -> Vectors {
+    let row = parameters.quads * parameters.words;
+    return Vectors(sent_up[at.x + row], sent_up[at.y + row], sent_up[at.z + row], sent_up[at.w + row]);
 }
 
 // The sums of four bytes, for all labels and nodes.
@@ -95,20 +134,61 @@ fn apart(even: u32, odd: u32) -> vec4<u32> {
 }
 
 // Data cost plus the messages from all sides but the one sent to.
-fn gather(side: u32, quad: u32, nodes: Nodes) -> Quad {
-    if quad >= parameters.quads {
-        return Quad(FAR, FAR, FAR, FAR);
+fn gather(side: u32, at: vec4<u32>, nodes: Nodes) -> Slice {
+    let data = Vectors(cost[at.x], cost[at.y], cost[at.z], cost[at.w]);
+    var x: Vectors;
+    var y: Vectors;
+    var z: Vectors;
+    switch side {
+        case LEFT: {
+            x = from_right_of(at, nodes);
+            y = from_above_of(at);
+            z = from_below_of(at);
+        }
+        case RIGHT: {
+            x = from_left_of(at, nodes);
+            y = from_above_of(at);
+            z = from_below_of(at);
+        }
+        case UP: {
+            x = from_left_of(at, nodes);
+            y = from_right_of(at, nodes);
+            z = from_below_of(at);
+        }
+        default: {
+            x = from_left_of(at, nodes);
+            y = from_right_of(at, nodes);
+            z = from_above_of(at);
+        }
     }
-    let index = plane_index(nodes.row, nodes.word) + quad * parameters.words;
-    // Left and right are 0 and 1, up and down 2 and 3.
-    let opposite = received(side ^ 1, index, nodes);
-    if side < UP {
-        return add(cost[index], opposite, from_above(index), from_below(index));
-    }
-    return add(cost[index], opposite, from_left(index, nodes), from_right(index, nodes));
+    return Slice(
+        add(data.first, x.first, y.first, z.first),
+        add(data.second, x.second, y.second, z.second),
+        add(data.third, x.third, y.third, z.third),
+        add(data.fourth, x.fourth, y.fourth, z.fourth),
+    );
 }
 
-// The envelope of an envelope or of any values, in the direction of increasing labels, under an offer to the first of them.
+// The slice with values so great that they offer nothing in quads beyond the last one.
+fn within(slice: Slice, quad: u32) -> Slice {
+    var now = slice;
+    let far = Quad(FAR, FAR, FAR, FAR);
+    if quad >= parameters.quads {
+        now.first = far;
+    }
+    if quad + 1 >= parameters.quads {
+        now.second = far;
+    }
+    if quad + 2 >= parameters.quads {
+        now.third = far;
+    }
+    if quad + 3 >= parameters.quads {
+        now.fourth = far;
+    }
+    return now;
+}
+
+// The envelope of values, or of an envelope, in the direction of increasing labels, under an offer to the first of them.
 fn ascend(quad: Quad, offer: vec4<u32>, step: vec4<u32>) -> Quad {
     let a = min(quad.a, offer);
     let b = min(quad.b, a + step);
@@ -123,7 +203,7 @@ fn descend(quad: Quad, offer: vec4<u32>, step: vec4<u32>) -> Quad {
     return Quad(min(quad.a, b + step), b, c, d);
 }
 
-// Lets an offer in at the first label, as far as it may reach.
+// Lets in an offer to the first label, which counts for `reach` labels.
 fn ascend_slice(slice: Slice, offer: vec4<u32>, step: vec4<u32>, reach: u32) -> Slice {
     var now = slice;
     now.first = ascend(slice.first, offer, step);
@@ -170,7 +250,7 @@ struct Offers {
 
 fn offers(at: u32, slice: u32, step: vec4<u32>) -> Offers {
     var offers = Offers(FAR, FAR);
-    for (var apart = 1u; SLICE_LABELS * (apart - 1) < parameters.reach; apart++) {
+    for (var apart = 1u; apart < SLICES && SLICE_LABELS * (apart - 1) < REACH; apart++) {
         let passed = step * (SLICE_LABELS * (apart - 1) + 1);
         if apart <= slice {
             offers.to_first = min(offers.to_first, unpack(last_ends[at - apart * GROUP_WORDS]) + passed);
@@ -189,57 +269,34 @@ fn normalised(quad: Quad, least: u32, most: vec4<u32>, receivers: u32) -> vec4<u
     return (words - vec4(least)) & vec4(receivers);
 }
 
-fn store(side: u32, quad: u32, nodes: Nodes, words: vec4<u32>) {
-    if quad >= parameters.quads {
-        return;
-    }
-    let index = plane_index(nodes.row, nodes.word) + quad * parameters.words;
+fn store(side: u32, at: u32, words: vec4<u32>) {
     switch side {
         case LEFT: {
-            to_left[index] = words;
+            to_left[at] = words;
         }
         case RIGHT: {
-            to_right[index] = words;
+            to_right[at] = words;
         }
         case UP: {
-            to_up[index] = words;
+            to_up[at] = words;
         }
         default: {
-            to_down[index] = words;
+            to_down[at] = words;
         }
     }
 }
 
-// Words of nodes, slices of labels and sides of a workgroup.
-@compute @workgroup_size(GROUP_WORDS, SLICES, SIDES)
-fn update_messages_of_slice(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let item = group.x * GROUP_WORDS + local.x;
-    let line = item / parameters.words;
-    // Invocations without nodes compute some, to meet the others at barriers, and store nothing.
-    let nodes = nodes_at(min(line, parameters.rows - 1), item - line * parameters.words);
-    let side = side_of(local.z);
-    let levels = edge_levels(nodes);
-    let step = unpack(of_edges(levels, parameters.steps)[side]);
-
-    let quad = SLICE_QUADS * local.y;
-    var slice = Slice(gather(side, quad, nodes), gather(side, quad + 1, nodes), gather(side, quad + 2, nodes), gather(side, quad + 3, nodes));
-    slice = ascend_slice(slice, FAR, step, SLICE_LABELS);
-    slice = descend_slice(slice, FAR, step, SLICE_LABELS);
-    let own_least = least_of(slice);
-
-    let row = local.z * SLICES + local.y;
-    let at = row * GROUP_WORDS + local.x;
-    first_ends[at] = pack(min(slice.first.a, vec4(255u)));
-    last_ends[at] = pack(min(slice.fourth.d, vec4(255u)));
+// The least values of all slices. All invocations of a workgroup must call it.
+fn least_of_slices(local: vec3<u32>, own: vec4<u32>) -> vec4<u32> {
     if local.y == 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicStore(&leasts[local.x][local.z][i], own_least[i]);
+            atomicStore(&leasts[local.x][local.z][i], own[i]);
         }
     }
     workgroupBarrier();
     if local.y > 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicMin(&leasts[local.x][local.z][i], own_least[i]);
+            atomicMin(&leasts[local.x][local.z][i], own[i]);
         }
     }
     workgroupBarrier();
@@ -247,19 +304,52 @@ fn update_messages_of_slice(@builtin(workgroup_id) group: vec3<u32>, @builtin(lo
     for (var i = 0u; i < 4; i++) {
         least[i] = atomicLoad(&leasts[local.x][local.z][i]);
     }
+    return least;
+}
 
-    let offered = offers(at, local.y, step);
-    slice = ascend_slice(slice, offered.to_first, step, parameters.reach);
-    slice = descend_slice(slice, offered.to_last, step, parameters.reach);
-    if line >= parameters.rows {
+// A workgroup computes words of a row, all slices of their labels, and all sides.
+@compute @workgroup_size(GROUP_WORDS, SLICES, SIDES)
+fn update_messages_of_slice(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let row_groups = (parameters.words + GROUP_WORDS - 1) / GROUP_WORDS;
+    let line = group.x / row_groups;
+    let word = (group.x - line * row_groups) * GROUP_WORDS + local.x;
+    // Invocations without nodes compute some, to meet the others at barriers, and store nothing.
+    let nodes = nodes_at(line, min(word, parameters.words - 1));
+    let side = side_of(local.z);
+    let levels = edge_levels(nodes);
+    let step = unpack(of_edges(levels, parameters.steps)[side]);
+
+    let quad = SLICE_QUADS * local.y;
+    let quads = min(vec4(quad) + vec4(0u, 1u, 2u, 3u), vec4(parameters.quads - 1));
+    let at = vec4(plane_index(nodes.row, nodes.word)) + quads * parameters.words;
+    var slice = within(gather(side, at, nodes), quad);
+    slice = ascend_slice(slice, FAR, step, SLICE_LABELS);
+    slice = descend_slice(slice, FAR, step, SLICE_LABELS);
+
+    let end = (local.z * SLICES + local.y) * GROUP_WORDS + local.x;
+    first_ends[end] = pack(min(slice.first.a, vec4(255u)));
+    last_ends[end] = pack(min(slice.fourth.d, vec4(255u)));
+    let least = least_of_slices(local, least_of(slice));
+    let offered = offers(end, local.y, step);
+    slice = ascend_slice(slice, offered.to_first, step, REACH);
+    slice = descend_slice(slice, offered.to_last, step, REACH);
+    if word >= parameters.words {
         return;
     }
     // Some label costs nothing, and messages at most 63. So neither the least nor what exceeds it by the truncation fills a byte.
     let most = least + unpack(of_edges(levels, parameters.truncations)[side]);
     let all = pack(least);
     let receives = receivers(nodes)[side];
-    store(side, quad, nodes, normalised(slice.first, all, most, receives));
-    store(side, quad + 1, nodes, normalised(slice.second, all, most, receives));
-    store(side, quad + 2, nodes, normalised(slice.third, all, most, receives));
-    store(side, quad + 3, nodes, normalised(slice.fourth, all, most, receives));
+    if quad < parameters.quads {
+        store(side, at.x, normalised(slice.first, all, most, receives));
+    }
+    if quad + 1 < parameters.quads {
+        store(side, at.y, normalised(slice.second, all, most, receives));
+    }
+    if quad + 2 < parameters.quads {
+        store(side, at.z, normalised(slice.third, all, most, receives));
+    }
+    if quad + 3 < parameters.quads {
+        store(side, at.w, normalised(slice.fourth, all, most, receives));
+    }
 }

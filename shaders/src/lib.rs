@@ -35,6 +35,8 @@ wgsl! {
     RESTRICT_COSTS = "restrict_costs.wgsl";
     /// Extends messages from label sets to all labels.
     EXTEND_MESSAGES = "extend_messages.wgsl";
+    /// Copies a buffer.
+    COPY = "copy.wgsl";
 }
 
 // Shared by several kernels.

@@ -43,11 +43,13 @@ pub enum Kernel {
     RestrictCosts,
     /// Messages with values for all labels, from those of label sets.
     ExtendMessages,
+    /// A copy of a buffer, to measure the rate of copying; part of no plan.
+    Copy,
 }
 
 impl Kernel {
     /// All kernels.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Features,
         Self::Greys,
         Self::MatchCost,
@@ -60,6 +62,7 @@ impl Kernel {
         Self::LabelSets,
         Self::RestrictCosts,
         Self::ExtendMessages,
+        Self::Copy,
     ];
 
     /// The name of the kernel, of its file and of its entry point.
@@ -78,6 +81,7 @@ impl Kernel {
             Self::LabelSets => "label_sets",
             Self::RestrictCosts => "restrict_costs",
             Self::ExtendMessages => "extend_messages",
+            Self::Copy => "copy",
         }
     }
 
@@ -97,13 +101,14 @@ impl Kernel {
             Self::LabelSets => bp_shaders::LABEL_SETS,
             Self::RestrictCosts => bp_shaders::RESTRICT_COSTS,
             Self::ExtendMessages => bp_shaders::EXTEND_MESSAGES,
+            Self::Copy => bp_shaders::COPY,
         };
         let of_several: &[&str] = match self {
             Self::Features | Self::Greys => &[bp_shaders::IMAGE],
             Self::MatchCost | Self::Coarsen => &[bp_shaders::SLICES, bp_shaders::COSTS],
             Self::UpdateMessages | Self::UpdateMessagesOfSlice => &[bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
             Self::SelectLabels => &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
-            Self::CoarsenGreys => &[],
+            Self::CoarsenGreys | Self::Copy => &[],
             Self::Refine => &[bp_shaders::SLICES],
             Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => &[bp_shaders::SETS],
         };
@@ -116,7 +121,7 @@ impl Kernel {
     pub fn bindings(self) -> &'static [Access] {
         match self {
             Self::Features | Self::Greys | Self::CoarsenGreys => &[Read, Write],
-            Self::LabelSets | Self::ExtendMessages => &[Write, Read],
+            Self::LabelSets | Self::ExtendMessages | Self::Copy => &[Write, Read],
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine | Self::RestrictCosts => &[Write, Read, Read],
@@ -139,7 +144,8 @@ impl Kernel {
             | Self::UpdateMessages
             | Self::LabelSets
             | Self::RestrictCosts
-            | Self::ExtendMessages => false,
+            | Self::ExtendMessages
+            | Self::Copy => false,
         }
     }
 

@@ -66,8 +66,6 @@ parameters! {
     labels_above: u32,
     /// 1 if label sets are those of seams, 0 if they are those of bands.
     seams: u32,
-    /// The labels that an offer may pass before it costs more than the truncation.
-    reach: u32,
     /// The one side whose messages are refined or extended.
     side: u32,
     /// Columns of the grid that is read.

@@ -34,6 +34,8 @@ pub(crate) struct Group {
     pub(crate) words: u32,
     /// Slices of the labels of each.
     pub(crate) slices: u32,
+    /// Whether all of its words lie in the same row.
+    in_a_row: bool,
 }
 
 impl Shape {
@@ -68,14 +70,30 @@ impl Group {
     /// The workgroups of a kernel.
     pub(crate) fn of(kernel: Kernel, plan: &Plan, limits: &Limits) -> Self {
         if !kernel.is_sliced() || limits.shape == Shape::Words {
-            return Self { words: WORKGROUP, slices: 1 };
+            return Self { words: WORKGROUP, slices: 1, in_a_row: false };
         }
         let slices = plan.model().labels().div_ceil(4 * SLICE_QUADS) as u32;
         if kernel == Kernel::UpdateMessagesOfSlice {
             // Every slice needs an invocation for each of four sides, since the slices of a message work together.
-            return Self { words: GROUP_WORDS.min(limits.invocations / (4 * slices)).max(1), slices };
+            let words = GROUP_WORDS.min(limits.invocations / (4 * slices)).max(1);
+            return Self { words, slices, in_a_row: true };
         }
-        Self { words: GROUP_WORDS, slices: slices.min(FEW_INVOCATIONS / GROUP_WORDS) }
+        // Without a least value to find, single quads keep the most reads under way.
+        let quads = plan.model().labels().div_ceil(4) as u32;
+        let slices = if kernel == Kernel::Refine { quads } else { slices };
+        Self { words: GROUP_WORDS, slices: slices.min(FEW_INVOCATIONS / GROUP_WORDS), in_a_row: false }
+    }
+
+    /// How many workgroups these rows of so many words need.
+    pub(crate) fn number(self, rows: usize, row_words: usize) -> usize {
+        let words = self.words as usize;
+        if self.in_a_row { rows * row_words.div_ceil(words) } else { (rows * row_words).div_ceil(words) }
+    }
+
+    /// How many rows of so many words these workgroups suffice for.
+    pub(crate) fn rows(self, number: usize, row_words: usize) -> usize {
+        let words = self.words as usize;
+        if self.in_a_row { number / row_words.div_ceil(words).max(1) } else { number * words / row_words.max(1) }
     }
 }
 

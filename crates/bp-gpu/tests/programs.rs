@@ -94,7 +94,7 @@ fn expected(kernel: Kernel, schedule: Schedule, height: u32, (row, colour): (u32
         (Kernel::UpdateMessages | Kernel::UpdateMessagesOfSlice, Schedule::Sweep) => sweeps(height, row, colour),
         (Kernel::Refine, Schedule::Sweep) => restored(height, row, colour),
         (Kernel::CoarsenGreys | Kernel::Coarsen | Kernel::Refine, _) => 0,
-        (Kernel::LabelSets | Kernel::RestrictCosts | Kernel::ExtendMessages, _) => 0,
+        (Kernel::LabelSets | Kernel::RestrictCosts | Kernel::ExtendMessages | Kernel::Copy, _) => 0,
     }
 }
 

@@ -3,34 +3,34 @@
 //!
 //! `cargo run --release -p bp-vulkan --example statistics -- DEVICE`, where DEVICE is an index of `bp devices`.
 
-use std::error::Error;
+use std::{collections::HashSet, error::Error};
 
 use bp_core::{Algorithm, Backend, Model, Plan, Profile, Schedule, Settings, Size};
 use bp_gpu::Shape;
 use bp_vulkan::{Statistics, Vulkan, statistics};
 
-/// The names that Mesa's RADV gives its figures.
+/// The figures of Mesa's RADV that are shown. Of other drivers, all are.
 const FIGURES: [&str; 5] = ["Instructions", "VGPRs", "Subgroups per SIMD", "Latency", "Inverse Throughput"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let device = std::env::args().nth(1).map_or(Ok(0), |index| index.parse())?;
     let info = Vulkan.devices().into_iter().nth(device).ok_or("there is no device of this index")?;
     println!("## {}\n\n{}\n", info.name, info.driver.unwrap_or_default());
-    println!("| plan | kernel | {} |\n|---|---|{}", FIGURES.join(" | "), "---:|".repeat(FIGURES.len()));
-    let mut known = Vec::new();
+    let mut of_plans = Vec::new();
     for (name, plan) in plans()? {
         for shape in [Shape::Words, Shape::Slices] {
-            for of in statistics(device, &plan, shape)?.into_iter().filter(|of| !of.figures.is_empty()) {
-                if !known.contains(&of.pipeline) {
-                    println!(
-                        "| {name} | `{}` | {} |",
-                        of.pipeline,
-                        FIGURES.map(|figure| value(&of, figure)).join(" | ")
-                    );
-                    known.push(of.pipeline);
-                }
-            }
+            of_plans.extend(statistics(device, &plan, shape)?.into_iter().map(|of| (name, of)));
         }
+    }
+    of_plans.retain(|(_, of)| !of.figures.is_empty());
+    let told: Vec<_> =
+        of_plans.iter().take(1).flat_map(|(_, of)| of.figures.iter().map(|(name, _)| name.as_str())).collect();
+    let shown = if FIGURES.iter().all(|name| told.contains(name)) { FIGURES.to_vec() } else { told };
+    println!("| plan | kernel | {} |\n|---|---|{}", shown.join(" | "), "---:|".repeat(shown.len()));
+    let mut known = HashSet::new();
+    for (name, of) in of_plans.iter().filter(|(_, of)| known.insert(&of.pipeline)) {
+        let values: Vec<_> = shown.iter().map(|figure| value(of, figure)).collect();
+        println!("| {name} | `{}` | {} |", of.pipeline, values.join(" | "));
     }
     Ok(())
 }

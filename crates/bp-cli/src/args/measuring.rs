@@ -1,6 +1,6 @@
 //! Arguments for running experiments.
 
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, ValueEnum, builder::NonEmptyStringValueParser};
 
@@ -46,6 +46,9 @@ pub(crate) struct ConformArgs {
     /// Backends, separated by commas. NAME:DEVICE selects a device other than the first.
     #[arg(long, value_delimiter = ',', default_value = devices::DEFAULT, value_name = "NAMES")]
     pub(crate) backend: Vec<String>,
+    /// Check only every N-th case: drivers of GPUs take longer to prepare most cases than to solve them.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(crate) every: NonZeroUsize,
 }
 
 /// `bp speed`.

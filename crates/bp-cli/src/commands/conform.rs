@@ -42,7 +42,7 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
     for chosen in chosen {
         let name = chosen.name.clone();
         let opened = chosen.open().map_err(|error| Failure::unavailable(devices::reason(error)));
-        let outcome = opened.and_then(|opened| check(&opened));
+        let outcome = opened.and_then(|opened| check(&opened, args.every.get()));
         terminal::watch().check()?;
         failures.extend(outcome.err().map(|failure| (name, failure)));
     }
@@ -51,13 +51,13 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<(), Failure> {
     Err(failure.of(&name))
 }
 
-/// Runs the suite on a device.
-fn check(opened: &devices::Opened) -> Result<(), Failure> {
+/// Runs every n-th case of the suite on a device.
+fn check(opened: &devices::Opened, n: usize) -> Result<(), Failure> {
     let reference = devices::reference()?;
     let start = Instant::now();
-    let conforms = bp_testkit::conform(reference.device.as_ref(), &Stoppable(opened.device.as_ref()));
+    let conforms = bp_testkit::conform_every(n, reference.device.as_ref(), &Stoppable(opened.device.as_ref()));
     conforms.map_err(|difference| Failure::other(difference.to_string()))?;
-    let (cases, seconds) = (bp_testkit::cases().count(), start.elapsed().as_secs_f64());
+    let (cases, seconds) = (bp_testkit::cases().step_by(n).count(), start.elapsed().as_secs_f64());
     let what = format!("{cases} cases match {} to the bit, also after another pair", reference.name);
     writeln!(std::io::stdout(), "{}: {what}, in {seconds:.1} s on {}", opened.name, opened.info.name)?;
     Ok(())

@@ -1,6 +1,6 @@
 //! Builds a program: records dispatches with their buffers and parameters.
 
-use bp_core::{Model, Plan, Schedule, Smoothness};
+use bp_core::{Plan, Schedule};
 use indexmap::IndexSet;
 
 use super::{
@@ -26,16 +26,6 @@ pub(super) struct Rows {
     pub(super) first: usize,
     pub(super) step: usize,
     pub(super) count: usize,
-}
-
-/// How many labels an offer may pass before it costs more than the truncation, on edges of any level.
-fn reach(model: &Model) -> u32 {
-    let of_level = |level: Smoothness| match (level.truncation, level.step()) {
-        (0, _) => 0,
-        (_, 0) => model.labels() as u32,
-        (truncation, step) => u32::from(truncation.div_ceil(step)),
-    };
-    model.edges().smoothness().map(of_level).into_iter().max().unwrap_or(0)
 }
 
 /// A program under construction.
@@ -84,7 +74,7 @@ impl Composer<'_> {
             let row_step = work.rows.step as u32;
             let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
-            let workgroups = (rows * work.row_items).div_ceil(group.words as usize) as u32;
+            let workgroups = group.number(rows, work.row_items) as u32;
             let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
             part.push(command, rows as u64 * self.row_entries(&work));
         }
@@ -99,7 +89,7 @@ impl Composer<'_> {
     /// How many rows a dispatch may compute.
     fn rows_per_dispatch(&self, work: &Work, group: Group) -> usize {
         let by_time = self.limits.dispatch_entries / self.row_entries(work).max(1);
-        let by_count = self.limits.workgroups as usize * group.words as usize / work.row_items.max(1);
+        let by_count = group.rows(self.limits.workgroups as usize, work.row_items);
         usize::try_from(by_time).unwrap_or(usize::MAX).min(by_count).max(1)
     }
 
@@ -121,7 +111,6 @@ impl Composer<'_> {
             most: model.edges().most().map(u32::from),
             clip: self.plan.clip(nodes.grid).into(),
             min_disparity: model.min_disparity(),
-            reach: reach(model),
             padding_cost: model.clip().into(),
             cut_x: cut.map_or(0, |cut| cut.x as u32),
             cut_y: cut.map_or(0, |cut| cut.y as u32),
