@@ -46,6 +46,8 @@ struct Parameters {
     labels_above: u32,
     // Kernels of label sets: 1 if the sets are those of seams, 0 if they are those of bands.
     seams: u32,
+    // update_messages_of_slice: how many labels an offer may pass before it costs as much as the truncation.
+    reach: u32,
     // refine and extend_messages: the side that the messages are sent to, with the same numbering.
     side: u32,
     // coarsen, coarsen_greys, refine and label_sets: size, words and strip of the grid that is read.

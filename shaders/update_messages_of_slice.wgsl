@@ -2,7 +2,7 @@
 // values it keeps in registers. A vector of values has a component for each node.
 //
 // First it computes the lower envelope of its slice alone. Then the slices of a message exchange the two ends of their
-// envelopes, and each lets in what others offer. After at most REACH labels, an offer costs as much as the
+// envelopes, and each lets in what others offer. After more than `reach` labels, an offer costs as much as the
 // truncation and counts for nothing.
 
 // The messages that these nodes send.
@@ -13,14 +13,12 @@
 // Grey values; see edge_levels.wgsl.
 @group(0) @binding(10) var<storage, read> greys: array<u32>;
 
-override GROUP_WORDS: u32 = 8;
+override GROUP_WORDS: u32 = 4;
 override SLICES: u32 = 1;
 // How many sides messages are sent to; `sends` says which.
 override SIDES: u32 = 4;
 // The product of these.
-override INVOCATIONS: u32 = 32;
-// The labels that an offer may pass, at least.
-override REACH: u32 = 15;
+override INVOCATIONS: u32 = 16;
 
 const SLICE_QUADS: u32 = 4;
 const SLICE_LABELS: u32 = 16;
@@ -250,7 +248,7 @@ struct Offers {
 
 fn offers(at: u32, slice: u32, step: vec4<u32>) -> Offers {
     var offers = Offers(FAR, FAR);
-    for (var apart = 1u; apart < SLICES && SLICE_LABELS * (apart - 1) < REACH; apart++) {
+    for (var apart = 1u; apart < SLICES && SLICE_LABELS * (apart - 1) < parameters.reach; apart++) {
         let passed = step * (SLICE_LABELS * (apart - 1) + 1);
         if apart <= slice {
             offers.to_first = min(offers.to_first, unpack(last_ends[at - apart * GROUP_WORDS]) + passed);
@@ -331,8 +329,8 @@ fn update_messages_of_slice(@builtin(workgroup_id) group: vec3<u32>, @builtin(lo
     last_ends[end] = pack(min(slice.fourth.d, vec4(255u)));
     let least = least_of_slices(local, least_of(slice));
     let offered = offers(end, local.y, step);
-    slice = ascend_slice(slice, offered.to_first, step, REACH);
-    slice = descend_slice(slice, offered.to_last, step, REACH);
+    slice = ascend_slice(slice, offered.to_first, step, parameters.reach);
+    slice = descend_slice(slice, offered.to_last, step, parameters.reach);
     if word >= parameters.words {
         return;
     }

@@ -66,6 +66,8 @@ parameters! {
     labels_above: u32,
     /// 1 if label sets are those of seams, 0 if they are those of bands.
     seams: u32,
+    /// How many labels an offer may pass before it costs as much as the truncation.
+    reach: u32,
     /// The one side whose messages are refined or extended.
     side: u32,
     /// Columns of the grid that is read.

@@ -1,6 +1,6 @@
 //! Builds a program: records dispatches with their buffers and parameters.
 
-use bp_core::{Plan, Schedule};
+use bp_core::{Model, Plan, Schedule, Smoothness};
 use indexmap::IndexSet;
 
 use super::{
@@ -26,6 +26,16 @@ pub(super) struct Rows {
     pub(super) first: usize,
     pub(super) step: usize,
     pub(super) count: usize,
+}
+
+/// How many labels an offer may pass before it costs as much as the truncation, on edges of any level.
+fn reach(model: &Model) -> u32 {
+    let of_level = |level: Smoothness| match (level.truncation, level.step()) {
+        (0, _) => 0,
+        (_, 0) => model.labels() as u32,
+        (truncation, step) => u32::from(truncation.div_ceil(step)) - 1,
+    };
+    model.edges().smoothness().map(of_level).into_iter().max().unwrap_or(0)
 }
 
 /// A program under construction.
@@ -111,6 +121,7 @@ impl Composer<'_> {
             most: model.edges().most().map(u32::from),
             clip: self.plan.clip(nodes.grid).into(),
             min_disparity: model.min_disparity(),
+            reach: reach(model),
             padding_cost: model.clip().into(),
             cut_x: cut.map_or(0, |cut| cut.x as u32),
             cut_y: cut.map_or(0, |cut| cut.y as u32),

@@ -1,6 +1,6 @@
 //! The buffers and constants of the kernels that read messages: `update_messages` and `select_labels`.
 
-use bp_core::{MAX_LABELS, Schedule, Smoothness};
+use bp_core::Schedule;
 
 use super::{
     composer::{Composer, Nodes, Work},
@@ -30,23 +30,10 @@ impl Composer<'_> {
             Shape::Slices => {
                 let (kernel, sides) = (Kernel::UpdateMessagesOfSlice, sides as u32);
                 let Group { words, slices, .. } = Group::of(kernel, self.plan, self.limits);
-                let size = [("SIDES", sides), ("INVOCATIONS", words * slices * sides), ("REACH", self.reach())];
+                let size = [("SIDES", sides), ("INVOCATIONS", words * slices * sides)];
                 Pipeline { kernel, constants: [&[saturating, self.finds_levels()], size.as_slice()].concat() }
             }
         }
-    }
-
-    /// How many labels an offer may pass before it costs as much as the truncation, on edges of any level, or more: few
-    /// different numbers, so that few pipelines are compiled.
-    fn reach(&self) -> u32 {
-        let model = self.plan.model();
-        let of_level = |level: Smoothness| match (level.truncation, level.step()) {
-            (0, _) => 0,
-            (_, 0) => model.labels() as u32,
-            (truncation, step) => u32::from(truncation.div_ceil(step)) - 1,
-        };
-        let most = model.edges().smoothness().map(of_level).into_iter().max().unwrap_or(0);
-        [4, 8, 16].into_iter().find(|&reach| most <= reach).unwrap_or(MAX_LABELS as u32)
     }
 
     /// The buffers of the data costs, of the messages from the other colour, of the messages that these nodes send, and
