@@ -84,7 +84,6 @@ fn the_least_memory_limit_is_kept() {
             let allowed =
                 limit.strip_suffix("MiB").map_or(0, |number| (number.parse::<f64>().unwrap() * 1048576.0) as u64);
             if end.code == 0 {
-                eprintln!("{ending} {options}: slack {}", allowed as i64 - end.peak as i64);
                 assert!(end.peak <= allowed, "{ending} {options}: {limit} allowed, {} bytes held", end.peak);
                 return Some(());
             }

@@ -4,8 +4,8 @@ use bp_core::{Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling, 
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
-/// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 1 MiB.
-pub(crate) const PROGRAM: u64 = 22 << 20;
+/// Bytes of the program itself, the stacks of its threads and the reserves of its allocators, which vary by more than 2 MiB.
+pub(crate) const PROGRAM: u64 = 25 << 20;
 
 /// About the bytes that allocators keep of freed memory where the caller does not limit memory.
 const KEPT: u64 = 32 << 20;
