@@ -267,7 +267,7 @@ fn normalised(quad: Quad, least: u32, most: vec4<u32>, receivers: u32) -> vec4<u
     return (words - vec4(least)) & vec4(receivers);
 }
 
-fn store(side: u32, at: u32, words: vec4<u32>) {
+fn store_quad(side: u32, at: u32, words: vec4<u32>) {
     switch side {
         case LEFT: {
             to_left[at] = words;
@@ -281,6 +281,22 @@ fn store(side: u32, at: u32, words: vec4<u32>) {
         default: {
             to_down[at] = words;
         }
+    }
+}
+
+// Stores a slice, apart from quads beyond the last one.
+fn store(side: u32, quad: u32, at: vec4<u32>, words: Vectors) {
+    if quad < parameters.quads {
+        store_quad(side, at.x, words.first);
+    }
+    if quad + 1 < parameters.quads {
+        store_quad(side, at.y, words.second);
+    }
+    if quad + 2 < parameters.quads {
+        store_quad(side, at.z, words.third);
+    }
+    if quad + 3 < parameters.quads {
+        store_quad(side, at.w, words.fourth);
     }
 }
 
@@ -338,16 +354,10 @@ fn update_messages_of_slice(@builtin(workgroup_id) group: vec3<u32>, @builtin(lo
     let most = least + unpack(of_edges(levels, parameters.truncations)[side]);
     let all = pack(least);
     let receives = receivers(nodes)[side];
-    if quad < parameters.quads {
-        store(side, at.x, normalised(slice.first, all, most, receives));
-    }
-    if quad + 1 < parameters.quads {
-        store(side, at.y, normalised(slice.second, all, most, receives));
-    }
-    if quad + 2 < parameters.quads {
-        store(side, at.z, normalised(slice.third, all, most, receives));
-    }
-    if quad + 3 < parameters.quads {
-        store(side, at.w, normalised(slice.fourth, all, most, receives));
-    }
+    store(side, quad, at, Vectors(
+        normalised(slice.first, all, most, receives),
+        normalised(slice.second, all, most, receives),
+        normalised(slice.third, all, most, receives),
+        normalised(slice.fourth, all, most, receives),
+    ));
 }
