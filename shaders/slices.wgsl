@@ -20,28 +20,30 @@ fn quads_of(slice: u32) -> vec2<u32> {
     return min(vec2(slice, slice + 1) * quads, vec2(parameters.quads));
 }
 
-var<workgroup> leasts: array<array<atomic<u32>, 4>, GROUP_WORDS>;
+// [word][side][node]
+var<workgroup> leasts: array<array<array<atomic<u32>, 4>, 4>, GROUP_WORDS>;
 
-// The least value over all slices, for each node of a word. All invocations of a workgroup must call it.
+// The least value over all slices, for each node of a word and, in update_messages_of_slice, for each side. All invocations of a
+// workgroup must call it.
 fn least_of_slices(local: vec3<u32>, own: vec4<u32>) -> vec4<u32> {
     if SLICES == 1 {
         return own;
     }
     if local.y == 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicStore(&leasts[local.x][i], own[i]);
+            atomicStore(&leasts[local.x][local.z][i], own[i]);
         }
     }
     workgroupBarrier();
     if local.y > 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicMin(&leasts[local.x][i], own[i]);
+            atomicMin(&leasts[local.x][local.z][i], own[i]);
         }
     }
     workgroupBarrier();
     var least: vec4<u32>;
     for (var i = 0u; i < 4; i++) {
-        least[i] = atomicLoad(&leasts[local.x][i]);
+        least[i] = atomicLoad(&leasts[local.x][local.z][i]);
     }
     return least;
 }

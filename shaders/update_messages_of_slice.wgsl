@@ -13,12 +13,10 @@
 // Grey values; see edge_levels.wgsl.
 @group(0) @binding(10) var<storage, read> greys: array<u32>;
 
-override GROUP_WORDS: u32 = 4;
-override SLICES: u32 = 1;
 // How many sides messages are sent to; `sends` says which.
 override SIDES: u32 = 4;
-// The product of these.
-override INVOCATIONS: u32 = 16;
+// The invocations of a workgroup: the product of GROUP_WORDS, SLICES and SIDES.
+override INVOCATIONS: u32 = 256;
 
 const SLICE_QUADS: u32 = 4;
 const SLICE_LABELS: u32 = 16;
@@ -53,8 +51,6 @@ struct Slice {
 // The values of all slices at their first and last labels, one byte per node: [side][slice][word].
 var<workgroup> first_ends: array<u32, INVOCATIONS>;
 var<workgroup> last_ends: array<u32, INVOCATIONS>;
-// The least values of all labels: [word][side][node].
-var<workgroup> leasts: array<array<array<atomic<u32>, 4>, 4>, GROUP_WORDS>;
 
 // The side of the messages that an invocation computes: one of those in `sends`.
 fn side_of(index: u32) -> u32 {
@@ -298,27 +294,6 @@ fn store(side: u32, quad: u32, at: vec4<u32>, words: Vectors) {
     if quad + 3 < parameters.quads {
         store_quad(side, at.w, words.fourth);
     }
-}
-
-// The least values of all slices. All invocations of a workgroup must call it.
-fn least_of_slices(local: vec3<u32>, own: vec4<u32>) -> vec4<u32> {
-    if local.y == 0 {
-        for (var i = 0u; i < 4; i++) {
-            atomicStore(&leasts[local.x][local.z][i], own[i]);
-        }
-    }
-    workgroupBarrier();
-    if local.y > 0 {
-        for (var i = 0u; i < 4; i++) {
-            atomicMin(&leasts[local.x][local.z][i], own[i]);
-        }
-    }
-    workgroupBarrier();
-    var least: vec4<u32>;
-    for (var i = 0u; i < 4; i++) {
-        least[i] = atomicLoad(&leasts[local.x][local.z][i]);
-    }
-    return least;
 }
 
 // A workgroup computes words of a row, all slices of their labels, and all sides.

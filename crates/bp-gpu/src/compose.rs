@@ -14,7 +14,7 @@ use composer::{Composer, PARAMETERS_ALIGNMENT};
 use indexmap::IndexSet;
 use recorder::Recorder;
 
-use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, layout, shape::Group};
+use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, group::Group, layout};
 
 /// The number of full dispatches in a submission: few enough for watchdogs, progress reports and quick stopping, but
 /// enough to make the cost of submitting negligible.

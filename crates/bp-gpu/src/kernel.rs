@@ -106,8 +106,10 @@ impl Kernel {
         let of_several: &[&str] = match self {
             Self::Features | Self::Greys => &[bp_shaders::IMAGE],
             Self::MatchCost | Self::Coarsen => &[bp_shaders::SLICES, bp_shaders::COSTS],
-            Self::UpdateMessages | Self::UpdateMessagesOfSlice => &[bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
-            Self::SelectLabels => &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
+            Self::UpdateMessages => &[bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
+            Self::UpdateMessagesOfSlice | Self::SelectLabels => {
+                &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS]
+            }
             Self::CoarsenGreys | Self::Copy => &[],
             Self::Refine => &[bp_shaders::SLICES],
             Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => &[bp_shaders::SETS],

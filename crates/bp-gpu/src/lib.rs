@@ -10,6 +10,7 @@ mod compose;
 #[cfg(feature = "conformance")]
 pub mod conformance;
 mod copy_rate;
+mod group;
 mod kernel;
 mod layout;
 mod limits;

@@ -7,7 +7,7 @@ use super::{
     buffers::{Buffers, StripBuffers},
     recorder::PartRecorder,
 };
-use crate::{BindGroup, Command, Limits, Parameters, Pipeline, layout::Grid, shape::Group};
+use crate::{BindGroup, Command, Limits, Parameters, Pipeline, group::Group, layout::Grid};
 
 /// The alignment of dynamic offsets: the largest of any device.
 pub(super) const PARAMETERS_ALIGNMENT: usize = 256;

@@ -6,7 +6,7 @@ use super::{
     composer::{Composer, Nodes, Work},
     recorder::PartRecorder,
 };
-use crate::{Kernel, Pipeline, Shape, shape::Group};
+use crate::{Kernel, Pipeline, Shape, group::Group};
 
 impl Composer<'_> {
     /// The buffer of the grid's grey values. If all edges have the same cost, no kernel reads it, and a buffer of costs is bound.
