@@ -21,14 +21,15 @@ fn open_reshaped(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
     })
 }
 
+// Fewer cases: most of the time goes into compiling its kernels for a processor, for every number of slices.
 #[test]
 fn the_other_shape_conforms() -> Result<(), Difference> {
-    conforms(8, &Scalar, open_reshaped)
+    conforms(32, &Scalar, open_reshaped)
 }
 
 #[test]
 fn the_other_shape_conforms_cut_up() -> Result<(), Difference> {
-    conforms_cut_up(8, &Scalar, open_reshaped)
+    conforms_cut_up(16, &Scalar, open_reshaped)
 }
 
 #[test]

@@ -27,12 +27,12 @@ fn open_reshaped(change: &dyn Fn(&mut Limits)) -> Option<Box<dyn Device>> {
 
 #[test]
 fn the_other_shape_conforms() -> Result<(), Difference> {
-    conforms(4 * EVERY, &Scalar, open_reshaped)
+    conforms(16 * EVERY, &Scalar, open_reshaped)
 }
 
 #[test]
 fn the_other_shape_conforms_cut_up() -> Result<(), Difference> {
-    conforms_cut_up(4 * EVERY, &Scalar, open_reshaped)
+    conforms_cut_up(8 * EVERY, &Scalar, open_reshaped)
 }
 
 #[test]
