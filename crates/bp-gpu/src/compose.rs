@@ -14,7 +14,11 @@ use composer::{Composer, PARAMETERS_ALIGNMENT};
 use indexmap::IndexSet;
 use recorder::Recorder;
 
-use crate::{Buffer, Kernel, Limits, Memory, Program, WORKGROUP, group::Group, layout};
+use crate::{
+    Buffer, Kernel, Limits, Memory, Program, Shape, WORKGROUP,
+    group::{FEW_INVOCATIONS, Group},
+    layout,
+};
 
 /// The number of full dispatches in a submission: few enough for watchdogs, progress reports and quick stopping, but
 /// enough to make the cost of submitting negligible.
@@ -96,6 +100,12 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
     if limits.bindings < Kernel::most_bindings() {
         let needed = Kernel::most_bindings();
         return unsupported(format!("a kernel needs {needed} buffers and it allows {}", limits.bindings));
+    }
+    if limits.shape == Shape::Slices && limits.invocations < FEW_INVOCATIONS {
+        let allowed = limits.invocations;
+        return unsupported(format!(
+            "a workgroup needs {FEW_INVOCATIONS} invocations and it allows {allowed}: set BP_GPU_SHAPE=words"
+        ));
     }
     if plan.margin() > 0 && !plan.model().edges().is_uniform() {
         return unsupported("a part with a plan of its own needs edges of one cost here".to_owned());

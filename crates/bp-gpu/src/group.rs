@@ -13,8 +13,9 @@ const GROUP_WORDS: u32 = 8;
 /// The same for `update_messages_of_slice`. An H100 takes a tenth more time with 8 words, and a sixth more with 2.
 const UPDATED_WORDS: u32 = 4;
 
-/// The most invocations of a workgroup that every device allows.
-const FEW_INVOCATIONS: u32 = 256;
+/// The invocations of a workgroup that a device must allow for the shape [`Shape::Slices`]: enough for 1024 labels. All GPUs of
+/// desktops allow more.
+pub(crate) const FEW_INVOCATIONS: u32 = 256;
 
 /// The shape of a workgroup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -186,6 +186,8 @@ fn what_no_device_can_run_is_refused() {
     assert!(error.starts_with("a device cannot run this plan: a kernel needs 11 buffers"), "{error}");
     let error = refusal(&bp, Limits { workgroups: 1, ..Limits::roomy() });
     assert!(error.contains("a row has 90 pixels and it computes at most 64"), "{error}");
+    let error = refusal(&bp, Limits { invocations: 128, shape: Shape::Slices, ..Limits::roomy() });
+    assert!(error.ends_with("a workgroup needs 256 invocations and it allows 128: set BP_GPU_SHAPE=words"), "{error}");
     let error = refusal(&bp, Limits { binding_bytes: 1000, ..Limits::roomy() });
     assert!(error.contains("at most 1000 bytes"), "{error}");
 
