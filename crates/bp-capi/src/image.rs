@@ -62,10 +62,12 @@ impl BpstereoImage {
             return Ok(None);
         }
         let rows = self.rows::<f32>(name)?;
-        // SAFETY: the caller's promise.
-        let values = (0..self.height).flat_map(|y| unsafe { rows.read(y) });
-        let factor = factor_to_8_bits(values);
-        factor.map(Some).map_err(|wrong| Failure::input(format!("{name}: {wrong}")))
+        let factors = (0..self.height).map(|y| {
+            // SAFETY: the caller's promise.
+            let row = unsafe { rows.read(y) };
+            factor_to_8_bits(row).map_err(|wrong| Failure::input(format!("{name}: {wrong}")))
+        });
+        factors.reduce(|one, other| Ok(one?.min(other?))).transpose()
     }
 
     /// Copies the image. Floats are multiplied by `factor`. Messages call it `name`.

@@ -45,7 +45,7 @@ impl<T: Copy> Rows<T> {
     ///
     /// # Safety
     /// The caller of the library must have promised that all rows are readable.
-    pub(crate) unsafe fn read(&self, y: usize) -> impl Iterator<Item = T> {
+    pub(crate) unsafe fn read(&self, y: usize) -> impl Iterator<Item = T> + Clone {
         let row = self.row(y);
         // SAFETY: the promise; the address is aligned, and its distance was checked.
         (0..self.length).map(move |x| unsafe { row.add(x).read() })

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Matches rasters that are larger than memory (pip install 'bpstereo[dask]' rioxarray zarr).
+"""Matches rasters that are larger than memory (pip install './crates/bp-python[dask]' rioxarray zarr).
 
     python rasters.py LEFT RIGHT LABELS DISPARITY.tif|DISPARITY.zarr [BLOCK]
 

@@ -6,7 +6,7 @@ use bp_core::{
 };
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
-    ndarray::{ArrayViewD, Ix3},
+    ndarray::{ArrayView2, Axis, Ix3},
 };
 use pyo3::{
     exceptions::{PyMemoryError, PyTypeError, PyValueError},
@@ -71,9 +71,13 @@ impl<'py> Pixels<'py> {
     /// The factor that makes 8-bit values of floats. Fails at values that no image has.
     fn factor(&self) -> PyResult<Option<f32>> {
         let Values::Floats(array) = &self.values else { return Ok(None) };
-        let array = array.try_readonly()?;
-        let factor = factor_to_8_bits(array.as_array().iter().copied());
-        factor.map(Some).map_err(|wrong| PyValueError::new_err(format!("{}: {wrong}", self.name)))
+        let mut factor = f32::INFINITY;
+        for_each_row(array, |row| {
+            let of_row = factor_to_8_bits(row.iter().copied());
+            factor = factor.min(of_row.map_err(|wrong| PyValueError::new_err(format!("{}: {wrong}", self.name)))?);
+            Ok(())
+        })?;
+        Ok(Some(factor))
     }
 
     fn image(&self, factor: f32) -> PyResult<Image> {
@@ -85,34 +89,72 @@ impl<'py> Pixels<'py> {
     }
 
     /// The image, with `stored` as the 8-bit value of each value.
-    fn converted<T: Element + Copy>(
+    fn converted<T: Element + Copy + Default>(
         &self,
         array: &Bound<'_, PyArrayDyn<T>>,
         stored: impl Fn(T) -> u8,
     ) -> PyResult<Image> {
         let Size { width, height } = self.size;
-        let array = array.try_readonly()?;
-        let (view, count) = (array.as_array(), self.size.pixels());
         let no_room = |_| PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size));
-        let image = if let [_, _, 3] = view.shape() {
+        let image = if let [_, _, 3] = array.shape() {
             let mut colours = Vec::new();
-            colours.try_reserve_exact(count).map_err(no_room)?;
-            match view.as_slice() {
-                Some(values) => colours.extend(values.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored))),
-                None => strided(view, &mut colours, stored),
-            }
+            colours.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
+            for_each_row(array, |row| {
+                colours.extend(row.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored)));
+                Ok(())
+            })?;
             Image::from_rgb(width, height, colours)
         } else {
             let mut greys = Vec::new();
-            greys.try_reserve_exact(count).map_err(no_room)?;
-            match view.as_slice() {
-                Some(values) => greys.extend(values.iter().map(|&value| stored(value))),
-                None => greys.extend(view.iter().map(|&value| stored(value))),
-            }
+            greys.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
+            for_each_row(array, |row| {
+                greys.extend(row.iter().map(|&value| stored(value)));
+                Ok(())
+            })?;
             Image::from_grey(width, height, greys)
         };
         image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
     }
+}
+
+/// The values between two looks at signals and at other Python threads.
+const PATIENCE: usize = 1 << 22;
+
+/// Calls `each` with the values of every row, side by side: those of the array, or copies where they do not lie so.
+fn for_each_row<T: Element + Copy + Default>(
+    array: &Bound<'_, PyArrayDyn<T>>,
+    mut each: impl FnMut(&[T]) -> PyResult<()>,
+) -> PyResult<()> {
+    let guard = array.try_readonly()?;
+    let mut view = guard.as_array();
+    if view.ndim() == 2 {
+        view = view.insert_axis(Axis(2));
+    }
+    let Ok(view) = view.into_dimensionality::<Ix3>() else { return Ok(()) };
+    let (mut copy, mut read) = (Vec::new(), 0);
+    for row in view.outer_iter() {
+        match row.as_slice() {
+            Some(values) => each(values)?,
+            None => each(side_by_side(row, &mut copy))?,
+        }
+        read += row.len();
+        if read >= PATIENCE {
+            read = 0;
+            array.py().check_signals()?;
+            array.py().detach(|| ());
+        }
+    }
+    Ok(())
+}
+
+/// A row `[width][channels]` without gaps, in `copy`. Each channel by itself, which is faster than pixel by pixel.
+fn side_by_side<'copy, T: Copy + Default>(row: ArrayView2<'_, T>, copy: &'copy mut Vec<T>) -> &'copy [T] {
+    copy.resize(row.len(), T::default());
+    let channels = row.ncols();
+    for (channel, values) in row.axis_iter(Axis(1)).enumerate() {
+        copy.iter_mut().skip(channel).step_by(channels).zip(values).for_each(|(to, &value)| *to = value);
+    }
+    copy
 }
 
 /// The object as an array: itself, or what it turns into, as images of other libraries do. Values that lie at odd
@@ -127,14 +169,6 @@ fn array<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyU
     }
     let array = object.py().import("numpy")?.call_method1("require", (object, object.py().None(), "A"))?;
     Ok(array.cast_into()?)
-}
-
-/// Adds the colours of an array whose values do not lie one after another.
-fn strided<T: Copy>(array: ArrayViewD<'_, T>, colours: &mut Vec<[u8; 3]>, stored: impl Fn(T) -> u8) {
-    let Ok(array) = array.into_dimensionality::<Ix3>() else { return };
-    for row in array.outer_iter() {
-        colours.extend(row.outer_iter().map(|pixel| [0, 1, 2].map(|channel| stored(pixel[channel]))));
-    }
 }
 
 /// The map in an array `[height][width]` of float32, where values that are not finite are unknown.

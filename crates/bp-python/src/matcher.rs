@@ -124,6 +124,17 @@ impl Matcher {
         Ok(map.into_any())
     }
 
+    /// The most bytes that matching this pair is predicted to take, with 25 MiB for the library itself, but without Python's
+    /// own and the arrays. Nothing is matched. MemoryError if it does not fit.
+    fn peak_bytes(&self, py: Python<'_>, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<u64> {
+        let mut state = self.state()?;
+        let pair = pair(left, right)?;
+        state.reopen_after_fork(py)?;
+        // A matcher may go to another thread, but not be shared with one.
+        let matcher = &mut *state.matcher;
+        py.detach(move || matcher.peak_bytes(&pair)).map_err(raised)
+    }
+
     /// The confidence of the last map, 0 to 1: float32 [height][width]. None unless the option `confidence` is set.
     #[getter]
     fn confidence(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {

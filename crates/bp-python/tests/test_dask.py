@@ -55,6 +55,18 @@ def test_any_chunks_and_colours_do():
     assert (abs(bpstereo.dask.match(*coloured, labels=24, min_disparity=-2).compute() - expected) > 0.5).mean() < 0.02
 
 
+def test_a_block_takes_what_is_predicted():
+    left, right, _ = scene(600, 1200, 40)
+    images = blocks(left, right, chunks=(128, 256))
+    predicted = bpstereo.dask.peak_bytes(*images, labels=48)
+    # Of smaller blocks a worker holds less, down to the library's own part.
+    assert 25 << 20 < predicted < bpstereo.dask.peak_bytes(*blocks(left, right, chunks=(600, 1200)), labels=48)
+    found = bpstereo.dask.match(*images, labels=48, max_memory=predicted).compute(scheduler="threads", num_workers=1)
+    assert numpy.isfinite(found).any()
+    with pytest.raises(MemoryError):
+        bpstereo.dask.peak_bytes(*images, labels=48, max_memory=26 << 20)
+
+
 def test_what_cannot_work_is_told_at_once():
     left, right, _ = scene(64, 128, 8)
     images = blocks(left, right, chunks=(64, 128))

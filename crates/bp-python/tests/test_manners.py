@@ -104,6 +104,27 @@ bpstereo.match(*shifted(480, 640, 4), **{SLOW!r})
     assert process.returncode in (1, 130, -signal.SIGINT)
 
 
+def test_ctrl_c_ends_the_reading_of_large_images():
+    # Every other column: values that do not lie side by side. Reading and matching this takes many seconds.
+    code = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import bpstereo, numpy
+image = numpy.random.default_rng(1).random((6000, 12000), dtype=numpy.float32)[:, ::2]
+matcher = bpstereo.Matcher(labels=64)
+print("go", flush=True)
+matcher.compute(image, image)
+"""
+    for moment in (0.02, 0.3):
+        process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdout.readline()
+        time.sleep(moment)
+        begin = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+        assert time.monotonic() - begin < 2 and "KeyboardInterrupt" in told, told
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_matcher_works_after_a_fork(pair):
@@ -152,6 +173,25 @@ def test_a_thousand_matches_leak_nothing():
     matcher = bpstereo.Matcher(labels=8, confidence=True, threads=1)
     assert least_growth(lambda: matcher.compute(*pair), 250) < 250 * 4096
     assert least_growth(lambda: bpstereo.match(*pair, labels=8, threads=1), 30) < 30 * 4096
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="there is no /proc")
+def test_a_match_holds_no_more_than_predicted():
+    code = """
+import bpstereo, numpy
+scene = numpy.random.default_rng(1).integers(0, 256, (900, 1240), dtype=numpy.uint8)
+left, right = scene[:, :1200], scene[:, 20:1220]
+most = lambda: 1024 * int(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM:")))
+matcher = bpstereo.Matcher(labels=64, threads=1)
+predicted, before = matcher.peak_bytes(left, right), most()
+matcher.compute(left, right)
+print(predicted, most() - before)
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    predicted, grown = map(int, done.stdout.split())
+    assert predicted / 4 < grown <= predicted
+    with pytest.raises(MemoryError):
+        bpstereo.Matcher(labels=64, max_memory=30 << 20).peak_bytes(*shifted(900, 1200, 4))
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads in /proc")

@@ -211,6 +211,18 @@ impl Matcher {
         Ok(Planned { plan, alignment, warnings, time: start.elapsed() })
     }
 
+    /// The most bytes that the program is predicted to hold while it matches a pair. Nothing is matched.
+    ///
+    /// # Errors
+    /// Those of [`Self::plan`]; [`Error::OutOfMemory`] if the pair does not fit into [`Options::max_memory`] or what is free.
+    pub fn peak_bytes(&self, pair: &StereoPair) -> Result<u64, Error> {
+        let Self { options, opened, beside, .. } = self;
+        let Planned { plan, alignment, .. } = self.plan(pair)?;
+        let images = Images::of(pair, plan.model().profile(), applied(alignment).is_some());
+        let fitted = || memory::fitted(options, *beside, &plan, images, opened, &Watch::default());
+        Ok(self.pool.install(fitted)?.peak_bytes)
+    }
+
     /// Matches a pair as planned. Progress goes to `watch`, in message entries.
     ///
     /// # Errors
@@ -225,7 +237,7 @@ impl Matcher {
         let Self { options, pool, opened, beside, prepared } = self;
         let Planned { plan, alignment, warnings, time } = planned;
         // A different plan is freed before the new one is prepared.
-        let applied = alignment.filter(|alignment| !alignment.is_negligible());
+        let applied = applied(alignment);
         let images = Images::of(pair, plan.model().profile(), applied.is_some());
         let fits = |prepared: &Prepared| *prepared.tiled.plan() == plan && prepared.images == images;
         let before = prepared.take().filter(fits);
@@ -291,6 +303,11 @@ impl Matcher {
         }
         Ok(bp_io::hex(&hash.finalize()))
     }
+}
+
+/// An alignment that changes anything.
+fn applied(alignment: Option<Alignment>) -> Option<Alignment> {
+    alignment.filter(|alignment| !alignment.is_negligible())
 }
 
 /// The pair with aligned rows, if there is an alignment.

@@ -38,6 +38,38 @@ def match(
     >>> float(numpy.nanmedian(disparity[:, 16:]).round())
     3.0
     """
+    images, options, depth = _extended(left, right, labels, min_disparity, options)
+    kind: dict[str, Any] = {"dtype": numpy.float32, "meta": numpy.empty((0, 0), numpy.float32)}
+    dropped = {"drop_axis": 2} if left.ndim == 3 else {}
+    matched = dask.array.map_blocks(_matched, *images, options=options, **kind, **dropped)
+    return overlap.trim_overlap(matched, depth=depth, boundary="none")
+
+
+def peak_bytes(
+    left: dask.array.Array, right: dask.array.Array, *, labels: int, min_disparity: int = 0, **options: Any
+) -> int:
+    """The most bytes that a worker is predicted to hold while it matches one block, beside Python and its packages.
+
+    It takes what `match` takes, and computes nothing but this. The option `max_memory` of `match` holds each block to a
+    limit.
+
+    >>> import dask.array
+    >>> image = dask.array.zeros((4096, 4096), chunks=1024, dtype="uint8")
+    >>> 50_000_000 < bpstereo.dask.peak_bytes(image, image, labels=64) < 500_000_000
+    True
+    """
+    images, options, _ = _extended(left, right, labels, min_disparity, options)
+    largest = tuple(max(sizes) for sizes in images[0].chunks)
+    blank = [numpy.zeros(largest, image.dtype) for image in images]
+    # Beside the library, the worker holds the two blocks and the map.
+    arrays = sum(image.nbytes for image in blank) + 4 * largest[0] * largest[1]
+    return arrays + Matcher(**({"threads": 1} | options)).peak_bytes(*blank)
+
+
+def _extended(
+    left: dask.array.Array, right: dask.array.Array, labels: int, min_disparity: int, options: dict[str, Any]
+) -> tuple[list[dask.array.Array], dict[str, Any], dict[int, Any]]:
+    """The images in blocks with halos, the options of each match, and the halos. Wrong options are told now, not by a worker."""
     if left.shape != right.shape:
         raise ValueError(f"the images differ in shape: {left.shape} and {right.shape}")
     if left.dtype.kind != "u" or right.dtype.kind != "u":
@@ -45,7 +77,6 @@ def match(
     if isinstance(labels, bool) or not isinstance(labels, (int, numpy.integer)):
         raise ValueError("`labels` must be a number: each block by itself would find other labels")
     options = {"align": "off"} | options | {"labels": int(labels), "min_disparity": int(min_disparity)}
-    # Wrong options are told now, not by a worker.
     Matcher(**options)
     before, after = halo(labels, min_disparity)
     chunks = _chunks(left.chunks[0], PATCH_ROWS, HALO_ROWS), _chunks(left.chunks[1], PATCH_COLUMNS, max(before, after))
@@ -53,11 +84,7 @@ def match(
     depth = {0: (HALO_ROWS, HALO_ROWS) if len(chunks[0]) > 1 else 0, 1: (before, after) if len(chunks[1]) > 1 else 0}
     whole = chunks + ((left.shape[2],) if left.ndim == 3 else ())
     images = [image.rechunk(whole) for image in (left, right)]
-    extended = [overlap.overlap(image, depth=depth, boundary="none", allow_rechunk=False) for image in images]
-    kind: dict[str, Any] = {"dtype": numpy.float32, "meta": numpy.empty((0, 0), numpy.float32)}
-    dropped = {"drop_axis": 2} if left.ndim == 3 else {}
-    matched = dask.array.map_blocks(_matched, *extended, options=options, **kind, **dropped)
-    return overlap.trim_overlap(matched, depth=depth, boundary="none")
+    return [overlap.overlap(image, depth=depth, boundary="none", allow_rechunk=False) for image in images], options, depth
 
 
 def halo(labels: int, min_disparity: int = 0) -> tuple[int, int]:
