@@ -161,13 +161,15 @@ fn threads() -> impl TypedValueParser<Value = u16> {
     clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS))
 }
 
-/// Fails if RAYON_NUM_THREADS asks for more threads than `--threads` may.
+/// Fails if the environment asks for more threads than `--threads` may: by the variable that Rayon reads, or its older name.
 pub(crate) fn check_environment() -> Result<(), Failure> {
-    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<u64>().ok());
-    match asked.filter(|&threads| threads > u64::from(MOST_THREADS)) {
-        Some(threads) => Err(Failure::usage(format!("RAYON_NUM_THREADS={threads}: at most {MOST_THREADS} threads"))),
-        None => Ok(()),
+    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+        let asked = std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+        if let Some(threads) = asked.filter(|&threads| threads > u64::from(MOST_THREADS)) {
+            return Err(Failure::usage(format!("{name}={threads}: at most {MOST_THREADS} threads")));
+        }
     }
+    Ok(())
 }
 
 fn positive(text: &str) -> Result<f32, String> {

@@ -299,10 +299,12 @@ pub struct NotAShade(pub f32);
 pub fn factor_to_8_bits(values: impl Iterator<Item = f32> + Clone) -> Result<f32, NotAShade> {
     let is_shade = |value: f32| (0.0..=255.0).contains(&value);
     // Flags instead of a return or a maximum: vectors do these.
-    let (wrong, above) = values.clone().fold((0, 0), |(wrong, above), value| {
-        (wrong | u32::from(!is_shade(value)), above | u32::from(value > 1.0))
-    });
-    if wrong != 0 && let Some(value) = values.into_iter().find(|&value| !is_shade(value)) {
+    let (wrong, above) = values
+        .clone()
+        .fold((0, 0), |(wrong, above), value| (wrong | u32::from(!is_shade(value)), above | u32::from(value > 1.0)));
+    if wrong != 0
+        && let Some(value) = values.into_iter().find(|&value| !is_shade(value))
+    {
         return Err(NotAShade(value));
     }
     Ok(if above == 0 { 255.0 } else { 1.0 })
@@ -375,7 +377,10 @@ mod tests {
     #[test]
     fn floats_have_one_of_two_factors() {
         let factor = |values: &[f32]| factor_to_8_bits(values.iter().copied());
-        assert_eq!([&[][..], &[0.0, 1.0], &[0.5, 1.0_f32.next_up()], &[255.0]].map(factor), [255.0, 255.0, 1.0, 1.0].map(Ok));
+        assert_eq!(
+            [&[][..], &[0.0, 1.0], &[0.5, 1.0_f32.next_up()], &[255.0]].map(factor),
+            [255.0, 255.0, 1.0, 1.0].map(Ok)
+        );
         assert_eq!(factor(&[3.0, -0.5, 300.0]), Err(NotAShade(-0.5)));
         assert!(factor(&[0.5, f32::NAN]).is_err_and(|wrong| wrong.0.is_nan()));
     }

@@ -105,7 +105,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let shard = options.shard;
     let files = Files::of(&shard.file_part()).owning(&options.output);
     let making = &Making { files, ..making.clone() };
-    let jobs = job::jobs(options, making, &found.pairs)?;
+    let jobs = job::jobs(options, making, &found.pairs, watch)?;
     let _lock = shard.lock(&options.output.join(job::RECORDS), &making.files)?;
     making.files.check_writable(&shard.summary_path(&options.output))?;
     job::clear_leftovers(options, &jobs, &making.files)?;
@@ -118,6 +118,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
             due.extend(chain);
         }
     }
+    let skipped = jobs.len() - due.len();
     let (due, mut failures) = writable(due, making, watch)?;
     let run = Run {
         options,
@@ -128,7 +129,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
         warned: Warned::default(),
     };
     failures.extend(match_due(&run, &due)?);
-    let summary = Summary::of(&options.output, shard, &jobs, jobs.len() - due.len(), failures)?;
+    let summary = Summary::of(&options.output, shard, &jobs, skipped, failures)?;
     let summary = Summary { unread: found.unread, ..summary };
     summary.write(&making.files, &shard.summary_path(&options.output))?;
     Ok(summary)

@@ -4,6 +4,7 @@
 use std::{fs, os::unix::fs::symlink, process::Command};
 
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 use crate::{
     folder::{Folder, text},
@@ -87,6 +88,34 @@ fn a_forged_record_removes_no_file_of_others() {
 }
 
 #[test]
+fn a_forged_record_removes_no_image_and_no_file_of_another_pair() {
+    let folder = Folder::new();
+    let images = ["left.png", "right.png"].map(|name| fs::read(folder.path(name)).unwrap());
+    for name in ["a.png", "r.png"] {
+        fs::write(folder.path(name), &images[usize::from(name == "r.png")]).unwrap();
+    }
+    // A map of `a` could be called a.png, as its left image is, or a.depth.pfm, as the map of the other pair is.
+    fs::write(folder.path("list"), "a.png r.png a\nleft.png right.png a.depth\n").unwrap();
+    let run = format!("match --pairs list --output . {TINY}");
+    assert!(folder.run(&run).status.success());
+    let record = folder.path("records/a.json");
+    let mut forged: Value = serde_json::from_slice(&fs::read(&record).unwrap()).unwrap();
+    for name in ["a.png", "a.depth.pfm"] {
+        let bytes = fs::read(folder.path(name)).unwrap();
+        let mut state = forged["done"]["outputs"][0].clone();
+        state["path"] = folder.path(name).display().to_string().into();
+        state["bytes"] = bytes.len().into();
+        (state["modified_ns"], state["changed_ns"]) = (Value::Null, Value::Null);
+        state["sha256"] = bp_io::hex(&Sha256::digest(&bytes)).into();
+        forged["done"]["outputs"].as_array_mut().unwrap().push(state);
+    }
+    forged["settings_sha256"] = "other".into();
+    fs::write(&record, forged.to_string()).unwrap();
+    assert!(folder.run(&run).status.success());
+    assert!(folder.path("a.pfm").exists() && folder.path("a.png").exists() && folder.path("a.depth.pfm").exists());
+}
+
+#[test]
 fn a_name_that_cannot_be_written_stops_no_other_pair() {
     let (folder, run) = four_pairs();
     let long = "n".repeat(300);
@@ -104,6 +133,8 @@ fn a_name_that_cannot_be_written_stops_no_other_pair() {
     {
         assert!(told.contains(words), "{words}: {told}");
     }
+    let summary: Value = serde_json::from_slice(&fs::read(folder.path("out/summary.json")).unwrap()).unwrap();
+    assert_eq!(["done", "skipped"].map(|key| &summary[key]), [1, 0]);
     fs::remove_file(folder.path("out/pipe.pfm")).unwrap();
     assert_eq!(names(&folder.path("out")), ["z"]);
 }

@@ -1,11 +1,13 @@
 //! The work for each pair: its inputs, outputs and record, and checks before the work begins.
 
 use std::{
-    collections::{BTreeSet, HashMap, HashSet},
-    ffi::{OsStr, OsString},
+    collections::{BTreeSet, HashSet},
+    ffi::OsStr,
     fs,
+    hash::{BuildHasher, RandomState},
     io::ErrorKind,
-    path::{Display, Path, PathBuf},
+    path::{Path, PathBuf},
+    sync::Arc,
     time::{Duration, SystemTime},
 };
 
@@ -16,7 +18,7 @@ use super::{
 use bp_io::{Files, MapFormat, create_folder, resolved};
 
 use super::{Also, BatchOptions};
-use crate::{Error, Making, Outputs, pairs::Pair};
+use crate::{Error, Making, Outputs, Watch, pairs::Pair};
 
 /// The folder of the records, inside the output folder.
 pub(super) const RECORDS: &str = "records";
@@ -34,18 +36,43 @@ pub(super) struct Job {
     pub(super) record: PathBuf,
     /// The index of its chain; see [`BatchOptions::chain`].
     pub(super) chain: usize,
+    /// The files of the whole batch.
+    taken: Arc<Taken>,
+}
+
+/// The files that the pairs of a batch are read from and written to, as hashes: only a few bytes for each.
+#[derive(Default)]
+struct Taken {
+    hashes: HashSet<u64>,
+    hasher: RandomState,
+}
+
+impl Taken {
+    fn add(&mut self, path: &Path) {
+        self.hashes.insert(self.hasher.hash_one(key(path)));
+    }
+
+    fn has(&self, path: &Path) -> bool {
+        let has = |path: &Path| self.hashes.contains(&self.hasher.hash_one(key(path)));
+        has(path) || has(&resolved(path))
+    }
 }
 
 /// The jobs of a shard. Fails if any two pairs, those of other shards included, would write the same file, or if an
 /// output would overwrite an input.
-pub(super) fn jobs(options: &BatchOptions, making: &Making, pairs: &[Pair]) -> Result<Vec<Job>, Error> {
+pub(super) fn jobs(
+    options: &BatchOptions,
+    making: &Making,
+    pairs: &[Pair],
+    watch: &Watch<'_>,
+) -> Result<Vec<Job>, Error> {
     // Checked once: an unknown extension is an error of the options, not of a pair.
     MapFormat::of(&Path::new("NAME").with_added_extension(&options.format))?;
     let jobs: Vec<Job> = pairs.iter().enumerate().map(|(index, pair)| Job::new(options, making, index, pair)).collect();
-    check_apart(options, &jobs)?;
-    let jobs: Vec<Job> = jobs.into_iter().filter(|job| options.shard.has(job.chain)).collect();
+    let taken = Arc::new(check_apart(options, &jobs, watch)?);
     create_folder(&options.output)?;
-    Ok(jobs)
+    let of_shard = jobs.into_iter().filter(|job| options.shard.has(job.chain));
+    Ok(of_shard.map(|job| Job { taken: Arc::clone(&taken), ..job }).collect())
 }
 
 impl Job {
@@ -63,7 +90,7 @@ impl Job {
         let paths = outputs.paths(making);
         let calibration = making.calibration_files().into_iter().map(Path::to_owned).collect();
         let chain = index / options.chain();
-        Self { pair: pair.clone(), calibration, outputs, paths, record, chain }
+        Self { pair: pair.clone(), calibration, outputs, paths, record, chain, taken: Arc::default() }
     }
 
     /// The two images.
@@ -90,7 +117,7 @@ impl Job {
     /// it.
     pub(super) fn remove_others(&self) -> Result<(), Error> {
         let Some(earlier) = PairRecord::known(&self.record)? else { return Ok(()) };
-        let written: HashSet<OsString> = self.paths.iter().map(|path| key(path)).collect();
+        let written: HashSet<PathBuf> = self.paths.iter().map(|path| key(path)).collect();
         for path in self.earlier_outputs(&earlier) {
             let path = path?;
             if !written.contains(&key(&path)) {
@@ -112,11 +139,15 @@ impl Job {
     }
 
     /// The outputs that a record lists and that are unchanged, at their current paths. All outputs of a pair are in one
-    /// folder, which may have been moved. A changed file of the same name may belong to another pair or to the user.
+    /// folder, which may have been moved. A changed file of the same name may belong to the user; a record may be forged and
+    /// name an image of the batch, or a file of another pair.
     fn earlier_outputs(&self, earlier: &PairRecord) -> impl Iterator<Item = Result<PathBuf, bp_io::Error>> {
         earlier.done.outputs.iter().filter_map(|state| {
             let name = state.path.file_name().filter(|name| self.is_own(name))?;
             let here = self.paths.first()?.with_file_name(name);
+            if !self.paths.contains(&here) && self.taken.has(&here) {
+                return None;
+            }
             state.compare(&here).map(|is_still| is_still.then_some(here)).transpose()
         })
     }
@@ -156,36 +187,41 @@ pub(super) fn are_complete(chain: &[Job], settings_sha256: &str) -> bool {
 }
 
 /// Fails if a job would overwrite an input, two jobs would write the same file, or a file of one is a folder of
-/// another.
-fn check_apart(options: &BatchOptions, jobs: &[Job]) -> Result<(), Error> {
-    let inputs: HashSet<PathBuf> = jobs.iter().flat_map(Job::inputs).map(resolved).collect();
-    let files = || jobs.iter().flat_map(|job| job.files().map(move |path| (job.pair.left.display(), path)));
-    if let Some((_, path)) = files().find(|(_, path)| inputs.contains(&resolved(path))) {
-        let what = format!("{} would be overwritten, which is read", path.display());
-        return Err(Error::Options(format!("{what}; choose another `output`")));
+/// another. Returns all files of the jobs.
+fn check_apart(options: &BatchOptions, jobs: &[Job], watch: &Watch<'_>) -> Result<Taken, Error> {
+    let mut inputs = HashSet::new();
+    for job in jobs {
+        watch.check()?;
+        inputs.extend(job.inputs().into_iter().map(resolved));
     }
+    let mut taken = Taken::default();
+    inputs.iter().for_each(|path| taken.add(path));
     let summary = Shard::default().summary_path(&options.output);
-    let mut owners = HashMap::from([(key(&summary), "the summary".to_owned())]);
-    for (owner, path) in files() {
-        if let Some(other) = owners.insert(key(path), owner.to_string()) {
-            return Err(clash(path, &other, &owner.to_string()));
+    let mut files = vec![(key(&summary), summary.as_path(), Path::new("the summary"))];
+    for job in jobs {
+        watch.check()?;
+        for path in job.files() {
+            if inputs.contains(&resolved(path)) {
+                let what = format!("{} would be overwritten, which is read", path.display());
+                return Err(Error::Options(format!("{what}; choose another `output`")));
+            }
+            taken.add(path);
+            files.push((key(path), path, &job.pair.left));
         }
     }
-    let taken = |(owner, path): (Display<'_>, &Path)| {
-        let folder = path.ancestors().skip(1).find(|folder| owners.contains_key(&key(folder)))?;
-        Some(clash(folder, &owners[&key(folder)], &owner.to_string()))
-    };
-    files().find_map(taken).map_or(Ok(()), Err)
+    // In order of their parts, a folder comes right before what is in it.
+    files.sort_by(|(one, ..), (other, ..)| one.cmp(other));
+    let clashing = files.array_windows().find(|[(one, ..), (other, ..)]| other.starts_with(one));
+    let Some([(one, folder, owner), (other, path, other_owner)]) = clashing else { return Ok(taken) };
+    let (place, advice) = (if one == other { path } else { folder }, "give them other names in a list of pairs");
+    let [owner, other_owner] = [owner, other_owner].map(|path| path.display());
+    let what = format!("{}: {owner} and {other_owner} would both go there; {advice}", place.display());
+    Err(Error::Options(what))
 }
 
 /// The form in which paths are compared. Upper and lower case are equal, as on some file systems.
-fn key(path: &Path) -> OsString {
-    path.as_os_str().to_ascii_lowercase()
-}
-
-fn clash(path: &Path, one: &str, other: &str) -> Error {
-    let advice = "give them other names in a list of pairs";
-    Error::Options(format!("{}: {one} and {other} would both go there; {advice}", path.display()))
+fn key(path: &Path) -> PathBuf {
+    path.as_os_str().to_ascii_lowercase().into()
 }
 
 /// All folders that hold files of these jobs.
