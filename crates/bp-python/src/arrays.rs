@@ -147,12 +147,23 @@ fn for_each_row<T: Element + Copy + Default>(
     Ok(())
 }
 
-/// A row `[width][channels]` without gaps, in `copy`. Each channel by itself, which is faster than pixel by pixel.
+/// A row `[width][channels]` without gaps, in `copy`. Walking along each channel is faster than from pixel to pixel.
 fn side_by_side<'copy, T: Copy + Default>(row: ArrayView2<'_, T>, copy: &'copy mut Vec<T>) -> &'copy [T] {
     copy.resize(row.len(), T::default());
-    let channels = row.ncols();
-    for (channel, values) in row.axis_iter(Axis(1)).enumerate() {
-        copy.iter_mut().skip(channel).step_by(channels).zip(values).for_each(|(to, &value)| *to = value);
+    // OpenCV's colours the other way round (`image[..., ::-1]`) lie side by side.
+    let mut turned = row;
+    turned.invert_axis(Axis(1));
+    match turned.to_slice() {
+        Some(values) if row.ncols() == 3 => {
+            let pixels = copy.as_chunks_mut::<3>().0.iter_mut().zip(values.as_chunks::<3>().0);
+            pixels.for_each(|(to, &[blue, green, red])| *to = [red, green, blue]);
+        }
+        _ => {
+            for (channel, values) in row.axis_iter(Axis(1)).enumerate() {
+                let to = copy.iter_mut().skip(channel).step_by(row.ncols());
+                to.zip(values).for_each(|(to, &value)| *to = value);
+            }
+        }
     }
     copy
 }
