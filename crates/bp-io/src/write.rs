@@ -55,7 +55,8 @@ impl Files {
         let mut at = folder.clone();
         for part in below {
             at.push(part);
-            let Ok(about) = at.symlink_metadata() else { continue };
+            // Where nothing is, nothing is below it either.
+            let Ok(about) = at.symlink_metadata() else { break };
             if about.is_symlink() {
                 return Err(Error::writing(&at, &"it is a link, which could lead out of the output folder; remove it"));
             }

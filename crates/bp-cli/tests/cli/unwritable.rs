@@ -1,7 +1,12 @@
 //! Batches into folders where something is in the way: links of others, names that no file can have.
 #![cfg(unix)]
 
-use std::{fs, os::unix::fs::symlink, process::Command};
+use std::{
+    fs,
+    os::unix::fs::symlink,
+    process::Command,
+    time::{Duration, Instant},
+};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -113,6 +118,18 @@ fn a_forged_record_removes_no_image_and_no_file_of_another_pair() {
     fs::write(&record, forged.to_string()).unwrap();
     assert!(folder.run(&run).status.success());
     assert!(folder.path("a.pfm").exists() && folder.path("a.png").exists() && folder.path("a.depth.pfm").exists());
+}
+
+/// Work for every folder of a name, as long as the name, would take half a minute.
+#[test]
+fn a_name_of_very_many_folders_fails_at_once() {
+    let (folder, run) = four_pairs();
+    fs::write(folder.path("list"), format!("left.png right.png {}b\nleft.png right.png z\n", "a/".repeat(200_000)))
+        .unwrap();
+    let begun = Instant::now();
+    assert_eq!(folder.run(&run).status.code(), Some(3));
+    assert!(begun.elapsed() < Duration::from_secs(10));
+    assert_eq!(names(&folder.path("out")), ["z"]);
 }
 
 #[test]
