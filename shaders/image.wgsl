@@ -5,13 +5,16 @@
 
 override APRON: u32 = 4;
 
+// The columns to the left of the nodes.
+override MARGIN: u32 = 0;
+
 fn image_byte(index: u32) -> u32 {
     return (image[index / 4] >> (8 * (index % 4))) & 0xff;
 }
 
-// The colour of a pixel. Its row is counted from the first row of the apron.
+// The colour of a pixel. Its row is counted from the first row of the apron, its column from the first one behind the margin.
 fn colour(x: u32, row: u32) -> vec3<u32> {
-    let first = 3 * (row * parameters.width + x);
+    let first = 3 * (row * (MARGIN + parameters.width) + MARGIN + x);
     return vec3(image_byte(first), image_byte(first + 1), image_byte(first + 2));
 }
 

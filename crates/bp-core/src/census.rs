@@ -174,7 +174,8 @@ pub fn find_match(pair: &StereoPair, model: &Model, node: Node) -> Option<Seed> 
 #[must_use]
 pub fn seed(pair: &StereoPair, plan: &Plan) -> Option<Seed> {
     let cut = plan.settings().cut.filter(|cut| cut.seed_start)?;
-    find_match(pair, plan.model(), Node { x: cut.x, y: cut.y })
+    let seed = find_match(pair, plan.model(), Node { x: plan.margin() + cut.x, y: cut.y })?;
+    Some(Seed { x: cut.x, ..seed })
 }
 
 #[cfg(test)]

@@ -51,8 +51,8 @@ impl Part {
         let model = *whole.model();
         let farthest = model.disparity(model.labels() as u16 - 1);
         let margin = columns.start.min(usize::try_from(farthest).unwrap_or(0));
-        let plan = Plan::new(size, model, Settings { cut: None, ..*whole.settings() })?.with_margin(margin);
-        Ok(Self { columns, rows, plan })
+        let plan = Plan::new(size, model, Settings { cut: None, ..*whole.settings() })?;
+        Ok(Self { columns, rows, plan: plan.with_margin(margin)? })
     }
 
     /// Its plan, for its nodes only.

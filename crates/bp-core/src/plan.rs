@@ -57,9 +57,14 @@ impl Plan {
         Ok(Self { model, settings, sizes, margin: 0 })
     }
 
-    /// The same plan for pairs that have more columns on the left, which its nodes do not cover but match.
-    pub(crate) fn with_margin(self, margin: usize) -> Self {
-        Self { margin, ..self }
+    /// The same plan for pairs that have `margin` more columns on the left, which its nodes do not cover but match.
+    ///
+    /// # Errors
+    /// Those of [`Size::new`] for such a pair.
+    pub fn with_margin(self, margin: usize) -> Result<Self, Error> {
+        let Size { width, height } = self.image_size();
+        Size::new(width.saturating_add(margin), height)?;
+        Ok(Self { margin, ..self })
     }
 
     /// The labels, the data cost and the smoothness.
@@ -86,8 +91,8 @@ impl Plan {
         self.sizes[0]
     }
 
-    /// The number of columns to the left of the nodes of grid 0 that a pair has; not 0 only for a [`crate::Part`]. The nodes
-    /// match these columns of the right image.
+    /// The number of columns to the left of the nodes of grid 0 that a pair has; not 0 only for a [`crate::Part`] or a
+    /// [`crate::Tile`]. The nodes match these columns of the right image.
     #[must_use]
     pub fn margin(&self) -> usize {
         self.margin

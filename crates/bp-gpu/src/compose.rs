@@ -107,9 +107,6 @@ fn check_limits(plan: &Plan, buffers: &[Buffer], limits: &Limits) -> Result<(), 
             "a workgroup needs {FEW_INVOCATIONS} invocations and it allows {allowed}: set BP_GPU_SHAPE=words"
         ));
     }
-    if plan.margin() > 0 && !plan.model().edges().is_uniform() {
-        return unsupported("a part with a plan of its own needs edges of one cost here".to_owned());
-    }
     let width = plan.pair_size().width;
     let most = limits.workgroups as usize * least_row_pixels(plan, limits);
     if width > most {

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use bp_core::{Device, Driver, Error, Model, Plan, Settings, Side, StereoPair};
+use bp_core::{Device, Driver, Error, Model, Plan, Settings, Side, Size, StereoPair};
 
 /// A pair and a plan for it.
 #[derive(Clone, Debug)]
@@ -20,6 +20,17 @@ impl Case {
     /// Those of [`Plan::new`].
     pub fn new(pair: StereoPair, model: Model, settings: Settings) -> Result<Self, Error> {
         Ok(Self { plan: Plan::new(pair.size(), model, settings)?, pair })
+    }
+
+    /// The same plan for nodes that do not cover the first `margin` columns of the pair, but match them.
+    ///
+    /// # Errors
+    /// Those of [`Plan::new`].
+    pub(crate) fn behind(self, margin: usize) -> Result<Self, Error> {
+        let Size { width, height } = self.pair.size();
+        let size = Size { width: width.saturating_sub(margin), height };
+        let plan = Plan::new(size, *self.plan.model(), *self.plan.settings())?.with_margin(margin)?;
+        Ok(Self { plan, ..self })
     }
 }
 

@@ -30,7 +30,7 @@ pub fn cases() -> impl Iterator<Item = Case> {
         let pair = noise_pair(width, height, model.labels() as u64);
         settings(pair.size()).into_iter().filter_map(move |settings| case(&pair, model, settings))
     });
-    whole.chain(strips()).chain(label_sets())
+    whole.chain(strips()).chain(label_sets()).chain(margins())
 }
 
 /// Cases of [`Schedule::Outward`]: start nodes at corners, borders and inside, whole images and parts.
@@ -90,6 +90,26 @@ fn stepped_label_sets() -> impl Iterator<Item = Case> {
         settings.into_iter().filter_map(move |(grids, steps, coarse_clip)| {
             case(&pair, model, Settings { grids, steps, coarse_clip, label_sets: true, ..ours })
         })
+    })
+}
+
+/// Nodes that do not cover the first columns of a pair: of every profile, with edges of several levels, a seed and label sets.
+fn margins() -> impl Iterator<Item = Case> {
+    [1, 6, 67].into_iter().flat_map(|margin| {
+        let noise = noise_pair(margin + 37, 9, margin as u64);
+        let profiles = Profile::ALL.into_iter().flat_map(move |profile| {
+            let size = Size { width: 37, height: 9 };
+            let ways = [
+                Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep),
+                Algorithm::Cfbp.settings(size, 7, 2, Schedule::Checkerboard),
+                Algorithm::Ctbp.settings(size, 4, 1, Schedule::Sync),
+            ];
+            let model = Model::new(profile, 12).map(|model| model.with_edges_halved_above(20)).ok();
+            let noise = noise.clone();
+            ways.into_iter().filter_map(move |settings| case(&noise, model?, settings)?.behind(margin).ok())
+        });
+        let stepped = stepped_label_sets().step_by(3).filter_map(move |case| case.behind(margin).ok());
+        profiles.chain(stepped)
     })
 }
 

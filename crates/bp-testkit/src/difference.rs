@@ -113,7 +113,7 @@ pub(crate) fn same(expected: &Answer, found: &Answer, case: &Case) -> Result<(),
 
 fn differing_message(expected: &Answer, found: &Answer, case: &Case, side: Side) -> Option<Fault> {
     let [expected, found] = [expected, found].map(|answer| &answer.messages[side as usize]);
-    let (width, labels) = (case.pair.size().width, case.plan.model().labels());
+    let (width, labels) = (case.plan.image_size().width, case.plan.model().labels());
     let i = first_difference(expected, found)?;
     let (node, label) = (i / labels, i % labels);
     let (x, y) = (node % width, node / width);
@@ -121,7 +121,7 @@ fn differing_message(expected: &Answer, found: &Answer, case: &Case, side: Side)
 }
 
 fn differing_label(expected: &Answer, found: &Answer, case: &Case) -> Option<Fault> {
-    let width = case.pair.size().width;
+    let width = case.plan.image_size().width;
     let i = first_difference(&expected.labels, &found.labels)?;
     Some(Fault::Label { x: i % width, y: i / width, expected: expected.labels[i], found: found.labels[i] })
 }

@@ -74,11 +74,12 @@ impl State {
 impl Solver for State {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
         let mut data_cost = DataCost::new(pair.size(), *self.plan.model())?;
-        data_cost.load(pair, seed)?;
-        for (i, Node { x, y }) in pair.size().nodes().enumerate() {
-            self.grids[0].greys[i] = pair.left().grey(x, y).into();
+        data_cost.load(pair, seed.map(|seed| Seed { x: self.plan.margin() + seed.x, ..seed }))?;
+        for (i, Node { x, y }) in self.plan.image_size().nodes().enumerate() {
+            let column = self.plan.margin() + x;
+            self.grids[0].greys[i] = pair.left().grey(column, y).into();
             for (label, cost) in self.grids[0].sums[i].iter_mut().enumerate() {
-                *cost = data_cost.at(x, y, label as u16).into();
+                *cost = data_cost.at(column, y, label as u16).into();
             }
         }
         self.set_costs(0);

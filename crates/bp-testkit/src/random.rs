@@ -3,8 +3,8 @@
 use fastrand::Rng;
 
 use bp_core::{
-    Cut, EdgeLevels, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Smoothness,
-    image::APRON,
+    Cut, EdgeLevels, MAX_GRIDS, MAX_TRUNCATION, MessageStart, Model, Plan, Profile, Schedule, Settings, Size,
+    Smoothness, image::APRON,
 };
 
 use crate::{Case, noise_pair};
@@ -13,17 +13,18 @@ use crate::{Case, noise_pair};
 const VOLUME: usize = 60_000;
 
 /// A random case. The same seed gives the same case as long as `fastrand` does not change. Sizes lie around one and
-/// several vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, and
-/// half of the models have edges of several levels; see [`EdgeLevels`].
+/// several vectors, blocks, strips and bands, with fewer rows for many labels. Half of the pairs have an apron, a quarter a
+/// margin, and half of the models have edges of several levels; see [`EdgeLevels`].
 #[must_use]
 pub fn random_case(seed: u64) -> Case {
     let mut random = Rng::with_seed(seed);
     let (model, width) = (model(&mut random), width(&mut random));
     let height = random.usize(1..80).min(1 + VOLUME / (width * model.labels()));
     let [above, below] = if random.bool() { [random.usize(..=APRON), random.usize(..=APRON)] } else { [0, 0] };
-    let pair = noise_pair(width, above + height + below, random.u32(..).into()).strip(above..above + height);
+    let margin = if random.u8(..4) == 0 { random.usize(1..150) } else { 0 };
+    let pair = noise_pair(margin + width, above + height + below, random.u32(..).into()).strip(above..above + height);
     let settings = settings(&mut random, width, height);
-    let plan = Plan::new(pair.size(), model, settings);
+    let plan = Plan::new(Size { width, height }, model, settings).and_then(|plan| plan.with_margin(margin));
     Case { plan: plan.unwrap_or_else(|error| panic!("{error}")), pair }
 }
 
@@ -101,8 +102,6 @@ fn one_of<T: Copy>(random: &mut Rng, all: &[T]) -> T {
 
 #[cfg(test)]
 mod tests {
-    use bp_core::Size;
-
     use super::*;
 
     #[test]
@@ -126,6 +125,7 @@ mod tests {
         assert!(any(&|settings| settings.coarse_clip && settings.grids > 1));
         assert!(any(&|settings| settings.label_sets && settings.grids > 2));
         assert!([true, false].iter().all(|&seed| any(&|s| s.cut.is_some_and(|cut| cut.seed_start == seed))));
+        assert!(plans.iter().any(|plan| plan.margin() > 0 && plan.settings().label_sets));
         assert!(any_size(&|size| size.width == 1100 && size.height > 1));
         assert!(any_size(&|size| size.width < 20 && size.height > 64));
     }

@@ -20,6 +20,8 @@ pub struct Tile {
     pub columns: Span,
     /// Its rows.
     pub rows: Span,
+    /// The columns to the left of these, of which only the right image is needed: the tile's pixels match them.
+    pub margin: usize,
 }
 
 impl Tile {
@@ -35,7 +37,7 @@ impl Tile {
     /// None for a tile of that plan's [`crate::Tiling`].
     pub fn plan(&self, whole: &Plan) -> Result<Plan, Error> {
         let cut = whole.settings().cut.and_then(|cut| self.cut(cut));
-        Plan::new(self.size(), *whole.model(), Settings { cut, ..*whole.settings() })
+        Plan::new(self.size(), *whole.model(), Settings { cut, ..*whole.settings() })?.with_margin(self.margin)
     }
 
     fn cut(&self, Cut { x, y, seed_start }: Cut) -> Option<Cut> {
@@ -45,31 +47,33 @@ impl Tile {
         (x.is_some() || y.is_some()).then(|| Cut { x: x.unwrap_or(0), y: y.unwrap_or(0), seed_start })
     }
 
-    /// Copies the tile's part of a pair.
+    /// Copies the tile's part of a pair, with the margin.
     ///
     /// # Panics
     /// If the tile lies outside.
     #[must_use]
     pub fn pair(&self, pair: &StereoPair) -> StereoPair {
-        pair.part(self.columns.all.clone(), self.rows.all.clone())
+        let Range { start, end } = self.columns.all;
+        pair.part(start - self.margin..end, self.rows.all.clone())
     }
 
     /// The bytes of such a copy of what a profile compares.
     pub(super) fn pair_bytes(&self, profile: Profile) -> u64 {
-        2 * profile.image_bytes() * (self.columns.all.len() * (self.rows.all.len() + 2 * APRON)) as u64
+        let columns = self.margin + self.columns.all.len();
+        2 * profile.image_bytes() * (columns * (self.rows.all.len() + 2 * APRON)) as u64
     }
 }
 
 /// The number of extra columns or rows that a tile has before and after those that it keeps.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Margin {
+pub(super) struct Halo {
     pub(super) before: usize,
     pub(super) after: usize,
 }
 
-/// Splits `len` columns or rows into spans that keep `kept` each and begin at multiples of `align`. A span also has the margin,
+/// Splits `len` columns or rows into spans that keep `kept` each and begin at multiples of `align`. A span also has the halo,
 /// clipped to the image. If they can have one length at little cost, they do: then one driver matches all of them.
-pub(super) fn spans(len: usize, kept: usize, align: usize, Margin { before, after }: Margin) -> Vec<Span> {
+pub(super) fn spans(len: usize, kept: usize, align: usize, Halo { before, after }: Halo) -> Vec<Span> {
     let span = |start: usize| {
         let end = (start + kept).min(len);
         Span { all: start.saturating_sub(before)..(end + after).min(len), kept: start..end }
@@ -89,9 +93,3 @@ pub(super) fn spans(len: usize, kept: usize, align: usize, Margin { before, afte
 /// Spans are made equal if this adds no more than this part of their sum. Tiles of another size need other memory, which takes
 /// the system about as long to hand out as half a tile takes to match.
 const MOST_LENGTHENED: usize = 12;
-
-/// The first span of each length.
-pub(super) fn distinct(spans: &[Span]) -> impl Iterator<Item = &Span> {
-    let first = |index: usize| spans.iter().position(|span| span.all.len() == spans[index].all.len()) == Some(index);
-    spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)
-}

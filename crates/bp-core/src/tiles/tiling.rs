@@ -1,6 +1,6 @@
 //! How a plan is cut into tiles. This is decided before anything runs.
 
-use super::tile::{Margin, Span, Tile, distinct, spans};
+use super::tile::{Halo, Span, Tile, spans};
 use crate::{BAND_ROWS, Error, Patch, Plan, Schedule, Size};
 
 /// Tiles begin at multiples of this many columns and rows, so that on up to five grids their nodes have the same children
@@ -41,13 +41,13 @@ impl Tiling {
     #[must_use]
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
-        let whole = |length| spans(length, length, 1, Margin::default());
+        let whole = |length| spans(length, length, 1, Halo::default());
         Self { plan, columns: whole(width), rows: whole(height), likely: None }
     }
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
-    /// around them. If labels match to the left, a tile extends further left by the largest disparity, so that the pixels it
-    /// keeps have the same costs as in the whole image; likewise on the right. Under [`Schedule::Sweep`] no halo has more
+    /// around them. All their pixels have the same costs as in the whole image, because the right image is there as far to the left as
+    /// labels match. If labels match to the right, a tile extends further right by as much. Under [`Schedule::Sweep`] no halo has more
     /// than 64 rows. Under [`Schedule::Outward`] the image is one tile.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
@@ -57,14 +57,13 @@ impl Tiling {
         }
         let Size { width, height } = plan.image_size();
         let (model, align) = (plan.model(), align(&plan));
-        let [left, right] = [model.disparity(model.labels() as u16 - 1), -model.min_disparity()]
-            .map(|reach| (halo + reach.max(0) as usize).next_multiple_of(align.width));
+        let to_the_right = (-model.min_disparity()).max(0) as usize;
+        let [before, after] = [halo, halo + to_the_right].map(|columns| columns.next_multiple_of(align.width));
         let swept = plan.settings().schedule == Schedule::Sweep;
         let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
-        let columns =
-            spans(width, kept.width.next_multiple_of(align.width), align.width, Margin { before: left, after: right });
-        let margin = Margin { before: beyond, after: beyond };
-        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, margin);
+        let columns = spans(width, kept.width.next_multiple_of(align.width), align.width, Halo { before, after });
+        let halo = Halo { before: beyond, after: beyond };
+        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, halo);
         Self { plan, columns, rows, likely: None }
     }
 
@@ -116,15 +115,24 @@ impl Tiling {
         &self.plan
     }
 
-    /// All tiles, grouped by size, the largest first.
+    /// All tiles, grouped by size and margin, the largest first.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
-        let mut tiles = Vec::with_capacity(self.columns.len() * self.rows.len());
-        for columns in &self.columns {
-            tiles.extend(self.rows.iter().map(|rows| Tile { columns: columns.clone(), rows: rows.clone() }));
-        }
-        tiles.sort_by_key(|tile| std::cmp::Reverse((tile.size().pixels(), tile.size().width)));
+        let of_columns = |columns| self.rows.iter().map(move |rows| self.tile(columns, rows));
+        let mut tiles: Vec<_> = self.columns.iter().flat_map(of_columns).collect();
+        tiles.sort_by_key(|tile| std::cmp::Reverse((tile.size().pixels(), tile.size().width, tile.margin)));
         tiles
+    }
+
+    fn tile(&self, columns: &Span, rows: &Span) -> Tile {
+        Tile { columns: columns.clone(), rows: rows.clone(), margin: self.margin(columns) }
+    }
+
+    /// The columns to the left of these that their pixels match.
+    fn margin(&self, columns: &Span) -> usize {
+        let model = self.plan.model();
+        let farthest = model.disparity(model.labels() as u16 - 1);
+        columns.all.start.min(usize::try_from(farthest).unwrap_or(0))
     }
 
     /// The number of tiles across and down.
@@ -173,9 +181,9 @@ impl Tiling {
             return needed(&self.plan);
         }
         let mut most = 0;
-        for columns in distinct(&self.columns) {
-            for rows in distinct(&self.rows) {
-                let tile = Tile { columns: columns.clone(), rows: rows.clone() };
+        for columns in distinct(&self.columns, |columns| (columns.all.len(), self.margin(columns))) {
+            for rows in distinct(&self.rows, |rows| rows.all.len()) {
+                let tile = self.tile(columns, rows);
                 let bytes = needed(&tile.plan(&self.plan)?)?;
                 most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
             }
@@ -199,6 +207,12 @@ impl Tiling {
     fn cost(&self, needed: &Needed<'_>) -> f64 {
         self.matched_pixels() + self.bytes(needed).unwrap_or(u64::MAX) as f64 / BYTES_PER_PIXEL
     }
+}
+
+/// The first span of each kind.
+fn distinct<Kind: PartialEq>(spans: &[Span], kind: impl Fn(&Span) -> Kind) -> impl Iterator<Item = &Span> {
+    let first = move |index: usize| spans.iter().position(|span| kind(span) == kind(&spans[index])) == Some(index);
+    spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)
 }
 
 /// Tiles begin at multiples of this many columns and rows. With label sets, they begin where patches and bands of grid 1 do, so
@@ -248,7 +262,7 @@ fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Cut, Model, Profile};
+    use crate::{Algorithm, Cut, Image, Model, Profile, StereoPair};
 
     fn plan((width, height): (usize, usize), labels: usize, algorithm: Algorithm) -> Plan {
         let size = Size { width, height };
@@ -273,7 +287,7 @@ mod tests {
         let whole = plan.bytes();
         assert!(within(&plan, whole).is_whole());
         let tilings = [whole - 1, whole / 5, whole / 10, whole / 20].map(|bytes| within(&plan, bytes));
-        assert_eq!(tilings.each_ref().map(Tiling::counts), [(1, 8), (1, 8), (3, 8), (5, 16)]);
+        assert_eq!(tilings.each_ref().map(Tiling::counts), [(1, 8), (1, 8), (3, 8), (4, 16)]);
         assert!(tilings.is_sorted_by(|a, b| a.matched_pixels() <= b.matched_pixels()));
         let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed, &needed)
         else {
@@ -336,18 +350,21 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "takes minutes")]
     fn tiles_share_the_image_and_see_all_that_labels_match() {
-        for (min_disparity, left, right) in
-            [(0, 64 + 16, 64), (-40, 64, 64 + 40), (100, 64 + 115, 64), (-9999, 64, 9999)]
-        {
+        let black = Image::from_grey(333, 222, vec![0; 333 * 222]).unwrap();
+        let pair = StereoPair::new(black.clone(), black).unwrap();
+        for (min_disparity, reach, right) in [(0, 15, 64), (-40, 0, 64 + 40), (100, 115, 64), (-9999, 0, 9999)] {
             let plan = plan((333, 222), 16, Algorithm::Cfbp);
             let model = plan.model().with_min_disparity(min_disparity).unwrap();
             let plan = Plan::new(plan.image_size(), model, *plan.settings()).unwrap();
             let tiling = Tiling::cut(plan, Size { width: 60, height: 100 }, 64);
             let mut kept = vec![0; 333 * 222];
-            for Tile { columns, rows } in tiling.tiles() {
+            for tile in tiling.tiles() {
+                let Tile { columns, rows, margin } = &tile;
                 let pixels = rows.kept.clone().flat_map(|y| columns.kept.clone().map(move |x| (x, y)));
                 pixels.for_each(|(x, y)| kept[y * 333 + x] += 1);
-                assert!(columns.all.start == 0 || columns.all.start + left <= columns.kept.start, "{columns:?}");
+                assert!(columns.all.start == 0 || columns.all.start + 64 <= columns.kept.start, "{columns:?}");
+                assert!(*margin == columns.all.start || *margin >= reach, "{tile:?}");
+                assert_eq!(tile.pair(&pair).size().width, margin + columns.all.len());
                 assert!(columns.all.end == 333 || columns.kept.end + right <= columns.all.end, "{columns:?}");
                 assert!(columns.all.start.is_multiple_of(ALIGN) && rows.all.start.is_multiple_of(ALIGN));
             }

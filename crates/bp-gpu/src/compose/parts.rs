@@ -59,7 +59,8 @@ impl Composer<'_> {
     /// The grey values of the left image, if the model has edges of several levels.
     fn greys(&mut self, part: &mut PartRecorder) {
         let Some(greys) = &self.buffers.greys else { return };
-        let pipeline = Pipeline { kernel: Kernel::Greys, constants: vec![("APRON", APRON as u32)] };
+        let constants = vec![("APRON", APRON as u32), ("MARGIN", self.plan.margin() as u32)];
+        let pipeline = Pipeline { kernel: Kernel::Greys, constants };
         for colour in 0..2 {
             let bound = vec![self.buffers.images[0], greys[0]];
             self.dispatch(part, pipeline.clone(), bound, self.whole_grid(0, colour));
