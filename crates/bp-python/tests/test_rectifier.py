@@ -148,6 +148,10 @@ def test_camera_infos_of_ros(tmp_path, kind):
         bpstereo.Calibration.read(files[0])
     with pytest.raises(ValueError, match="640x480"):
         bpstereo.Rectifier(*files, size=(320, 240))
+    # As `ros2 topic echo` prints them.
+    for file in files:
+        file.write_text(2 * f"{file.read_text()}---\n")
+    assert bpstereo.Calibration.read(*files).baseline == calibration.baseline
 
 
 @pytest.mark.parametrize("kind", ["radtan", "fisheye"])

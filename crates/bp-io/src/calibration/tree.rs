@@ -34,7 +34,9 @@ impl<'a> Tree<'a> {
             // OpenCV begins its files with a directive that is not YAML's.
             let body =
                 text.strip_prefix("%YAML").map_or(text, |rest| rest.split_once('\n').map_or("", |(_, body)| body));
-            serde_saphyr::from_str(body).map_err(|error| failed(&error))?
+            // `ros2 topic echo` ends every message as YAML ends a document; the first message counts.
+            let documents: Vec<Value> = serde_saphyr::from_multiple(body).map_err(|error| failed(&error))?;
+            documents.into_iter().next().unwrap_or_default()
         };
         if value.is_object() { Ok(Self { path, value }) } else { Err(failed(&"it has no names with values")) }
     }
@@ -155,5 +157,27 @@ fn flat(value: &Value) -> Option<Vec<f64>> {
         Value::Array(values) => Some(values.iter().map(flat).collect::<Option<Vec<_>>>()?.concat()),
         Value::Object(parts) => flat(parts.get("data")?),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Tree<'_>, Error> {
+        Tree::parse(Path::new("left.yaml"), text)
+    }
+
+    #[test]
+    fn the_first_of_several_messages_counts() {
+        let message = "width: 640\nk: [1, 2]\n";
+        for text in ["", "---\n", "---\nwidth: 320\n---\n"].map(|after| format!("{message}{after}")) {
+            let tree = parse(&text).unwrap();
+            assert_eq!((tree.numbers(&["width"]), tree.numbers(&["K"])), (Ok(vec![640.0]), Ok(vec![1.0, 2.0])), "{text}");
+        }
+        assert!(parse("%YAML:1.0\n---\nM1: [1]\n").is_ok());
+        for text in ["", "---\n", "[1, 2]\n", "a: 1\n---\n{"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
     }
 }
