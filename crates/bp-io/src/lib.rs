@@ -54,6 +54,6 @@ pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};
 pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};
 pub use ply::write_points;
 pub use raster::Raster;
-pub use read::{Contents, MOST_DESCRIPTION, MOST_TEXT, read_text};
+pub use read::{Contents, MOST_DESCRIPTION, MOST_TEXT, read_source, read_text};
 pub use sidecar::{Origin, put_described, sidecar_of, staged_picture_sidecar, staged_sidecar};
 pub use write::{Files, Staged, check_distinct, check_new, create_folder, is_stream, resolved};

@@ -131,8 +131,10 @@ impl Files {
     /// # Errors
     /// [`Error::Write`].
     pub fn staged_json(&self, path: &Path, value: &impl Serialize) -> Result<Staged, Error> {
-        let text = serde_json::to_string_pretty(value).map_err(|error| Error::writing(path, &error))? + "\n";
-        self.staged(path, |file| file.write_all(text.as_bytes()))
+        self.staged(path, |file| {
+            serde_json::to_writer_pretty(&mut *file, value)?;
+            file.write_all(b"\n").map_err(serde_json::Error::io)
+        })
     }
 
     /// Writes a new file. An existing file stays as it was.
