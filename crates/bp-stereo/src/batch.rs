@@ -119,7 +119,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     let jobs = job::jobs(places, &found, &taken);
     let _lock = shard.lock(&options.output.join(places::RECORDS), &making.files)?;
     making.files.check_writable(&shard.summary_path(&options.output))?;
-    job::clear_leftovers(options, &jobs, &making.files)?;
+    job::clear_leftovers(options, &jobs, &making.files, watch);
     let options = &with_alignment(options, &found.pairs, &making.files, watch)?;
     let settings_sha256 = record::settings_sha256(options, making)?;
     let mut due = Vec::new();

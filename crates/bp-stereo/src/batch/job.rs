@@ -3,7 +3,7 @@
 use std::{
     collections::{BTreeSet, HashSet},
     ffi::OsStr,
-    fs,
+    fs::{self, DirEntry},
     io::ErrorKind,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
@@ -18,7 +18,7 @@ use super::{
 use bp_io::{Files, MapFormat, create_folder, resolved};
 
 use crate::{
-    Error, Making, Outputs,
+    Error, Making, Outputs, Watch,
     pairs::{Found, Pair},
 };
 
@@ -169,29 +169,28 @@ fn folders(options: &BatchOptions, jobs: &[Job<'_>]) -> BTreeSet<PathBuf> {
     folders
 }
 
-/// Removes temporary files of a killed run of this shard, and abandoned ones of other shards.
-pub(super) fn clear_leftovers(options: &BatchOptions, jobs: &[Job<'_>], files: &Files) -> Result<(), Error> {
+/// Removes temporary files of a killed run of this shard, and abandoned ones of other shards. What cannot be removed, such as a
+/// folder of that name, is no reason to match nothing.
+pub(super) fn clear_leftovers(options: &BatchOptions, jobs: &[Job<'_>], files: &Files, watch: &Watch<'_>) {
     for folder in folders(options, jobs) {
         // A folder that is missing, or leads elsewhere, has no files of ours.
         let Some(entries) = files.check_own(&folder).ok().and_then(|()| fs::read_dir(&folder).ok()) else { continue };
-        for entry in entries.flatten() {
-            let name = entry.file_name();
-            let is_old = || {
-                let modified = entry.metadata().and_then(|metadata| metadata.modified()).ok();
-                let age = modified.and_then(|modified| SystemTime::now().duration_since(modified).ok());
-                age.is_some_and(|age| age > ABANDONED)
-            };
-            let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
-            if is(files.prefix()) || (is(Files::PREFIX) && is_old()) {
-                // Another shard that started at the same time may have removed it first.
-                match fs::remove_file(entry.path()) {
-                    Err(error) if error.kind() != ErrorKind::NotFound => {
-                        return Err(bp_io::Error::writing(&entry.path(), &error).into());
-                    }
-                    _ => {}
-                }
+        for entry in entries.flatten().filter(|entry| is_leftover(entry, files)) {
+            // Another shard that started at the same time may have removed it first.
+            if let Err(error) = remove(&entry.path()) {
+                watch.warn(&format!("a temporary file of an earlier run stays: {error}"));
             }
         }
     }
-    Ok(())
+}
+
+fn is_leftover(entry: &DirEntry, files: &Files) -> bool {
+    let name = entry.file_name();
+    let is_old = || {
+        let modified = entry.metadata().and_then(|metadata| metadata.modified()).ok();
+        let age = modified.and_then(|modified| SystemTime::now().duration_since(modified).ok());
+        age.is_some_and(|age| age > ABANDONED)
+    };
+    let is = |prefix: &str| name.as_encoded_bytes().starts_with(prefix.as_bytes());
+    is(files.prefix()) || (is(Files::PREFIX) && is_old())
 }
