@@ -10,7 +10,10 @@ use std::{
 use serde::Serialize;
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::Error;
+use crate::{
+    Error,
+    folders::{folder_of, sync_folder_of},
+};
 
 /// Writes temporary files in the folder of the final file and renames them.
 #[derive(Clone, Debug)]
@@ -257,24 +260,6 @@ impl Hidden {
     }
 }
 
-/// Makes the names in the folder of `path` survive a loss of power, as far as the system can.
-pub(crate) fn sync_folder_of(path: &Path) -> Result<(), Error> {
-    // Not every system opens folders, and not every file system syncs them.
-    let Ok(folder) = fs::File::open(folder_of(path)) else { return Ok(()) };
-    match folder.sync_all() {
-        Err(error) if matches!(error.raw_os_error(), Some(IO_ERROR)) => Err(Error::writing(path, &error)),
-        _ => Ok(()),
-    }
-}
-
-/// The number that Unix gives a broken disk (EIO).
-const IO_ERROR: i32 = 5;
-
-/// The folder that holds `path`.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// What a new file takes over from the one that it replaces.
 #[cfg(unix)]
 mod replaced {
@@ -350,17 +335,6 @@ pub fn check_new(path: &Path) -> Result<(), Error> {
         Ok(_) => Err(Error::writing(path, &"it exists, and a record is never overwritten; choose another folder")),
         Err(_) => Ok(()),
     }
-}
-
-/// Creates a folder and its missing parents.
-///
-/// # Errors
-/// [`Error::Write`].
-pub fn create_folder(path: &Path) -> Result<(), Error> {
-    if path.exists() && !path.is_dir() {
-        return Err(Error::writing(path, &"a file is there, and a folder is needed"));
-    }
-    fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))
 }
 
 #[cfg(test)]
