@@ -34,6 +34,8 @@ mod maps;
 mod npy;
 mod pfm;
 mod picture;
+#[cfg(unix)]
+mod pipe;
 mod ply;
 mod png;
 mod raster;

@@ -1,15 +1,19 @@
 //! Writes files whole or not at all.
 
+#[cfg(unix)]
+use std::os::unix::fs::FileTypeExt as _;
 use std::{
     fmt::Display,
     fs,
-    io::{BufWriter, ErrorKind, Write},
+    io::{self, BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
 use serde::Serialize;
 use tempfile::{NamedTempFile, TempPath};
 
+#[cfg(unix)]
+use crate::pipe::Pipe;
 use crate::{
     Error,
     folders::{folder_of, sync_folder_of},
@@ -22,12 +26,14 @@ pub struct Files {
     temporary: String,
     /// The folder below which no links are followed, if any.
     owned: Option<PathBuf>,
+    /// Whether to stop waiting for the reader of a pipe.
+    is_stopped: Option<fn() -> bool>,
 }
 
 /// Temporary files are named `.bp-` and random characters.
 impl Default for Files {
     fn default() -> Self {
-        Self { temporary: Self::PREFIX.to_owned(), owned: None }
+        Self { temporary: Self::PREFIX.to_owned(), owned: None, is_stopped: None }
     }
 }
 
@@ -38,7 +44,7 @@ impl Files {
     /// Files whose temporary names begin with [`Files::PREFIX`], `owner` and a hyphen.
     #[must_use]
     pub fn of(owner: &str) -> Self {
-        Self { temporary: format!("{}{owner}-", Self::PREFIX), owned: None }
+        Self { temporary: format!("{}{owner}-", Self::PREFIX), ..Self::default() }
     }
 
     /// The same, but below `folder` only regular files are written, and only folders are entered. A link there, which another
@@ -46,6 +52,12 @@ impl Files {
     #[must_use]
     pub fn owning(self, folder: &Path) -> Self {
         Self { owned: Some(folder.to_owned()), ..self }
+    }
+
+    /// The same, but a write to a named pipe, which waits for its reader, fails as soon as `is_stopped` says so.
+    #[must_use]
+    pub fn stopping(self, is_stopped: fn() -> bool) -> Self {
+        Self { is_stopped: Some(is_stopped), ..self }
     }
 
     /// Fails if a path below [`Files::owning`] is anything but a regular file or nothing, in folders.
@@ -100,11 +112,32 @@ impl Files {
     ) -> Result<Staged, Error> {
         self.check_own(path)?;
         if is_stream(path) {
-            stream(path, write)?;
+            self.stream(path, write)?;
             return Ok(Staged { file: None, path: path.to_owned() });
         }
         let path = self.target(path);
         Ok(Staged { file: Some(self.filled_beside(&path, write)?), path })
+    }
+
+    fn stream<E: Display>(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), Error> {
+        let failed = |error: &dyn Display| Error::writing(path, error);
+        let mut file = BufWriter::new(self.opened_stream(path).map_err(|e| failed(&e))?);
+        write(&mut file).map_err(|e| failed(&e))?;
+        file.flush().map_err(|e| failed(&e))
+    }
+
+    fn opened_stream(&self, path: &Path) -> io::Result<Box<dyn Write>> {
+        #[cfg(unix)]
+        if let Some(is_stopped) = self.is_stopped
+            && path.metadata()?.file_type().is_fifo()
+        {
+            return Ok(Box::new(Pipe::open(path, is_stopped)?));
+        }
+        Ok(Box::new(fs::OpenOptions::new().write(true).open(path)?))
     }
 
     /// Where a file is replaced: a symbolic link stays, but below [`Files::owning`] none is followed that came since the check.
@@ -299,13 +332,6 @@ mod replaced {
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
-}
-
-fn stream<E: Display>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), Error> {
-    let failed = |error: &dyn Display| Error::writing(path, error);
-    let mut file = BufWriter::new(fs::OpenOptions::new().write(true).open(path).map_err(|e| failed(&e))?);
-    write(&mut file).map_err(|e| failed(&e))?;
-    file.flush().map_err(|e| failed(&e))
 }
 
 /// Fails if writing `output` would overwrite `other`. `what` is the reason for the message.

@@ -7,7 +7,7 @@ use std::{
 };
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
-use bp_io::{Geometry, Picture};
+use bp_io::{Files, Geometry, Picture};
 use bp_stereo::{
     Algorithm, Hierarchy, Loops, Making, Options, Outputs, Quality, Rectifying,
     batch::{Also, BatchOptions},
@@ -15,7 +15,7 @@ use bp_stereo::{
 };
 
 use super::{ManyArgs, MatchArgs, OutputArgs, PlanArgs};
-use crate::{colour_bar, failure::Failure};
+use crate::{colour_bar, failure::Failure, interrupt};
 
 /// The algorithms that count loops as the thesis does, for messages.
 const THESIS: &str = "--algorithm bp, cfbp, cfcsbp, ctbp or ctcsbp";
@@ -164,7 +164,7 @@ impl OutputArgs {
             nan: args.unknown == Some(true),
             geometry: read.or(given),
             rectifying: rectifying.map(Arc::new),
-            ..Making::default()
+            files: Files::default().stopping(interrupt::is_stopped),
         })
     }
 
