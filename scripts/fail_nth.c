@@ -2,6 +2,7 @@
  *
  * BP_FAIL_FOLDER is the folder whose files count; paths that are not absolute count too.
  * BP_FAIL="KIND N ERRNO" makes the N-th call of that kind fail with that error number.
+ * BP_FAIL_TRACE, if set, prints the addresses of the callers of the call that fails; addr2line knows their names.
  * BP_FAIL_COUNTS is a file that receives how many calls there were of each kind, a line each.
  *
  * The program renames files without the C library, so strace lets those calls fail. */
@@ -9,6 +10,7 @@
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdatomic.h>
@@ -29,6 +31,7 @@ static const char *folder = "";
 static enum kind failing = KINDS;
 static long failing_at;
 static int failing_error;
+static int is_traced;
 static atomic_long calls[KINDS];
 static atomic_char ours[1 << 16]; /* by file descriptor */
 
@@ -40,6 +43,9 @@ __attribute__((constructor)) static void begin(void) {
         for (int kind = 0; kind < KINDS; kind++)
             if (!strcmp(name, NAMES[kind])) failing = kind;
     ours[STDOUT_FILENO] = 1;
+    /* The first call of `backtrace` allocates. */
+    void *callers[1];
+    is_traced = getenv("BP_FAIL_TRACE") && backtrace(callers, 1);
 }
 
 __attribute__((destructor)) static void end(void) {
@@ -54,6 +60,10 @@ __attribute__((destructor)) static void end(void) {
 static int fails(enum kind kind) {
     long call = atomic_fetch_add(&calls[kind], 1) + 1;
     if (kind != failing || call != failing_at) return 0;
+    if (is_traced) {
+        void *callers[64];
+        backtrace_symbols_fd(callers, backtrace(callers, 64), STDERR_FILENO);
+    }
     errno = failing_error;
     return 1;
 }

@@ -13,6 +13,9 @@ pub(crate) struct Failure {
     message: String,
 }
 
+/// The exit code for a lack of memory.
+pub(crate) const OUT_OF_MEMORY: u8 = 6;
+
 /// The exit codes and their meanings. The help, the man page and docs/matching.md use this list.
 pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
     (0, "done"),
@@ -21,7 +24,7 @@ pub(crate) const EXIT_CODES: [(u8, &str); 8] = [
     (3, "input"),
     (4, "the gate failed"),
     (5, "backend or device unavailable or unable to run the plan"),
-    (6, "out of memory"),
+    (OUT_OF_MEMORY, "out of memory"),
     (130, "interrupted"),
 ];
 
@@ -100,7 +103,7 @@ impl From<bp_stereo::Error> for Failure {
             Cause::Options => 2,
             Cause::Input => 3,
             Cause::Unavailable | Cause::Unsupported | Cause::DeviceLost => 5,
-            Cause::Memory => 6,
+            Cause::Memory => OUT_OF_MEMORY,
             Cause::Stopped => 130,
         };
         Self::new(code, error.to_string())
@@ -115,7 +118,7 @@ impl From<harness::Failure> for Failure {
             Kind::Input => 3,
             Kind::Gate => 4,
             Kind::Unavailable | Kind::Unsupported | Kind::DeviceLost => 5,
-            Kind::OutOfMemory => 6,
+            Kind::OutOfMemory => OUT_OF_MEMORY,
             Kind::Interrupted => 130,
         };
         Self::new(code, failure.to_string())

@@ -9,6 +9,11 @@ use crate::failure::Failure;
 /// Set by Ctrl-C and SIGTERM.
 pub(crate) static STOP: LazyLock<Stop> = LazyLock::new(Stop::default);
 
+/// Whether the user asked to stop.
+pub(crate) fn is_stopped() -> bool {
+    STOP.is_stopped()
+}
+
 /// Makes a write beyond the largest size that the system allows a file (`ulimit -f`) fail like one on a full disk. By default
 /// it would end the program, which would leave a temporary file.
 #[cfg(unix)]

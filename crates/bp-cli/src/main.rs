@@ -11,6 +11,7 @@ mod failure;
 mod heap;
 mod interrupt;
 mod notes;
+mod shortage;
 mod terminal;
 
 use std::process::ExitCode;
@@ -24,6 +25,7 @@ use notes::tell;
 fn main() -> ExitCode {
     notes::quieten_driver();
     interrupt::survive_size_limit();
+    shortage::set_up();
     let cli = Cli::parse();
     notes::set_up(cli.quiet);
     match args::check_environment().and_then(|()| run(&cli.command)) {

@@ -57,6 +57,22 @@ fn save_pair(folder: &Path, ending: &str, convert: impl Fn(RgbImage) -> DynamicI
     }
 }
 
+/// A limit that was too low names a larger one. Ends when the program keeps to the limit that it asked for, and returns that.
+fn least_limit_kept(folder: &TempDir, arguments: &str, code: i32) -> u64 {
+    let mut limit = "1".to_owned();
+    for _ in 0..6 {
+        let end = run(folder, &format!("{arguments} --max-memory {limit}"));
+        let allowed = limit.strip_suffix("MiB").map_or(0, |number| (number.parse::<f64>().unwrap() * 1048576.0) as u64);
+        assert!(allowed == 0 || end.peak <= allowed, "{arguments}: {limit} allowed, {} bytes held", end.peak);
+        let Some(words) = end.told.split("at least ").nth(1) else {
+            assert_eq!(end.code, code, "{end:?}");
+            return allowed;
+        };
+        limit = words.split(',').next().unwrap().replace(' ', "");
+    }
+    panic!("{arguments}: refused with {limit} too");
+}
+
 /// The refusal of a tiny limit names a larger one, first for reading, then for the rest. The program keeps to the limit that it
 /// asks for, with all kinds of inputs and outputs.
 #[test]
@@ -75,23 +91,42 @@ fn the_least_memory_limit_is_kept() {
         ("png", ""),
         ("tif", ""),
     ] {
-        let arguments = format!(
-            "match left.{ending} right.{ending} -o m.pfm --labels 16 --threads 2 --quiet {options} --max-memory"
-        );
-        let mut limit = "1".to_owned();
-        let kept = (0..6).find_map(|_| {
-            let end = run(&folder, &format!("{arguments} {limit}"));
-            let allowed =
-                limit.strip_suffix("MiB").map_or(0, |number| (number.parse::<f64>().unwrap() * 1048576.0) as u64);
-            if end.code == 0 {
-                assert!(end.peak <= allowed, "{ending} {options}: {limit} allowed, {} bytes held", end.peak);
-                return Some(());
-            }
-            let words = end.told.split("at least ").nth(1).unwrap_or_else(|| panic!("{end:?}"));
-            limit = words.split(',').next().unwrap().replace(' ', "");
-            None
-        });
-        assert!(kept.is_some(), "{ending} {options}: refused with {limit} too");
+        let arguments =
+            format!("match left.{ending} right.{ending} -o m.pfm --labels 16 --threads 2 --quiet {options}");
+        least_limit_kept(&folder, &arguments, 0);
+    }
+}
+
+/// First the pairs of another shard are listed, then all of this one fail, so that their names are held as failures too.
+#[test]
+fn the_least_memory_limit_is_kept_for_lists_of_long_and_of_short_names() {
+    let folder = tempfile::tempdir().unwrap();
+    GrayImage::new(16, 16).save(folder.path().join("l.pgm")).unwrap();
+    let long = ["n", "m", "o", "p", "q"].map(|letter| letter.repeat(200)).join("/");
+    for (name, pairs, most) in [(long.as_str(), 10_000, 110), ("n", 40_000, 120)] {
+        let list: String = (0..pairs).map(|pair| format!("l.pgm l.pgm {name}{pair}\n")).collect();
+        fs::write(folder.path().join("list"), list).unwrap();
+        let arguments = "match --pairs list --output o --labels 12 --threads 1 --quiet --also picture,confidence";
+        let held = least_limit_kept(&folder, &format!("{arguments} --shard 1/1000000000"), 0);
+        assert!(held < most << 20, "{name}: {held}");
+    }
+    let list: String = (0..5_000).map(|pair| format!("none{long}{pair}.pgm none{long}.pgm {long}{pair}\n")).collect();
+    fs::write(folder.path().join("list"), list).unwrap();
+    least_limit_kept(&folder, "match --pairs list --output o --labels 12 --threads 1 --quiet", 3);
+}
+
+/// Lists of tabs, quotes, empty lines or bytes that are no text, which are many times as long once they are split or shown.
+#[test]
+fn lists_that_are_larger_than_they_seem_stay_within_the_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let (tabs, quoted) = ("a\t".repeat(4 << 20), format!("\"a\"{}", ",".repeat(2 << 20)));
+    let (lines, text) = ("\n".repeat(8 << 20), [&b"a "[..], &[0xff; 2 << 20]].concat());
+    for (list, code) in [(tabs.as_bytes(), 6), (quoted.as_bytes(), 6), (lines.as_bytes(), 3), (&text, 6)] {
+        fs::write(folder.path().join("list"), list).unwrap();
+        let end = run(&folder, "match --pairs list --output o --labels 12 --threads 1 --max-memory 60MB");
+        assert!(end.code == code && end.peak <= 60_000_000, "{end:?}");
+        let end = run(&folder, "match --pairs list --output o --labels 12 --threads 1 --max-memory 10GB");
+        assert!(end.code == 3 && end.peak <= 10_000_000_000, "{end:?}");
     }
 }
 

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{
     Contents, Error, Files, Limits,
+    caught::caught,
     decode::{check_unscaled, decode, decoded},
     pfm,
 };
@@ -42,7 +43,13 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
         return pfm::parse(path, bytes, limit)?.into_image(path);
     }
     let decoded = decoded(path, || decode(path, bytes, limit))?;
-    in_8_bits(decoded).map_err(|error| Error::reading(path, &error))
+    converted(path, decoded, in_8_bits)?.map_err(|error| Error::reading(path, &error))
+}
+
+/// Converts pixels. The crate `image` 0.25.10 panics if there is no memory for them.
+fn converted<T>(path: &Path, image: DynamicImage, convert: impl FnOnce(DynamicImage) -> T) -> Result<T, Error> {
+    let needed = 3 * u64::from(image.width()) * u64::from(image.height());
+    caught(|| convert(image)).map_err(|_| Error::OutOfMemory { path: path.to_owned(), needed, available: None })
 }
 
 fn in_8_bits(image: DynamicImage) -> Result<Image, bp_core::Error> {
@@ -111,11 +118,13 @@ pub(crate) fn stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<St
     let size = size(path, &decoded)?;
     let sixteen = has_16_bits(&decoded);
     let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
-    let values: Option<Vec<u16>> = if sixteen {
-        decoded.into_rgb16().pixels().map(|pixel| grey(pixel.0)).collect()
-    } else {
-        decoded.into_rgb8().pixels().map(|pixel| grey(pixel.0.map(u16::from))).collect()
-    };
+    let values: Option<Vec<u16>> = converted(path, decoded, |decoded| {
+        if sixteen {
+            decoded.into_rgb16().pixels().map(|pixel| grey(pixel.0)).collect()
+        } else {
+            decoded.into_rgb8().pixels().map(|pixel| grey(pixel.0.map(u16::from))).collect()
+        }
+    })?;
     let coloured = || Error::reading(path, &"a map holds grey values, this image has colours");
     Ok(StoredGrey { size, values: values.ok_or_else(coloured)?, has_16_bits: sixteen })
 }

@@ -29,12 +29,16 @@ impl Contents {
     /// # Errors
     /// [`Error::Read`], also if there are more bytes; [`Error::OutOfMemory`].
     pub fn of(path: &Path, most: u64) -> Result<Self, Error> {
+        Self::within(path, most, None)
+    }
+
+    /// [`Contents::of`] in at most `memory` bytes, if memory is limited.
+    ///
+    /// # Errors
+    /// Those of [`Contents::of`].
+    pub fn within(path: &Path, most: u64, memory: Option<u64>) -> Result<Self, Error> {
         let (file, metadata) = open(path)?;
-        let too_long = || Error::reading(path, &format!("it has more than {} MiB, and is not read", most >> 20));
-        if metadata.len() > most {
-            return Err(too_long());
-        }
-        let bytes = filled(file, path, &metadata, most)?.ok_or_else(too_long)?;
+        let bytes = text_within(file, path, metadata.len(), most, memory)?;
         Ok(Self { bytes, metadata })
     }
 
@@ -62,7 +66,7 @@ impl Contents {
             bytes if bytes > room => return Err(no_room(bytes)),
             _ => {}
         }
-        let bytes = filled(file, path, &metadata, most.min(room))?;
+        let bytes = filled(file, path, metadata.len(), most.min(room))?;
         let bytes = bytes.ok_or_else(|| if room < most { no_room(most) } else { too_long() })?;
         Ok(Self { bytes, metadata })
     }
@@ -75,11 +79,33 @@ fn open(path: &Path) -> Result<(File, Metadata), Error> {
     if metadata.is_dir() { Err(Error::reading(path, &"is a folder, not a file")) } else { Ok((file, metadata)) }
 }
 
+/// Reads all of a source that has no path, such as standard input, as [`Contents::within`] does. Messages call it `name`.
+///
+/// # Errors
+/// Those of [`Contents::of`].
+pub fn read_source(source: impl Read, name: &str, most: u64, memory: Option<u64>) -> Result<Vec<u8>, Error> {
+    text_within(source, Path::new(name), 0, most, memory)
+}
+
+/// The bytes of a text whose length is expected to be `len`.
+fn text_within(source: impl Read, path: &Path, len: u64, most: u64, memory: Option<u64>) -> Result<Vec<u8>, Error> {
+    let too_long = || Error::reading(path, &format!("it has more than {} MiB, and is not read", most >> 20));
+    let no_room = |needed| Error::OutOfMemory { path: path.to_owned(), needed, available: memory };
+    let room = memory.unwrap_or(u64::MAX);
+    match len {
+        len if len > most => return Err(too_long()),
+        len if len > room => return Err(no_room(len)),
+        _ => {}
+    }
+    let bytes = filled(source, path, len, most.min(room))?;
+    bytes.ok_or_else(|| if room < most { no_room(most) } else { too_long() })
+}
+
 /// The bytes of a file; `None` if there are more than `most`, as in a device without end.
-fn filled(file: File, path: &Path, about: &Metadata, most: u64) -> Result<Option<Vec<u8>>, Error> {
-    let no_room = || Error::OutOfMemory { path: path.to_owned(), needed: about.len().max(1), available: None };
+fn filled(file: impl Read, path: &Path, len: u64, most: u64) -> Result<Option<Vec<u8>>, Error> {
+    let no_room = || Error::OutOfMemory { path: path.to_owned(), needed: len.max(1), available: None };
     let mut bytes = Vec::new();
-    bytes.try_reserve_exact(usize::try_from(about.len()).unwrap_or(usize::MAX)).map_err(|_| no_room())?;
+    bytes.try_reserve_exact(usize::try_from(len).unwrap_or(usize::MAX)).map_err(|_| no_room())?;
     file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| match error.kind() {
         ErrorKind::OutOfMemory => no_room(),
         _ => Error::reading(path, &error),
@@ -113,6 +139,10 @@ mod tests {
         assert!(Contents::of(folder.path(), 100).unwrap_err().to_string().contains("is a folder"));
         let limits = Limits { memory: Some(99), ..Limits::megapixels(1) };
         assert!(matches!(Contents::of_pixels(&path, limits), Err(Error::OutOfMemory { needed: 100, .. })));
+        assert!(matches!(Contents::within(&path, 100, Some(99)), Err(Error::OutOfMemory { needed: 100, .. })));
+        assert_eq!(read_source(&[7; 100][..], "pipe", 100, Some(100)).unwrap(), [7; 100]);
+        assert!(matches!(read_source(&[7; 100][..], "pipe", 200, Some(99)), Err(Error::OutOfMemory { .. })));
+        assert!(read_source(&[7; 100][..], "pipe", 99, None).unwrap_err().to_string().starts_with("pipe: it has more"));
     }
 
     /// A sparse file tells a length that nobody could read.

@@ -10,9 +10,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
-    Colours, Contents, Error, Files, MapFormat, Raster, Staged,
-    read::MOST_DESCRIPTION,
-    write::{Hidden, sync_folder_of},
+    Colours, Contents, Error, Files, MapFormat, Raster, Staged, folders::sync_folder_of, read::MOST_DESCRIPTION,
+    write::Hidden,
 };
 
 /// Version of the sidecar's format. Every change of meaning raises it.

@@ -1,16 +1,23 @@
 //! Writes files whole or not at all.
 
+#[cfg(unix)]
+use std::os::unix::fs::FileTypeExt as _;
 use std::{
     fmt::Display,
     fs,
-    io::{BufWriter, ErrorKind, Write},
+    io::{self, BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
 use serde::Serialize;
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::Error;
+#[cfg(unix)]
+use crate::pipe::Pipe;
+use crate::{
+    Error,
+    folders::{folder_of, sync_folder_of},
+};
 
 /// Writes temporary files in the folder of the final file and renames them.
 #[derive(Clone, Debug)]
@@ -19,12 +26,14 @@ pub struct Files {
     temporary: String,
     /// The folder below which no links are followed, if any.
     owned: Option<PathBuf>,
+    /// Whether to stop waiting for the reader of a pipe.
+    is_stopped: Option<fn() -> bool>,
 }
 
 /// Temporary files are named `.bp-` and random characters.
 impl Default for Files {
     fn default() -> Self {
-        Self { temporary: Self::PREFIX.to_owned(), owned: None }
+        Self { temporary: Self::PREFIX.to_owned(), owned: None, is_stopped: None }
     }
 }
 
@@ -35,7 +44,7 @@ impl Files {
     /// Files whose temporary names begin with [`Files::PREFIX`], `owner` and a hyphen.
     #[must_use]
     pub fn of(owner: &str) -> Self {
-        Self { temporary: format!("{}{owner}-", Self::PREFIX), owned: None }
+        Self { temporary: format!("{}{owner}-", Self::PREFIX), ..Self::default() }
     }
 
     /// The same, but below `folder` only regular files are written, and only folders are entered. A link there, which another
@@ -43,6 +52,12 @@ impl Files {
     #[must_use]
     pub fn owning(self, folder: &Path) -> Self {
         Self { owned: Some(folder.to_owned()), ..self }
+    }
+
+    /// The same, but a write to a named pipe, which waits for its reader, fails as soon as `is_stopped` says so.
+    #[must_use]
+    pub fn stopping(self, is_stopped: fn() -> bool) -> Self {
+        Self { is_stopped: Some(is_stopped), ..self }
     }
 
     /// Fails if a path below [`Files::owning`] is anything but a regular file or nothing, in folders.
@@ -97,11 +112,32 @@ impl Files {
     ) -> Result<Staged, Error> {
         self.check_own(path)?;
         if is_stream(path) {
-            stream(path, write)?;
+            self.stream(path, write)?;
             return Ok(Staged { file: None, path: path.to_owned() });
         }
         let path = self.target(path);
         Ok(Staged { file: Some(self.filled_beside(&path, write)?), path })
+    }
+
+    fn stream<E: Display>(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), Error> {
+        let failed = |error: &dyn Display| Error::writing(path, error);
+        let mut file = BufWriter::new(self.opened_stream(path).map_err(|e| failed(&e))?);
+        write(&mut file).map_err(|e| failed(&e))?;
+        file.flush().map_err(|e| failed(&e))
+    }
+
+    fn opened_stream(&self, path: &Path) -> io::Result<Box<dyn Write>> {
+        #[cfg(unix)]
+        if let Some(is_stopped) = self.is_stopped
+            && path.metadata()?.file_type().is_fifo()
+        {
+            return Ok(Box::new(Pipe::open(path, is_stopped)?));
+        }
+        Ok(Box::new(fs::OpenOptions::new().write(true).open(path)?))
     }
 
     /// Where a file is replaced: a symbolic link stays, but below [`Files::owning`] none is followed that came since the check.
@@ -131,8 +167,10 @@ impl Files {
     /// # Errors
     /// [`Error::Write`].
     pub fn staged_json(&self, path: &Path, value: &impl Serialize) -> Result<Staged, Error> {
-        let text = serde_json::to_string_pretty(value).map_err(|error| Error::writing(path, &error))? + "\n";
-        self.staged(path, |file| file.write_all(text.as_bytes()))
+        self.staged(path, |file| {
+            serde_json::to_writer_pretty(&mut *file, value)?;
+            file.write_all(b"\n").map_err(serde_json::Error::io)
+        })
     }
 
     /// Writes a new file. An existing file stays as it was.
@@ -255,24 +293,6 @@ impl Hidden {
     }
 }
 
-/// Makes the names in the folder of `path` survive a loss of power, as far as the system can.
-pub(crate) fn sync_folder_of(path: &Path) -> Result<(), Error> {
-    // Not every system opens folders, and not every file system syncs them.
-    let Ok(folder) = fs::File::open(folder_of(path)) else { return Ok(()) };
-    match folder.sync_all() {
-        Err(error) if matches!(error.raw_os_error(), Some(IO_ERROR)) => Err(Error::writing(path, &error)),
-        _ => Ok(()),
-    }
-}
-
-/// The number that Unix gives a broken disk (EIO).
-const IO_ERROR: i32 = 5;
-
-/// The folder that holds `path`.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// What a new file takes over from the one that it replaces.
 #[cfg(unix)]
 mod replaced {
@@ -314,13 +334,6 @@ pub fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
 }
 
-fn stream<E: Display>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), Error> {
-    let failed = |error: &dyn Display| Error::writing(path, error);
-    let mut file = BufWriter::new(fs::OpenOptions::new().write(true).open(path).map_err(|e| failed(&e))?);
-    write(&mut file).map_err(|e| failed(&e))?;
-    file.flush().map_err(|e| failed(&e))
-}
-
 /// Fails if writing `output` would overwrite `other`. `what` is the reason for the message.
 ///
 /// # Errors
@@ -348,17 +361,6 @@ pub fn check_new(path: &Path) -> Result<(), Error> {
         Ok(_) => Err(Error::writing(path, &"it exists, and a record is never overwritten; choose another folder")),
         Err(_) => Ok(()),
     }
-}
-
-/// Creates a folder and its missing parents.
-///
-/// # Errors
-/// [`Error::Write`].
-pub fn create_folder(path: &Path) -> Result<(), Error> {
-    if path.exists() && !path.is_dir() {
-        return Err(Error::writing(path, &"a file is there, and a folder is needed"));
-    }
-    fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))
 }
 
 #[cfg(test)]

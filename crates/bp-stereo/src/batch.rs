@@ -5,27 +5,32 @@
 //! whole. The record of a pair is written after its outputs and holds checksums of its images and outputs. Processes
 //! that share a batch need no other files.
 
+mod apart;
 mod job;
+mod places;
 mod record;
 mod run;
 mod shard;
 mod summary;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use apart::check_apart;
 use job::Job;
+use places::Places;
 pub use record::PairTimes;
 use run::{Run, Warned};
 use serde::{Deserialize, Serialize};
 pub use shard::Shard;
 pub use summary::{Failed, Summary};
 
-use bp_io::Files;
+use bp_io::{Files, MapFormat, create_folder};
 
 use crate::{
     Align, Cause, Error, Event, Labels, Making, Options, Watch, align_camera,
-    pairs::{Pair, Source},
+    pairs::{Pair, Source, listed_bytes},
     read_pair,
+    reading::Room,
 };
 
 /// The pairs of a batch, how they are matched, and what is written.
@@ -99,16 +104,22 @@ impl Also {
 /// [`Summary::failures`].
 pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
     check(options)?;
-    let found = options.source.find(&options.output, watch)?;
+    let max_memory = options.matching.max_memory;
+    let found = options.source.find(&options.output, max_memory, watch)?;
+    let listed = listed_bytes(&found.pairs, &options.output);
+    Room::new(options.max_megapixels, max_memory).check_list(&options.source.to_string(), listed)?;
     found.notes.iter().for_each(|note| watch.note(note));
     found.unread.iter().for_each(|text| watch.tell(Event::Failed(text)));
     let shard = options.shard;
     let files = Files::of(&shard.file_part()).owning(&options.output);
     let making = &Making { files, ..making.clone() };
-    let jobs = job::jobs(options, making, &found.pairs, watch)?;
-    let _lock = shard.lock(&options.output.join(job::RECORDS), &making.files)?;
+    let places = Places { options, making };
+    let taken = check_apart(places, &found.pairs, watch)?;
+    create_folder(&options.output)?;
+    let jobs = job::jobs(places, &found, &taken);
+    let _lock = shard.lock(&options.output.join(places::RECORDS), &making.files)?;
     making.files.check_writable(&shard.summary_path(&options.output))?;
-    job::clear_leftovers(options, &jobs, &making.files)?;
+    job::clear_leftovers(options, &jobs, &making.files, watch);
     let options = &with_alignment(options, &found.pairs, &making.files, watch)?;
     let settings_sha256 = record::settings_sha256(options, making)?;
     let mut due = Vec::new();
@@ -120,14 +131,7 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
     }
     let skipped = jobs.len() - due.len();
     let (due, mut failures) = writable(due, making, watch)?;
-    let run = Run {
-        options,
-        making,
-        listed: found.pairs.len(),
-        settings_sha256: &settings_sha256,
-        watch,
-        warned: Warned::default(),
-    };
+    let run = Run { options, making, listed, settings_sha256: &settings_sha256, watch, warned: Warned::default() };
     failures.extend(match_due(&run, &due)?);
     let summary = Summary::of(&options.output, shard, &jobs, skipped, failures)?;
     let summary = Summary { unread: found.unread, ..summary };
@@ -137,13 +141,17 @@ pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result
 
 /// The jobs whose files can be written, and those that fail because a name or what is there does not allow it. What is wrong
 /// with the options fails for all.
-fn writable<'a>(due: Vec<&'a Job>, making: &Making, watch: &Watch<'_>) -> Result<(Vec<&'a Job>, Vec<Failed>), Error> {
+fn writable<'a>(
+    due: Vec<&'a Job<'a>>,
+    making: &Making,
+    watch: &Watch<'_>,
+) -> Result<(Vec<&'a Job<'a>>, Vec<Failed>), Error> {
     let (mut writable, mut failures) = (Vec::new(), Vec::new());
     for job in due {
         watch.check()?;
         match job.check(making) {
             Ok(()) => writable.push(job),
-            Err(error) if error.cause() != Cause::Options => failures.push(Failed::told(&job.pair, &error, watch)),
+            Err(error) if error.cause() != Cause::Options => failures.push(Failed::told(job.pair, &error, watch)),
             Err(error) => return Err(error),
         }
     }
@@ -178,7 +186,7 @@ fn with_alignment(
 }
 
 /// Matches the jobs that are due, and returns those that failed.
-fn match_due(run: &Run<'_>, due: &[&Job]) -> Result<Vec<Failed>, Error> {
+fn match_due(run: &Run<'_>, due: &[&Job<'_>]) -> Result<Vec<Failed>, Error> {
     if due.is_empty() {
         return Ok(Vec::new());
     }
@@ -190,9 +198,10 @@ fn match_due(run: &Run<'_>, due: &[&Job]) -> Result<Vec<Failed>, Error> {
     })
 }
 
-/// Fails if options contradict each other, or if the name of a folder is not UTF-8, which records need.
+/// Fails if options contradict each other, if the format of maps is unknown, or if the name of a folder is not UTF-8, which records need.
 fn check(options: &BatchOptions) -> Result<(), Error> {
     options.matching.check()?;
+    MapFormat::of(&Path::new("NAME").with_added_extension(&options.format))?;
     let folder = if let Source::Path(path) = &options.source { Some(path) } else { None };
     for folder in [Some(&options.output), folder].into_iter().flatten() {
         if std::path::absolute(folder).is_ok_and(|folder| folder.to_str().is_none()) {

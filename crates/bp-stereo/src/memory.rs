@@ -10,9 +10,6 @@ pub(crate) const PROGRAM: u64 = 25 << 20;
 /// About the bytes that allocators keep of freed memory where the caller does not limit memory.
 const KEPT: u64 = 32 << 20;
 
-/// Bytes for each pair of a batch: its paths and those of its outputs, in tables too, and in the end its record.
-pub(crate) const LISTED: u64 = 3 << 10;
-
 /// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
 
@@ -57,8 +54,8 @@ pub struct Beside {
     pub rectified: bool,
     /// Whether the next pair is read and the previous one written at the same time.
     pub batch: bool,
-    /// How many pairs a batch lists.
-    pub pairs: usize,
+    /// The bytes that a batch holds of all its pairs.
+    pub listed: u64,
     /// The option that needs all messages at once, if any. The image then cannot be tiled.
     pub whole: Option<&'static str>,
 }
@@ -161,7 +158,7 @@ impl Bytes {
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + 2 * Image::COLOUR_BYTES + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + LISTED * beside.pairs as u64 + images.bytes + a_pixel(aligned + positions + truth),
+            held: PROGRAM + beside.listed + images.bytes + a_pixel(aligned + positions + truth),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }

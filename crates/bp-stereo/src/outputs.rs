@@ -136,8 +136,13 @@ impl Outputs {
     /// Writes all files. `watch` receives warnings about their contents.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// [`Error::File`]; [`Error::Stopped`] if a pipe had no reader until then, see [`Files::stopping`].
     pub fn write(&self, making: &Making, content: &Content<'_>, watch: &Watch<'_>) -> Result<(), Error> {
+        let stopped = |error| if watch.is_stopped() { Error::Stopped } else { error };
+        self.write_all(making, content, watch).map_err(stopped)
+    }
+
+    fn write_all(&self, making: &Making, content: &Content<'_>, watch: &Watch<'_>) -> Result<(), Error> {
         let plan = content.plan.map(|plan| description::Settings { planned_bytes: None, ..plan.clone() });
         let writer = Writer { making, content, plan, watch };
         self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &Raster::disparities(content.map), None))?;

@@ -5,13 +5,15 @@ mod natural;
 mod search;
 mod video;
 
-use std::path::{Component, Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    path::{Component, Path, PathBuf},
+};
 
 pub use list::parse;
 
-use bp_io::{Contents, MOST_TEXT};
-
-use crate::{Error, Watch};
+use crate::{Error, Watch, reading::Room};
 
 /// A pair and its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,11 +33,24 @@ impl Pair {
     }
 }
 
+/// Bytes for each pair of a batch beside its paths: tables, marks of its files, and in the end its failure or its settings.
+const LISTED: u64 = 2 << 10;
+
+/// The most bytes that a batch holds of these pairs, with its outputs in a folder of this name: their paths, and, of pairs that
+/// fail, their paths again and a message with two more. [`LISTED`] counts the rest.
+pub(crate) fn listed_bytes(pairs: &[Pair], output: &Path) -> u64 {
+    let len = |path: &Path| path.as_os_str().len();
+    let letters = |pair: &Pair| 3 * (len(&pair.left) + len(&pair.right)) + 4 * len(&pair.name) + 2 * len(output);
+    pairs.iter().map(|pair| letters(pair) as u64 + LISTED).sum()
+}
+
 /// Pairs in order, notes on files that are not part of a pair, and what may hold more pairs but could not be read.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// The pairs.
     pub pairs: Vec<Pair>,
+    /// The pairs that cannot be matched, by their place in `pairs`, and why.
+    pub refused: BTreeMap<usize, String>,
     /// The notes, a line each.
     pub notes: Vec<String>,
     /// Folders that could not be read, and why, a line each.
@@ -47,6 +62,8 @@ pub struct Found {
 pub enum Source {
     /// A list, or a folder that is searched.
     Path(PathBuf),
+    /// A list on standard input.
+    StandardInput,
     /// Two patterns with one `%d`, `%04d` or `*` each, left and right.
     Video([String; 2]),
     /// Given pairs, and the name of their source for messages.
@@ -54,30 +71,39 @@ pub enum Source {
 }
 
 impl Source {
-    /// Finds the pairs, at least one. The search of a folder skips `output`.
+    /// Finds the pairs, at least one. The search of a folder skips `output`. A list that needs more than `max_memory` bytes, or
+    /// more memory than is free, is refused before it is parsed.
     ///
     /// # Errors
     /// [`Error::Input`] if there is no pair or a list is broken, [`Error::Options`] for a pattern without a
-    /// placeholder, [`Error::Stopped`].
-    pub fn find(&self, output: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
-        let (found, source) = match self {
-            Self::Path(path) if path.is_dir() => (search::search(path, output, watch)?, path.display().to_string()),
-            Self::Path(path) => (listed(path, watch)?, path.display().to_string()),
-            Self::Video([left, right]) => (video::frames(left, right)?, format!("{left} and {right}")),
-            Self::Pairs(pairs, name) => (Found { pairs: pairs.clone(), ..Found::default() }, name.clone()),
+    /// placeholder, [`Error::OutOfMemory`], [`Error::Stopped`].
+    pub fn find(&self, output: &Path, max_memory: Option<u64>, watch: &Watch<'_>) -> Result<Found, Error> {
+        let room = || Room::new(0, max_memory);
+        let found = match self {
+            Self::Path(path) if path.is_dir() => search::search(path, output, watch)?,
+            Self::Path(path) => list::read(path, room(), watch)?,
+            Self::StandardInput => list::read_input(room(), watch)?,
+            Self::Video([left, right]) => video::frames(left, right)?,
+            Self::Pairs(pairs, _) => Found { pairs: pairs.clone(), ..Found::default() },
         };
         if found.pairs.is_empty() {
             let notes: String = found.unread.iter().chain(&found.notes).map(|note| format!("\n  {note}")).collect();
-            return Err(Error::Input(format!("{source}: no pair found{notes}")));
+            return Err(Error::Input(format!("{self}: no pair found{notes}")));
         }
         Ok(found)
     }
 }
 
-fn listed(path: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
-    let (name, path) = (path.display().to_string(), path.to_owned());
-    let bytes = watch.unless_stopped(move || Contents::of(&path, MOST_TEXT))??.bytes;
-    Ok(Found { pairs: parse(&bytes, &name)?, ..Found::default() })
+/// Its name in messages.
+impl fmt::Display for Source {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Path(path) => path.display().fmt(out),
+            Self::StandardInput => out.write_str(list::INPUT),
+            Self::Video([left, right]) => write!(out, "{left} and {right}"),
+            Self::Pairs(_, name) => out.write_str(name),
+        }
+    }
 }
 
 /// The default name of a pair: the path of its left image without root, `..` and extension.

@@ -10,6 +10,10 @@ use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
 /// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
 const RECTIFYING: u64 = 2 * Image::COLOUR_BYTES + POSITIONS;
 
+/// How reading needs less memory.
+const IMAGES: &str = "use smaller images";
+const LIST: &str = "split the list";
+
 /// Bytes that may be read in any case: the threads and outputs that [`PROGRAM`] counts are not there yet. So small images
 /// are refused when their plan is known, with advice that suits it.
 const SMALL: u64 = 4 << 20;
@@ -90,25 +94,40 @@ impl Room {
         let needed = a_pixel * pair.size().pixels() as u64;
         let Some(left) = self.limits.memory.filter(|&left| left < needed) else { return Ok(()) };
         let what = format!("{step} {}", pair.size());
-        Err(self.refused(needed, left).of(what))
+        Err(self.refused(needed, left, IMAGES).of(what))
     }
 
-    /// Why `needed` bytes where `left` are left are too much.
-    fn refused(self, needed: u64, left: u64) -> Error {
+    /// Fails if so many bytes for a list of pairs are not left.
+    pub(crate) fn check_list(self, name: &str, needed: u64) -> Result<(), Error> {
+        let Some(left) = self.limits.memory.filter(|&left| left < needed) else { return Ok(()) };
+        Err(self.refused(needed, left, LIST).of(format!("the pairs of {name}")))
+    }
+
+    /// Why `needed` bytes where `left` are left are too much. `less` is how to need less.
+    fn refused(self, needed: u64, left: u64, less: &str) -> Error {
         let (reason, advice) = match self.allowed {
-            Some(_) => ("allowed by `max_memory`", "raise it, or use smaller images".to_owned()),
-            None => ("free", "use smaller images".to_owned()),
+            Some(_) => ("allowed by `max_memory`", format!("raise it, or {less}")),
+            None => ("free", less.to_owned()),
         };
         let beside = self.allowed.map_or(0, |available| available.saturating_sub(left).max(PROGRAM));
         let (needed, available) = (needed.saturating_add(beside), self.allowed.unwrap_or(left));
         Error::OutOfMemory { needed, available, reason, advice }
     }
 
-    /// The outcome of reading a file, with advice if the limit can be raised.
+    /// The outcome of reading an image, with advice if the limit can be raised.
     pub(crate) fn explained<T>(self, read: Result<T, bp_io::Error>) -> Result<T, Error> {
+        self.advised(read, IMAGES)
+    }
+
+    /// The outcome of reading a list, in the same way.
+    pub(crate) fn explained_list<T>(self, read: Result<T, bp_io::Error>) -> Result<T, Error> {
+        self.advised(read, LIST)
+    }
+
+    fn advised<T>(self, read: Result<T, bp_io::Error>, less: &str) -> Result<T, Error> {
         read.map_err(|error| match (error, self.allowed, self.limits.memory) {
             (bp_io::Error::OutOfMemory { path, needed, .. }, Some(_), Some(left)) => {
-                self.refused(needed, left).of(format!("reading {}", path.display()))
+                self.refused(needed, left, less).of(format!("reading {}", path.display()))
             }
             (error, ..) => error.into(),
         })

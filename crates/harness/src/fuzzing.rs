@@ -126,7 +126,7 @@ pub fn calibration(bytes: &[u8]) -> bool {
 /// If a name leads out of the output folder.
 pub fn pair_list(bytes: &[u8]) -> bool {
     let Ok(found) = pairs::parse(bytes, NAME) else { return false };
-    for name in found.iter().map(|pair| &pair.name) {
+    for name in found.pairs.iter().map(|pair| &pair.name) {
         let inside = name.components().all(|part| matches!(part, Component::Normal(_)));
         assert!(inside && name.file_name().is_some(), "{}", name.display());
     }

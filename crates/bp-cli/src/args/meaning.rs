@@ -2,21 +2,20 @@
 //! each other are here.
 
 use std::{
-    io::Read as _,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use bp_core::{Algorithm as Kind, MessageStart, Schedule};
-use bp_io::{Geometry, MOST_TEXT, Picture};
+use bp_io::{Files, Geometry, Picture};
 use bp_stereo::{
     Algorithm, Hierarchy, Loops, Making, Options, Outputs, Quality, Rectifying,
     batch::{Also, BatchOptions},
-    pairs::{self, Source},
+    pairs::Source,
 };
 
 use super::{ManyArgs, MatchArgs, OutputArgs, PlanArgs};
-use crate::{colour_bar, failure::Failure};
+use crate::{colour_bar, failure::Failure, interrupt};
 
 /// The algorithms that count loops as the thesis does, for messages.
 const THESIS: &str = "--algorithm bp, cfbp, cfcsbp, ctbp or ctcsbp";
@@ -65,7 +64,7 @@ impl MatchArgs {
 
     /// The batch that the arguments ask for; `None` for one pair.
     pub(crate) fn batch(&self) -> Result<Option<BatchOptions>, Failure> {
-        let Some(source) = self.many.source()? else { return Ok(None) };
+        let Some(source) = self.many.source() else { return Ok(None) };
         let OutputArgs { picture, depth, points, .. } = &self.outputs;
         if [picture, depth, points, &self.finish.confidence].into_iter().any(Option::is_some) {
             let what = "--picture, --depth, --points and --confidence name one file";
@@ -115,20 +114,12 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
 
 impl ManyArgs {
     /// The source of many pairs; `None` for one pair.
-    fn source(&self) -> Result<Option<Source>, Failure> {
+    fn source(&self) -> Option<Source> {
         match (&self.pairs, self.video.as_deref()) {
-            (Some(path), _) if path == Path::new("-") => {
-                let (mut bytes, name) = (Vec::new(), "standard input".to_owned());
-                let read = std::io::stdin().lock().take(MOST_TEXT + 1).read_to_end(&mut bytes);
-                read.map_err(|error| Failure::input(format!("{name}: {error}")))?;
-                if bytes.len() as u64 > MOST_TEXT {
-                    return Err(Failure::input(format!("{name}: more than {} MiB; split the list", MOST_TEXT >> 20)));
-                }
-                Ok(Some(Source::Pairs(pairs::parse(&bytes, &name)?, name)))
-            }
-            (Some(path), _) => Ok(Some(Source::Path(path.clone()))),
-            (None, Some([left, right])) => Ok(Some(Source::Video([left.clone(), right.clone()]))),
-            (None, _) => Ok(None),
+            (Some(path), _) if path == Path::new("-") => Some(Source::StandardInput),
+            (Some(path), _) => Some(Source::Path(path.clone())),
+            (None, Some([left, right])) => Some(Source::Video([left.clone(), right.clone()])),
+            (None, _) => None,
         }
     }
 }
@@ -173,7 +164,7 @@ impl OutputArgs {
             nan: args.unknown == Some(true),
             geometry: read.or(given),
             rectifying: rectifying.map(Arc::new),
-            ..Making::default()
+            files: Files::default().stopping(interrupt::is_stopped),
         })
     }
 

@@ -90,7 +90,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
         depth: args.outputs.depth.is_some(),
         rectified: args.rectify,
         batch: false,
-        pairs: 0,
+        listed: 0,
         whole,
     };
     let mut matcher = Matcher::new(&options)?.beside(beside);

@@ -13,6 +13,7 @@ mod recorded;
 mod rectify;
 mod resumed;
 mod running;
+mod shortage;
 mod speed;
 mod stream;
 mod survey;

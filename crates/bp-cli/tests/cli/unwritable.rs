@@ -155,3 +155,44 @@ fn a_name_that_cannot_be_written_stops_no_other_pair() {
     fs::remove_file(folder.path("out/pipe.pfm")).unwrap();
     assert_eq!(names(&folder.path("out")), ["z"]);
 }
+
+#[test]
+fn a_folder_with_the_name_of_a_temporary_file_is_passed_over() {
+    let (folder, run) = four_pairs();
+    for name in ["out/.bp-1-of-1-x", "out/records/.bp-1-of-1-y", "out/e/.bp-1-of-1-z"] {
+        fs::create_dir_all(folder.path(name)).unwrap();
+    }
+    let output = folder.run(&run);
+    let told = text(&output.stderr);
+    assert!(output.status.success() && told.contains("warning: ") && told.contains("out/.bp-1-of-1-x"), "{told}");
+    assert_eq!(names(&folder.path("out")), ["a", "b", "c", "e/d"]);
+}
+
+#[test]
+fn a_folder_in_place_of_the_lock_is_refused() {
+    let (folder, run) = four_pairs();
+    fs::create_dir(folder.path("out/records/1-of-1.lock")).unwrap();
+    folder.fails(&run, 1, &["out/records/1-of-1.lock: it is a folder"]);
+    assert!(names(&folder.path("out")).is_empty());
+}
+
+#[test]
+fn a_line_that_is_not_utf_8_stops_no_other_pair() {
+    let (folder, run) = four_pairs();
+    let list = b"left.png right.png a\nleft\xff.png right.png \xffb\n# \xfe\nleft.png right.png z\n";
+    fs::write(folder.path("list"), list).unwrap();
+    for done in 0..2 {
+        let output = folder.run(&run);
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{told}");
+        assert!(
+            told.contains("\\xffb: line 2 of the list is not a text in UTF-8") && told.contains("1 of 3 pairs failed")
+        );
+        assert_eq!(names(&folder.path("out")), ["a", "z"]);
+        let summary: Value = serde_json::from_slice(&fs::read(folder.path("out/summary.json")).unwrap()).unwrap();
+        assert_eq!(
+            (&summary["skipped"], &summary["failures"][0]["left"]),
+            (&(2 * done).into(), &"left\\xff.png".into())
+        );
+    }
+}

@@ -23,12 +23,12 @@ use super::{
 };
 use crate::{
     Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Options, Rectifying, Start, Stopped, Warning,
-    Watch, description, memory::LISTED, pairs::Pair, reading::Room,
+    Watch, description, pairs::Pair, reading::Room,
 };
 
 /// A pair in memory.
 struct Read<'a> {
-    job: &'a Job,
+    job: &'a Job<'a>,
     images: Images,
     read_ms: f64,
 }
@@ -41,7 +41,7 @@ struct Images {
 
 /// An answer, not yet written.
 struct Matched<'a> {
-    job: &'a Job,
+    job: &'a Job<'a>,
     origin: PairOrigin,
     answer: Result<Answer, Error>,
 }
@@ -86,8 +86,8 @@ impl Images {
 pub(super) struct Run<'a> {
     pub(super) options: &'a BatchOptions,
     pub(super) making: &'a Making,
-    /// The number of all pairs.
-    pub(super) listed: usize,
+    /// The bytes that the batch holds of all its pairs.
+    pub(super) listed: u64,
     pub(super) settings_sha256: &'a str,
     pub(super) watch: &'a Watch<'a>,
     pub(super) warned: Warned,
@@ -115,7 +115,7 @@ impl Warned {
 
 impl Run<'_> {
     /// Matches and writes all jobs. If a pair fails, the others continue.
-    pub(super) fn all(&self, jobs: &[&Job]) -> Result<Vec<Failed>, Error> {
+    pub(super) fn all(&self, jobs: &[&Job<'_>]) -> Result<Vec<Failed>, Error> {
         let writer =
             Writer { run: self, pairs: jobs.len() as u64, last: Instant::now(), written: 0, failed: Vec::new() };
         let is_limited = self.options.matching.max_memory.is_some();
@@ -125,12 +125,12 @@ impl Run<'_> {
     }
 
     /// Reads, matches and writes one pair after another, so that only one is in memory.
-    fn one_by_one(&self, jobs: &[&Job], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
+    fn one_by_one(&self, jobs: &[&Job<'_>], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
         let mut solver = PairSolver::new(self)?;
         for job in jobs {
             self.watch.check()?;
             let room = Room::new(self.options.max_megapixels, self.options.matching.max_memory);
-            let room = room.without(LISTED * self.listed as u64);
+            let room = room.without(self.listed);
             let beside = self.read(job, room.without(solver.matcher.allocated_bytes()))?;
             let is_short = beside.images.pair.as_ref().is_err_and(|error| error.cause() == Cause::Memory);
             // A warm start needs what the matcher holds, and a pipe is empty now.
@@ -142,7 +142,7 @@ impl Run<'_> {
     }
 
     /// Reads, matches and writes three pairs at a time.
-    fn side_by_side(&self, jobs: &[&Job], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
+    fn side_by_side(&self, jobs: &[&Job<'_>], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
         // The channels have no buffer, so at most three pairs are in memory.
         let (read, to_match) = sync_channel(0);
         let (matched, to_write) = sync_channel(0);
@@ -159,7 +159,7 @@ impl Run<'_> {
     }
 
     /// Reads one pair after another until the batch stops or the receiver is gone.
-    fn read_all<'a>(&self, jobs: &[&'a Job], to: &SyncSender<Read<'a>>) {
+    fn read_all<'a>(&self, jobs: &[&'a Job<'a>], to: &SyncSender<Read<'a>>) {
         for &job in jobs {
             let room = Room::new(self.options.max_megapixels, None);
             let Ok(read) = self.read(job, room) else { return };
@@ -169,7 +169,7 @@ impl Run<'_> {
         }
     }
 
-    fn read<'a>(&self, job: &'a Job, room: Room) -> Result<Read<'a>, Stopped> {
+    fn read<'a>(&self, job: &'a Job<'a>, room: Room) -> Result<Read<'a>, Stopped> {
         let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
         let mut images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
         if !self.options.also.contains(&Also::Points) {
@@ -200,7 +200,7 @@ impl Run<'_> {
             depth,
             rectified: self.making.rectifying.is_some(),
             batch,
-            pairs: self.listed,
+            listed: self.listed,
             whole,
         }))
     }
@@ -208,7 +208,7 @@ impl Run<'_> {
     fn match_one(
         &self,
         matcher: &mut Matcher,
-        job: &Job,
+        job: &Job<'_>,
         pair: StereoPair,
         start: Start,
         read_ms: f64,
@@ -220,7 +220,7 @@ impl Run<'_> {
         let is_first = |warning: &Warning| self.warned.count(warning) == 1;
         let firsts = planned.warnings.iter().zip(&warnings).filter(|(warning, _)| is_first(warning));
         firsts.for_each(|(_, text)| self.watch.warn(text));
-        job.outputs.check_plan(self.making, &planned.plan)?;
+        job.outputs().check_plan(self.making, &planned.plan)?;
         self.options.warm_start.map_or(Ok(()), |_| matcher.check_warm(&planned.plan))?;
         // The batch counts pairs, not the work within one.
         let events = |event: Event<'_>| {
@@ -307,7 +307,7 @@ impl Writer<'_> {
     fn write(&mut self, Matched { job, origin, answer }: Matched<'_>) {
         if let Err(error) = self.finish(job, &origin, answer) {
             job.remove_stale(&origin.inputs);
-            self.failed.push(Failed::told(&job.pair, &error, self.run.watch));
+            self.failed.push(Failed::told(job.pair, &error, self.run.watch));
         }
         self.written += 1;
         let failed = if self.failed.is_empty() { String::new() } else { format!(", {} failed", self.failed.len()) };
@@ -317,13 +317,13 @@ impl Writer<'_> {
     }
 
     /// Writes the outputs of an answer, then its record.
-    fn finish(&mut self, job: &Job, origin: &PairOrigin, answer: Result<Answer, Error>) -> Result<(), Error> {
+    fn finish(&mut self, job: &Job<'_>, origin: &PairOrigin, answer: Result<Answer, Error>) -> Result<(), Error> {
         let done = self.outputs(job, answer?)?;
         job.remove_others()?;
         self.record(job, origin, done)
     }
 
-    fn record(&mut self, job: &Job, origin: &PairOrigin, done: Done) -> Result<(), Error> {
+    fn record(&mut self, job: &Job<'_>, origin: &PairOrigin, done: Done) -> Result<(), Error> {
         let elapsed_ms = milliseconds_since(self.last);
         self.last = Instant::now();
         let record = PairRecord {
@@ -336,10 +336,10 @@ impl Writer<'_> {
             elapsed_ms,
             done,
         };
-        record.write(&self.run.making.files, &job.record)
+        record.write(&self.run.making.files, &job.record())
     }
 
-    fn outputs(&self, job: &Job, Answer { done, disparity, pair }: Answer) -> Result<Done, Error> {
+    fn outputs(&self, job: &Job<'_>, Answer { done, disparity, pair }: Answer) -> Result<Done, Error> {
         let start = Instant::now();
         let content = Content {
             map: &disparity.map,
@@ -348,8 +348,8 @@ impl Writer<'_> {
             plan: Some(&disparity.settings),
             inputs: &job.inputs(),
         };
-        job.outputs.write(self.run.making, &content, self.run.watch)?;
-        let outputs = job.paths.iter().map(|path| FileState::of(path)).collect::<Result<_, _>>()?;
+        job.outputs().write(self.run.making, &content, self.run.watch)?;
+        let outputs = job.paths().iter().map(|path| FileState::of(path)).collect::<Result<_, _>>()?;
         Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
     }
 }

@@ -42,6 +42,10 @@ impl Shard {
         let path = folder.join(format!("{}.lock", self.file_part()));
         files.check_own(&path)?;
         create_folder(folder)?;
+        if path.is_dir() {
+            // It could be opened, but not everywhere locked.
+            return Err(bp_io::Error::writing(&path, &"it is a folder, and a lock is a file; remove it").into());
+        }
         let file = File::options().create(true).truncate(false).write(true).open(&path);
         // The lock file of another user, in a shared folder, can be locked without write permission.
         let file = file.or_else(|error| File::open(&path).map_err(|_| bp_io::Error::writing(&path, &error)))?;

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::{
     Shard,
     job::Job,
-    record::{Done, PairRecord, PairTimes},
+    record::{PairRecord, PairTimes},
 };
 use bp_io::Files;
 
@@ -69,35 +69,29 @@ impl Summary {
     pub(super) fn of(
         output: &Path,
         shard: Shard,
-        jobs: &[Job],
+        jobs: &[Job<'_>],
         skipped: usize,
         failures: Vec<Failed>,
     ) -> Result<Self, Error> {
-        let missing = |job: &Job| Error::System(format!("{} is gone", job.record.display()));
-        let read = |job: &Job| PairRecord::read(&job.record).ok_or_else(|| missing(job));
         let failed: HashSet<&Path> = failures.iter().map(|failed| failed.name.as_path()).collect();
-        let succeeded = jobs.iter().filter(|job| !failed.contains(job.pair.name.as_path()));
-        let records = succeeded.map(read).collect::<Result<Vec<_>, _>>()?;
-        let done: Vec<&Done> = records.iter().map(|record| &record.done).collect();
-        let times = done.iter().fold(PairTimes::default(), |sum, done| sum + done.times);
-        // Starts from 0.0 because the empty `sum` is -0.0, which would be written as such.
-        let total_ms = records.iter().fold(0.0, |sum, record| sum + record.elapsed_ms);
-        let rate = |ms: f64| (ms > 0.0 && !done.is_empty()).then(|| 1000.0 * done.len() as f64 / ms);
+        let done = Sum::of(jobs.iter().filter(|job| !failed.contains(job.pair.name.as_path())))?;
+        let count = done.solve_ms.len();
+        let rate = |ms: f64| (ms > 0.0 && count > 0).then(|| 1000.0 * count as f64 / ms);
         Ok(Self {
             shard: (!shard.is_all()).then(|| shard.to_string()),
             pairs: jobs.len(),
-            done: done.len(),
+            done: count,
             skipped,
             failures,
             unread: Vec::new(),
-            settings: distinct(done.iter().map(|done| description::Settings { rows: None, ..done.settings.clone() })),
-            tiles: distinct(done.iter().filter_map(|done| done.tiles.clone())),
-            devices: distinct(done.iter().map(|done| done.device.clone())),
-            times,
-            total_ms,
-            median_solve_ms: median(done.iter().map(|done| done.times.solve_ms).collect()),
-            pairs_per_second: rate(total_ms),
-            solved_per_second: rate(times.solve_ms),
+            settings: done.settings,
+            tiles: done.tiles,
+            devices: done.devices,
+            times: done.times,
+            total_ms: done.total_ms,
+            median_solve_ms: median(done.solve_ms),
+            pairs_per_second: rate(done.total_ms),
+            solved_per_second: rate(done.times.solve_ms),
             output: output.to_owned(),
         })
     }
@@ -120,15 +114,38 @@ impl Failed {
     }
 }
 
-/// The distinct values, in order of first appearance.
-fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found: Vec<T> = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
+/// What the records of pairs add up to. They are read one by one, because all of them may not fit in memory.
+#[derive(Default)]
+struct Sum {
+    settings: Vec<description::Settings>,
+    tiles: Vec<Tiles>,
+    devices: Vec<description::Device>,
+    times: PairTimes,
+    total_ms: f64,
+    solve_ms: Vec<f64>,
+}
+
+impl Sum {
+    fn of<'a>(jobs: impl Iterator<Item = &'a Job<'a>>) -> Result<Self, Error> {
+        let mut sum = Self::default();
+        for job in jobs {
+            let path = job.record();
+            let gone = || Error::System(format!("{} is gone", path.display()));
+            let PairRecord { elapsed_ms, done, .. } = PairRecord::read(&path).ok_or_else(gone)?;
+            add_distinct(&mut sum.settings, Some(description::Settings { rows: None, ..done.settings }));
+            add_distinct(&mut sum.tiles, done.tiles);
+            add_distinct(&mut sum.devices, Some(done.device));
+            sum.times = sum.times + done.times;
+            sum.total_ms += elapsed_ms;
+            sum.solve_ms.push(done.times.solve_ms);
         }
+        Ok(sum)
     }
-    found
+}
+
+/// Adds a value to the distinct ones, in order of first appearance.
+fn add_distinct<T: PartialEq>(found: &mut Vec<T>, value: Option<T>) {
+    found.extend(value.filter(|value| !found.contains(value)));
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

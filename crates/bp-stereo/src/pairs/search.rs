@@ -40,7 +40,7 @@ const MOST_ENTRIES: usize = 1_000_000;
 /// The pairs below `root`, but not in `output`, in the natural order of their names.
 pub(super) fn search(root: &Path, output: &Path, watch: &Watch<'_>) -> Result<Found, Error> {
     let mut found = Found::default();
-    let folders = images(root, output, &mut found, watch)?;
+    let folders = images(root, output, MOST_ENTRIES, &mut found, watch)?;
     for (folder, images) in &folders {
         in_one_folder(folder, images, &mut found);
         in_two_folders(folder, &folders, &mut found);
@@ -53,13 +53,13 @@ pub(super) fn search(root: &Path, output: &Path, watch: &Watch<'_>) -> Result<Fo
 }
 
 /// All images below a folder. Links are followed, but not to a folder above them.
-fn images(root: &Path, output: &Path, found: &mut Found, watch: &Watch<'_>) -> Result<Folders, Error> {
+fn images(root: &Path, output: &Path, most: usize, found: &mut Found, watch: &Watch<'_>) -> Result<Folders, Error> {
     let output = output.canonicalize().ok();
     let is_output = |path: &Path| output.is_some() && path.canonicalize().ok() == output;
     let entries = WalkDir::new(root).min_depth(1).follow_links(true).sort_by_file_name().into_iter();
     let mut entries = entries.filter_entry(|entry| !(entry.file_type().is_dir() && is_output(entry.path())));
     let mut folders = Folders::new();
-    for _ in 0..=MOST_ENTRIES {
+    for _ in 0..=most {
         watch.check()?;
         match entries.next() {
             None => return Ok(folders),
@@ -68,7 +68,7 @@ fn images(root: &Path, output: &Path, found: &mut Found, watch: &Watch<'_>) -> R
             Some(Ok(entry)) => add_image(root, &entry, &mut folders, &mut found.notes),
         }
     }
-    let what = format!("more than {MOST_ENTRIES} files and folders; name a smaller folder, or give a list of pairs");
+    let what = format!("more than {most} files and folders; name a smaller folder, or give a list of pairs");
     Err(Error::Input(format!("{}: {what}", root.display())))
 }
 
@@ -175,5 +175,21 @@ mod tests {
         let (left, right) = (images(&["A.png", "a.png", "b.PNG"]), images(&["A.png", "B.png"]));
         let found = ["A.png", "a.png", "b.PNG"].map(|name| partner(name, &left, &right).map(String::as_str));
         assert_eq!(found, [Some("A.png"), None, Some("B.png")]);
+    }
+
+    /// A link to the root of a system leads to millions.
+    #[test]
+    fn a_folder_with_more_files_than_are_looked_at_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        ["view1.png", "view5.png", "text"]
+            .iter()
+            .for_each(|name| std::fs::write(folder.path().join(name), "").unwrap());
+        let images = |most| {
+            images(folder.path(), Path::new("output"), most, &mut Found::default(), &Watch::default())
+                .map(|folders| folders.into_values().next().unwrap_or_default().len())
+        };
+        assert_eq!(images(3), Ok(2));
+        let Err(Error::Input(what)) = images(2) else { panic!("it is searched") };
+        assert!(what.contains("more than 2 files and folders"), "{what}");
     }
 }
