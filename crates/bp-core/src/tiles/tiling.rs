@@ -25,6 +25,8 @@ pub struct Tiling {
     plan: Plan,
     columns: Vec<Span>,
     rows: Vec<Span>,
+    /// The columns on each side of those that are kept which have the whole image's costs.
+    halo: usize,
     likely: Option<Likely>,
 }
 
@@ -42,7 +44,7 @@ impl Tiling {
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
         let whole = |length| spans(length, length, 1, Halo::default());
-        Self { plan, columns: whole(width), rows: whole(height), likely: None }
+        Self { plan, columns: whole(width), rows: whole(height), halo: 0, likely: None }
     }
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
@@ -62,9 +64,9 @@ impl Tiling {
         let swept = plan.settings().schedule == Schedule::Sweep;
         let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
         let columns = spans(width, kept.width.next_multiple_of(align.width), align.width, Halo { before, after });
-        let halo = Halo { before: beyond, after: beyond };
-        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, halo);
-        Self { plan, columns, rows, likely: None }
+        let around = Halo { before: beyond, after: beyond };
+        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, around);
+        Self { plan, columns, rows, halo, likely: None }
     }
 
     /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that probably take the least
@@ -128,11 +130,18 @@ impl Tiling {
         Tile { columns: columns.clone(), rows: rows.clone(), margin: self.margin(columns) }
     }
 
-    /// The columns to the left of these that their pixels match.
+    /// The columns to the left of these that their pixels match; none if the pixels that count match these columns only.
     fn margin(&self, columns: &Span) -> usize {
         let model = self.plan.model();
-        let farthest = model.disparity(model.labels() as u16 - 1);
-        columns.all.start.min(usize::try_from(farthest).unwrap_or(0))
+        let reach = usize::try_from(model.disparity(model.labels() as u16 - 1)).unwrap_or(0);
+        let start = columns.all.start;
+        if columns.kept.start.saturating_sub(self.halo + reach) >= start { 0 } else { start.min(reach) }
+    }
+
+    /// A span of columns and one of rows for each plan that tiles have.
+    fn kinds(&self) -> impl Iterator<Item = (&Span, &Span)> {
+        let columns = distinct(&self.columns, |columns| (columns.all.len(), self.margin(columns)));
+        columns.flat_map(|columns| distinct(&self.rows, |rows| rows.all.len()).map(move |rows| (columns, rows)))
     }
 
     /// The number of tiles across and down.
@@ -181,12 +190,10 @@ impl Tiling {
             return needed(&self.plan);
         }
         let mut most = 0;
-        for columns in distinct(&self.columns, |columns| (columns.all.len(), self.margin(columns))) {
-            for rows in distinct(&self.rows, |rows| rows.all.len()) {
-                let tile = self.tile(columns, rows);
-                let bytes = needed(&tile.plan(&self.plan)?)?;
-                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
-            }
+        for (columns, rows) in self.kinds() {
+            let tile = self.tile(columns, rows);
+            let bytes = needed(&tile.plan(&self.plan)?)?;
+            most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
         }
         let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);
         Ok(most.saturating_add(self.label_bytes()).min(limit))
@@ -363,7 +370,7 @@ mod tests {
                 let pixels = rows.kept.clone().flat_map(|y| columns.kept.clone().map(move |x| (x, y)));
                 pixels.for_each(|(x, y)| kept[y * 333 + x] += 1);
                 assert!(columns.all.start == 0 || columns.all.start + 64 <= columns.kept.start, "{columns:?}");
-                assert!(*margin == columns.all.start || *margin >= reach, "{tile:?}");
+                assert!(columns.all.start - margin <= columns.kept.start.saturating_sub(64 + reach), "{tile:?}");
                 assert_eq!(tile.pair(&pair).size().width, margin + columns.all.len());
                 assert!(columns.all.end == 333 || columns.kept.end + right <= columns.all.end, "{columns:?}");
                 assert!(columns.all.start.is_multiple_of(ALIGN) && rows.all.start.is_multiple_of(ALIGN));

@@ -173,7 +173,11 @@ mod tests {
         let message = "width: 640\nk: [1, 2]\n";
         for text in ["", "---\n", "---\nwidth: 320\n---\n"].map(|after| format!("{message}{after}")) {
             let tree = parse(&text).unwrap();
-            assert_eq!((tree.numbers(&["width"]), tree.numbers(&["K"])), (Ok(vec![640.0]), Ok(vec![1.0, 2.0])), "{text}");
+            assert_eq!(
+                (tree.numbers(&["width"]), tree.numbers(&["K"])),
+                (Ok(vec![640.0]), Ok(vec![1.0, 2.0])),
+                "{text}"
+            );
         }
         assert!(parse("%YAML:1.0\n---\nM1: [1]\n").is_ok());
         for text in ["", "---\n", "[1, 2]\n", "a: 1\n---\n{"] {
