@@ -17,6 +17,10 @@ const SWEPT_ROWS_HALO: usize = 64;
 /// find and clear the memory.
 const BYTES_PER_PIXEL: f64 = 128.0;
 
+/// Tiles match so many columns more on the left, rather than have them of their right image only. Then all tiles have one plan,
+/// and its memory is prepared once.
+const MOST_MATCHED: usize = 256;
+
 /// A plan, and the tiles that it runs on. One tile gives the image's answer to the bit. Several give nearly the same one, which is
 /// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`] bands also begin at the first row of
 /// each tile.
@@ -27,6 +31,8 @@ pub struct Tiling {
     rows: Vec<Span>,
     /// The columns on each side of those that are kept which have the whole image's costs.
     halo: usize,
+    /// How far to the left labels match, if tiles do not match all these columns.
+    reach: usize,
     likely: Option<Likely>,
 }
 
@@ -44,12 +50,12 @@ impl Tiling {
     pub fn whole(plan: Plan) -> Self {
         let Size { width, height } = plan.image_size();
         let whole = |length| spans(length, length, 1, Halo::default());
-        Self { plan, columns: whole(width), rows: whole(height), halo: 0, likely: None }
+        Self { plan, columns: whole(width), rows: whole(height), halo: 0, reach: 0, likely: None }
     }
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
-    /// around them. All their pixels have the same costs as in the whole image, because the right image is there as far to the left as
-    /// labels match. If labels match to the right, a tile extends further right by as much. Under [`Schedule::Sweep`] no halo has more
+    /// around them. All their pixels have the same costs as in the whole image. If labels match to the left, a tile extends further left by
+    /// the largest disparity, or, if that is far, its right image alone does; likewise the tile on the right. Under [`Schedule::Sweep`] no halo has more
     /// than 64 rows. Under [`Schedule::Outward`] the image is one tile.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
@@ -59,14 +65,16 @@ impl Tiling {
         }
         let Size { width, height } = plan.image_size();
         let (model, align) = (plan.model(), align(&plan));
-        let to_the_right = (-model.min_disparity()).max(0) as usize;
-        let [before, after] = [halo, halo + to_the_right].map(|columns| columns.next_multiple_of(align.width));
+        let [left, right] =
+            [model.disparity(model.labels() as u16 - 1), -model.min_disparity()].map(|reach| reach.max(0) as usize);
+        let (matched, reach) = if left > MOST_MATCHED { (0, left) } else { (left, 0) };
+        let [before, after] = [halo + matched, halo + right].map(|columns| columns.next_multiple_of(align.width));
         let swept = plan.settings().schedule == Schedule::Sweep;
         let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
         let columns = spans(width, kept.width.next_multiple_of(align.width), align.width, Halo { before, after });
         let around = Halo { before: beyond, after: beyond };
         let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, around);
-        Self { plan, columns, rows, halo, likely: None }
+        Self { plan, columns, rows, halo, reach, likely: None }
     }
 
     /// The tiling that runs within `bytes`: the whole image, or else the tiles with a halo of [`HALO`] that probably take the least
@@ -132,10 +140,8 @@ impl Tiling {
 
     /// The columns to the left of these that their pixels match; none if the pixels that count match these columns only.
     fn margin(&self, columns: &Span) -> usize {
-        let model = self.plan.model();
-        let reach = usize::try_from(model.disparity(model.labels() as u16 - 1)).unwrap_or(0);
         let start = columns.all.start;
-        if columns.kept.start.saturating_sub(self.halo + reach) >= start { 0 } else { start.min(reach) }
+        if columns.kept.start.saturating_sub(self.halo + self.reach) >= start { 0 } else { start.min(self.reach) }
     }
 
     /// A span of columns and one of rows for each plan that tiles have.
@@ -294,7 +300,7 @@ mod tests {
         let whole = plan.bytes();
         assert!(within(&plan, whole).is_whole());
         let tilings = [whole - 1, whole / 5, whole / 10, whole / 20].map(|bytes| within(&plan, bytes));
-        assert_eq!(tilings.each_ref().map(Tiling::counts), [(1, 8), (1, 8), (3, 8), (4, 16)]);
+        assert_eq!(tilings.each_ref().map(Tiling::counts), [(1, 8), (1, 8), (3, 8), (5, 16)]);
         assert!(tilings.is_sorted_by(|a, b| a.matched_pixels() <= b.matched_pixels()));
         let Err(Error::OutOfMemory { needed: least, available, .. }) = Tiling::within(&plan, 1, &needed, &needed)
         else {
@@ -359,7 +365,9 @@ mod tests {
     fn tiles_share_the_image_and_see_all_that_labels_match() {
         let black = Image::from_grey(333, 222, vec![0; 333 * 222]).unwrap();
         let pair = StereoPair::new(black.clone(), black).unwrap();
-        for (min_disparity, reach, right) in [(0, 15, 64), (-40, 0, 64 + 40), (100, 115, 64), (-9999, 0, 9999)] {
+        for (min_disparity, reach, right) in
+            [(0, 15, 64), (-40, 0, 64 + 40), (100, 115, 64), (270, 285, 64), (-9999, 0, 9999)]
+        {
             let plan = plan((333, 222), 16, Algorithm::Cfbp);
             let model = plan.model().with_min_disparity(min_disparity).unwrap();
             let plan = Plan::new(plan.image_size(), model, *plan.settings()).unwrap();
