@@ -33,7 +33,8 @@ impl Pair {
     }
 }
 
-/// Bytes for each pair of a batch beside its paths: tables, marks of its files, and in the end its failure or its settings.
+/// Bytes for each pair of a batch, apart from the letters of its paths: its entries in tables, the hashes of its files, and, when the
+/// batch ends, why it failed or which settings it had.
 const LISTED: u64 = 2 << 10;
 
 /// The most bytes that a batch holds of these pairs, with its outputs in a folder of this name: their paths, and, of pairs that

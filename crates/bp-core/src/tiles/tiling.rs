@@ -144,12 +144,6 @@ impl Tiling {
         if columns.kept.start.saturating_sub(self.halo + self.reach) >= start { 0 } else { start.min(self.reach) }
     }
 
-    /// A span of columns and one of rows for each plan that tiles have.
-    fn kinds(&self) -> impl Iterator<Item = (&Span, &Span)> {
-        let columns = distinct(&self.columns, |columns| (columns.all.len(), self.margin(columns)));
-        columns.flat_map(|columns| distinct(&self.rows, |rows| rows.all.len()).map(move |rows| (columns, rows)))
-    }
-
     /// The number of tiles across and down.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
@@ -196,10 +190,12 @@ impl Tiling {
             return needed(&self.plan);
         }
         let mut most = 0;
-        for (columns, rows) in self.kinds() {
-            let tile = self.tile(columns, rows);
-            let bytes = needed(&tile.plan(&self.plan)?)?;
-            most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
+        for columns in distinct(&self.columns, |columns| (columns.all.len(), self.margin(columns))) {
+            for rows in distinct(&self.rows, |rows| rows.all.len()) {
+                let tile = self.tile(columns, rows);
+                let bytes = needed(&tile.plan(&self.plan)?)?;
+                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
+            }
         }
         let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);
         Ok(most.saturating_add(self.label_bytes()).min(limit))
