@@ -1,5 +1,6 @@
 //! Matches pairs of any size in limited memory, one tile at a time.
 
+mod join;
 mod tile;
 mod tiling;
 
@@ -7,6 +8,8 @@ use std::{ops::ControlFlow, sync::Mutex, time::Instant};
 
 pub use tile::{Span, Tile};
 pub use tiling::{HALO, Needed, Tiling};
+
+use join::Joint;
 
 use crate::{
     Device, DisparityMap, Driver, Error, IsStopped, Observer, Plan, Progress, Side, StereoPair, Times, memory, never,
@@ -141,17 +144,19 @@ impl Tiled {
     ) -> Result<Times, Error> {
         self.updates = 0;
         let (mut times, mut done, total) = (Times::default(), 0, self.tiling.sum_of_updates(way.updates));
-        for tile in self.tiling.tiles() {
+        let tiles = self.tiling.tiles();
+        for (index, tile) in tiles.iter().enumerate() {
             let mut driver = {
                 let report = Mutex::new(&mut *observer);
                 let is_stopped = || report.lock().is_ok_and(|mut report| report(Progress { done, total }).is_break());
-                self.prepared(&is_stopped, device, &tile)?
+                self.prepared(&is_stopped, device, tile)?
             };
             let observe = &mut |progress: Progress| observer(Progress { done: done + progress.done, total });
-            let solved = self.solve_tile(way, &mut driver, pair, &tile, observe);
+            let solved = self.solve_tile(way, &mut driver, pair, (tile, &tiles[..index]), observe);
             done += (way.updates)(driver.plan());
             // With label sets, a solve may allocate.
-            self.most_bytes = self.most_bytes.max(driver.allocated_bytes());
+            let joined = if self.tiling.is_whole() { 0 } else { join::bytes(tile.size()) };
+            self.most_bytes = self.most_bytes.max(driver.allocated_bytes() + joined);
             self.updates += driver.message_updates();
             self.driver = Some(driver);
             times += solved?;
@@ -192,7 +197,7 @@ impl Tiled {
         way: Way,
         driver: &mut Driver,
         pair: &StereoPair,
-        tile: &Tile,
+        (tile, matched): (&Tile, &[Tile]),
         observer: &mut Observer<'_>,
     ) -> Result<Times, Error> {
         if self.tiling.is_whole() {
@@ -200,13 +205,8 @@ impl Tiled {
         }
         let part = tile.pair(&pair.clone().compared_by(driver.plan().model().profile()));
         let times = (way.solve)(driver, &part, observer)?;
-        let rows = driver.labels().chunks_exact(tile.size().width).zip(tile.rows.all.clone());
-        for (labels, y) in rows.filter(|(_, y)| tile.rows.kept.contains(y)) {
-            let Span { all, kept } = &tile.columns;
-            let from = kept.start - all.start;
-            let row = &mut self.labels[y * pair.size().width..][kept.clone()];
-            row.copy_from_slice(&labels[from..from + kept.len()]);
-        }
+        let (width, image) = (pair.size().width, &mut self.labels[..]);
+        Joint { tile, labels: driver.labels(), matched, width, image }.copy()?;
         Ok(times)
     }
 

@@ -1,5 +1,5 @@
-//! How visible the borders of bands and of coarse nodes are in maps of `sweep`, with all labels and with label sets: prints each
-//! scene, and the means that docs/algorithms.md shows.
+//! How visible the borders of bands, of coarse nodes and of tiles are in maps of `sweep`, with all labels and with label sets: prints
+//! each scene, and the means that docs/algorithms.md and docs/big-images.md show.
 //!
 //! `cargo run --release -p bp-cpu-rayon --example seams -- DATA`, where DATA has the Middlebury pairs of 2006 at half size and
 //! those of version 3 at a quarter of their size.
@@ -7,8 +7,8 @@
 use std::{error::Error, path::Path};
 
 use bp_core::{
-    Algorithm, Backend, Device, DisparityMap, Driver, Energy, GroundTruth, Image, Model, Plan, Profile, Schedule,
-    Settings, StereoPair,
+    Algorithm, Backend, Device, DisparityMap, Energy, GroundTruth, HALO, Image, Model, Plan, Profile, Schedule,
+    Settings, Size, StereoPair, Tiled, Tiling,
 };
 use bp_testkit::jumps;
 
@@ -32,18 +32,28 @@ const VERSION_3: [(&str, usize); 8] = [
 /// Every so many rows or columns.
 const PERIODS: [usize; 4] = [16, 32, 64, 128];
 
-/// The profile, and whether with label sets.
-const PLANS: [(Profile, bool); 2] = [(Profile::Census, false), (Profile::Census16, true)];
+/// The columns and rows that a tile keeps, so that its borders are at the last of the periods.
+const TILE: Size = Size { width: 128, height: 128 };
+
+/// The profile, and whether with label sets and in tiles.
+const PLANS: [(Profile, bool, bool); 4] = [
+    (Profile::Census, false, false),
+    (Profile::Census, false, true),
+    (Profile::Census16, true, false),
+    (Profile::Census16, true, true),
+];
 
 fn main() -> Result<()> {
     let data = std::env::args().nth(1).ok_or("usage: seams DATA")?;
     let device = bp_cpu_rayon::Rayon.open(0)?;
     let periods = PERIODS.map(|period| format!(" every {period} |")).concat();
-    for (profile, label_sets) in PLANS {
-        println!("Profile {}, label sets {}:\n", profile.name(), if label_sets { "on" } else { "off" });
+    for (profile, label_sets, tiles) in PLANS {
+        let [sets, image] =
+            [["off", "on"][usize::from(label_sets)], ["the whole image", "tiles of 128x128"][usize::from(tiles)]];
+        println!("Profile {}, label sets {sets}, {image}:\n", profile.name());
         println!("| scene | rows:{periods} columns:{periods} bad-1.0 non-occluded | bad-1.0 all | RMSE | energy |");
         println!("|---|{}", "---:|".repeat(12));
-        print_scenes(&Plans { device: device.as_ref(), profile, label_sets }, Path::new(&data))?;
+        print_scenes(&Plans { device: device.as_ref(), profile, label_sets, tiles }, Path::new(&data))?;
         println!();
     }
     Ok(())
@@ -83,6 +93,7 @@ struct Plans<'a> {
     device: &'a dyn Device,
     profile: Profile,
     label_sets: bool,
+    tiles: bool,
 }
 
 impl Plans<'_> {
@@ -90,10 +101,12 @@ impl Plans<'_> {
         let model = Model::new(self.profile, labels)?;
         let settings = Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep);
         let settings = Settings { label_sets: self.label_sets, ..settings };
-        let mut driver = Driver::new(self.device, Plan::new(pair.size(), model, settings)?)?;
-        driver.solve(pair)?;
-        let energy = Energy::of(pair, &model, driver.labels())?.total() as f64;
-        Ok(Solved { map: driver.disparities(), labels: driver.labels().to_vec(), energy })
+        let plan = Plan::new(pair.size(), model, settings)?;
+        let tiling = if self.tiles { Tiling::cut(plan, TILE, HALO) } else { Tiling::whole(plan) };
+        let mut tiled = Tiled::new(self.device, tiling)?;
+        tiled.solve(self.device, pair)?;
+        let energy = Energy::of(pair, &model, tiled.labels())?.total() as f64;
+        Ok(Solved { map: tiled.disparities(), labels: tiled.labels().to_vec(), energy })
     }
 }
 

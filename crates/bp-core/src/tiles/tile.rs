@@ -9,8 +9,19 @@ use crate::{Cut, Error, Plan, Profile, Settings, Size, StereoPair, image::APRON}
 pub struct Span {
     /// All columns or rows that are matched.
     pub all: Range<usize>,
-    /// Those whose labels are kept. Together, the spans of an image keep each column, or row, exactly once.
+    /// Those whose labels are kept, but for borders that leave the middle of what two tiles share. Together, the spans of an
+    /// image keep each column, or row, exactly once.
     pub kept: Range<usize>,
+}
+
+impl Span {
+    /// Those that are kept, and around them those that may be kept in place of a neighbour's.
+    pub(super) fn shared(&self) -> Range<usize> {
+        let Self { all, kept } = self;
+        let [before, after] =
+            [kept.start - all.start, all.end - kept.end].map(|halo| SHARED.min(halo * 3 / 4).min(kept.len() / 2));
+        kept.start - before..kept.end + after
+    }
 }
 
 /// A part of an image that is matched on its own.
@@ -63,6 +74,11 @@ impl Tile {
         2 * profile.image_bytes() * (columns * (self.rows.all.len() + 2 * APRON)) as u64
     }
 }
+
+/// Tiles share at most so many columns or rows on either side of the middle of a border, at most half of those that they keep, so
+/// that borders do not cross, and at most three quarters of the halo: what
+/// lies further out knows less of the image.
+pub(super) const SHARED: usize = 48;
 
 /// The number of extra columns or rows that a tile has before and after those that it keeps.
 #[derive(Clone, Copy, Debug, Default)]

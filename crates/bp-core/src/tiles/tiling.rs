@@ -1,5 +1,6 @@
 //! How a plan is cut into tiles. This is decided before anything runs.
 
+use super::join;
 use super::tile::{Halo, Span, Tile, spans};
 use crate::{BAND_ROWS, Error, Patch, Plan, Schedule, Size};
 
@@ -115,8 +116,7 @@ impl Tiling {
 
     /// The bytes that matching a tile must not exceed, if it could.
     pub(super) fn limit(&self, tile: &Tile) -> Option<u64> {
-        let beside = tile.pair_bytes(self.plan.model().profile()).saturating_add(self.label_bytes());
-        self.likely.as_ref().map(|likely| likely.bytes.saturating_sub(beside))
+        self.likely.as_ref().map(|likely| likely.bytes.saturating_sub(self.bytes_beside(tile)))
     }
 
     /// The plan of the whole image.
@@ -194,16 +194,17 @@ impl Tiling {
             for rows in distinct(&self.rows, |rows| rows.all.len()) {
                 let tile = self.tile(columns, rows);
                 let bytes = needed(&tile.plan(&self.plan)?)?;
-                most = most.max(bytes.saturating_add(tile.pair_bytes(self.plan.model().profile())));
+                most = most.max(bytes.saturating_add(self.bytes_beside(&tile)));
             }
         }
         let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);
-        Ok(most.saturating_add(self.label_bytes()).min(limit))
+        Ok(most.min(limit))
     }
 
-    /// The bytes of the labels of all tiles.
-    fn label_bytes(&self) -> u64 {
-        2 * self.plan.image_size().pixels() as u64
+    /// The bytes beside those of a tile's driver: a copy of its part of the pair, joining it, and the labels of all tiles.
+    fn bytes_beside(&self, tile: &Tile) -> u64 {
+        let labels = 2 * self.plan.image_size().pixels() as u64;
+        tile.pair_bytes(self.plan.model().profile()) + join::bytes(tile.size()) + labels
     }
 
     /// The number of matched pixels.
