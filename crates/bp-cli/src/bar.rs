@@ -2,6 +2,7 @@
 
 use std::{
     sync::{Mutex, PoisonError},
+    thread,
     time::Duration,
 };
 
@@ -33,7 +34,10 @@ impl ProgressBar {
         let bar = indicatif::ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(5));
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.enable_steady_tick(Duration::from_millis(500));
+        // The bar panics if the system starts no thread for it.
+        if !bar.is_hidden() && thread::Builder::new().spawn(|| ()).is_ok() {
+            bar.enable_steady_tick(Duration::from_millis(500));
+        }
         bar.set_position(done);
         bar.reset_eta();
         *shown = Some(bar.clone());

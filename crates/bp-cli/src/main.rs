@@ -40,6 +40,7 @@ fn main() -> ExitCode {
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
+    threads::start()?;
     match command {
         Command::Match(args) => commands::match_pair(args),
         Command::Rectify(args) => commands::rectify(args),

@@ -109,17 +109,21 @@ impl<'a> Watch<'a> {
     }
 
     /// Does work that may wait for others, such as a read from a pipe, on a thread of its own. If it should stop meanwhile, that
-    /// thread is left behind.
+    /// thread is left behind. If the system starts none, the work cannot be stopped.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(crate) fn unless_stopped<T: Send + 'static>(
+    pub(crate) fn unless_stopped<T: Send + 'static, Work: FnOnce() -> T + Send + 'static>(
         &self,
-        work: impl FnOnce() -> T + Send + 'static,
+        work: Work,
     ) -> Result<T, Stopped> {
         let Some(stop) = self.stop else { return Ok(work()) };
         let (done, outcome) = sync_channel(1);
-        let worker = thread::spawn(move || drop(done.send(work())));
+        // The work follows once there is a thread; else it is done on this one.
+        let (give, given) = sync_channel(1);
+        let begin = move || drop(given.recv().map(|work: Work| done.send(work())));
+        let Ok(worker) = thread::Builder::new().spawn(begin) else { return Ok(work()) };
+        drop(give.send(work));
         loop {
             match outcome.recv_timeout(PATIENCE) {
                 Ok(value) => return Ok(value),

@@ -15,6 +15,16 @@ pub fn run_on<T: Send, E: From<Failure> + Send>(
     pool.install(work)
 }
 
+/// Starts the pool of all work that is done in no other one, such as reading images. Otherwise it starts when it is first needed, and
+/// panics if it cannot.
+///
+/// # Errors
+/// A failure if the threads cannot be started.
+pub fn start() -> Result<(), Failure> {
+    let failed = |error| Failure::other(format!("cannot start the threads: {error}; a lower RAYON_NUM_THREADS may do"));
+    rayon::ThreadPoolBuilder::new().build_global().map_err(failed)
+}
+
 /// Fails if none of these devices uses the requested number of threads.
 pub fn check(threads: Option<u16>, names: &[String], workers: impl IntoIterator<Item = usize>) -> Result<(), Failure> {
     match threads.map(usize::from) {

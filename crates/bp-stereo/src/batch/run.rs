@@ -141,21 +141,24 @@ impl Run<'_> {
         Ok(writer.failed)
     }
 
-    /// Reads, matches and writes three pairs at a time.
+    /// Reads, matches and writes three pairs at a time; one, if the system starts no threads.
     fn side_by_side(&self, jobs: &[&Job<'_>], mut writer: Writer<'_>) -> Result<Vec<Failed>, Error> {
         // The channels have no buffer, so at most three pairs are in memory.
         let (read, to_match) = sync_channel(0);
         let (matched, to_write) = sync_channel(0);
-        thread::scope(|scope| {
-            scope.spawn(move || self.read_all(jobs, &read));
-            let writer = scope.spawn(move || {
-                to_write.into_iter().for_each(|matched| writer.write(matched));
-                writer.failed
-            });
+        let solved = thread::scope(|scope| {
+            let write = || to_write.into_iter().for_each(|matched| writer.write(matched));
+            let writing = thread::Builder::new().spawn_scoped(scope, write).ok()?;
+            // Begins last, because what is read from a pipe cannot be read again.
+            thread::Builder::new().spawn_scoped(scope, move || self.read_all(jobs, &read)).ok()?;
             let solved = self.solve_all(to_match, matched);
-            let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            solved.map(|()| written)
-        })
+            writing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            Some(solved)
+        });
+        match solved {
+            Some(solved) => solved.map(|()| writer.failed),
+            None => self.one_by_one(jobs, writer),
+        }
     }
 
     /// Reads one pair after another until the batch stops or the receiver is gone.
