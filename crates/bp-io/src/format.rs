@@ -22,21 +22,29 @@ pub enum MapFormat {
 
 impl MapFormat {
     /// The extensions, for messages.
-    const ENDINGS: &str = ".pfm, .png, .tif, .tiff or .npy";
+    pub const ENDINGS: &str = ".pfm, .png, .tif, .tiff or .npy";
 
     /// The format of an output path.
     ///
     /// # Errors
     /// [`Error::Request`] for an unknown extension.
     pub fn of(path: &Path) -> Result<Self, Error> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        match ending.as_deref() {
-            Some("pfm") => Ok(Self::Pfm),
-            Some("png") => Ok(Self::Png16),
-            Some("tif" | "tiff") => Ok(Self::Tiff),
-            Some("npy") => Ok(Self::Npy),
-            None if is_stream(path) => Ok(Self::Pfm),
-            _ => Err(Error::request(path, &format!("a map ends in {}", Self::ENDINGS))),
+        let format = match path.extension() {
+            Some(ending) => Self::named(&ending.to_string_lossy()),
+            None => is_stream(path).then_some(Self::Pfm),
+        };
+        format.ok_or_else(|| Error::request(path, &format!("a map ends in {}", Self::ENDINGS)))
+    }
+
+    /// The format of files with this extension, which is given without a dot.
+    #[must_use]
+    pub fn named(ending: &str) -> Option<Self> {
+        match ending.to_lowercase().as_str() {
+            "pfm" => Some(Self::Pfm),
+            "png" => Some(Self::Png16),
+            "tif" | "tiff" => Some(Self::Tiff),
+            "npy" => Some(Self::Npy),
+            _ => None,
         }
     }
 

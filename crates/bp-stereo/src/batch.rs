@@ -13,7 +13,7 @@ mod run;
 mod shard;
 mod summary;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use apart::check_apart;
 use job::Job;
@@ -201,7 +201,9 @@ fn match_due(run: &Run<'_>, due: &[&Job<'_>]) -> Result<Vec<Failed>, Error> {
 /// Fails if options contradict each other, if the format of maps is unknown, or if the name of a folder is not UTF-8, which records need.
 fn check(options: &BatchOptions) -> Result<(), Error> {
     options.matching.check()?;
-    MapFormat::of(&Path::new("NAME").with_added_extension(&options.format))?;
+    if MapFormat::named(&options.format).is_none() {
+        return Err(Error::Options(format!("format {}: a map ends in {}", options.format, MapFormat::ENDINGS)));
+    }
     let folder = if let Source::Path(path) = &options.source { Some(path) } else { None };
     for folder in [Some(&options.output), folder].into_iter().flatten() {
         if std::path::absolute(folder).is_ok_and(|folder| folder.to_str().is_none()) {

@@ -146,7 +146,10 @@ fn outputs_that_would_collide_are_refused_before_the_work() {
         folder.fails(&format!("match --pairs list {output} {options} {TINY}"), 2, &words);
     }
     list("left.png right.png\n");
-    folder.fails("match --pairs list --output out --format tiff.gz", 2, &["tiff.gz"]);
+    for format in ["tiff.gz", "../pfm", "/", "x.pfm"] {
+        folder.fails(&format!("match --pairs list --output out --format {format}"), 2, &[format, ".pfm, .png"]);
+        folder.fails(&format!("match --video left*.png right*.png --output out --format {format}"), 2, &[format]);
+    }
     for options in [
         "left.png right.png --shard 1/2",
         "left.png right.png --pairs list",

@@ -132,8 +132,7 @@ impl Job<'_> {
         let ending = name.to_str().zip(pair).and_then(|(name, pair)| name.strip_prefix(pair)?.strip_prefix('.'));
         let Some(ending) = ending.map(|ending| ending.strip_suffix(".json").unwrap_or(ending)) else { return false };
         let map = ["depth.", "confidence."].iter().find_map(|kind| ending.strip_prefix(kind)).unwrap_or(ending);
-        let is_map = !map.contains('.') && MapFormat::of(&Path::new("NAME").with_added_extension(map)).is_ok();
-        is_map || ["picture.png", "points.ply"].contains(&ending)
+        MapFormat::named(map).is_some() || ["picture.png", "points.ply"].contains(&ending)
     }
 }
 
