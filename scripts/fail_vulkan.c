@@ -1,4 +1,4 @@
-/* A Vulkan layer that makes the n-th call to a device fail. scripts/fail-each builds it, and makes the loader use it.
+/* A Vulkan layer that makes the n-th call to an instance or a device fail. scripts/fail-each builds it, and makes the loader use it.
  *
  * BP_FAIL="device N RESULT" makes the N-th call that could lack memory return that VkResult. BP_FAIL="lost N RESULT" makes the N-th
  * call return it that could find the device lost, and every later one on that device.
@@ -58,6 +58,16 @@ static VkResult failure(enum kind kind) {
         return ((PFN_vk##name)next_device(device, "vk" #name)) arguments;        \
     }
 
+/* The same for a call to an instance. Only while an instance is made does the loader give the next layer's function; later it gives
+ * the first layer's. */
+#define INSTANCE(name, parameters, arguments)                                    \
+    static PFN_vkVoidFunction next_##name;                                       \
+    static VKAPI_ATTR VkResult VKAPI_CALL fail_##name parameters {               \
+        VkResult result = failure(DEVICE);                                       \
+        if (result != VK_SUCCESS) return result;                                 \
+        return ((PFN_vk##name)next_##name) arguments;                            \
+    }
+
 /* It may find the device lost, but not before it has waited: otherwise work would go on that nobody waits for. */
 #define WAIT(name, parameters, arguments)                                        \
     static VKAPI_ATTR VkResult VKAPI_CALL fail_##name parameters {               \
@@ -74,6 +84,10 @@ static VkResult failure(enum kind kind) {
         return ((PFN_vk##name)next_device(device, "vk" #name)) arguments;        \
     }
 
+INSTANCE(EnumeratePhysicalDevices, (VkInstance i, uint32_t *n, VkPhysicalDevice *d), (i, n, d))
+INSTANCE(EnumerateDeviceExtensionProperties, (VkPhysicalDevice d, const char *l, uint32_t *n, VkExtensionProperties *p), (d, l, n, p))
+INSTANCE(GetPhysicalDeviceImageFormatProperties, (VkPhysicalDevice d, VkFormat f, VkImageType k, VkImageTiling t, VkImageUsageFlags u, VkImageCreateFlags c, VkImageFormatProperties *p), (d, f, k, t, u, c, p))
+INSTANCE(GetPhysicalDeviceImageFormatProperties2, (VkPhysicalDevice d, const VkPhysicalDeviceImageFormatInfo2 *i, VkImageFormatProperties2 *p), (d, i, p))
 CALL(AllocateMemory, (VkDevice d, const VkMemoryAllocateInfo *i, const VkAllocationCallbacks *a, VkDeviceMemory *m), (d, i, a, m))
 CALL(MapMemory, (VkDevice d, VkDeviceMemory m, VkDeviceSize o, VkDeviceSize s, VkMemoryMapFlags f, void **p), (d, m, o, s, f, p))
 CALL(CreateBuffer, (VkDevice d, const VkBufferCreateInfo *i, const VkAllocationCallbacks *a, VkBuffer *b), (d, i, a, b))
@@ -115,21 +129,32 @@ static const struct { const char *name; PFN_vkVoidFunction function; } CALLS[] =
     ENTRY(QueueWaitIdle), ENTRY(DeviceWaitIdle), ENTRY(FlushMappedMemoryRanges), ENTRY(InvalidateMappedMemoryRanges),
 };
 
+#define INSTANCE_ENTRY(name) {"vk" #name, (PFN_vkVoidFunction)fail_##name, &next_##name}
+static const struct { const char *name; PFN_vkVoidFunction function, *next; } INSTANCE_CALLS[] = {
+    INSTANCE_ENTRY(EnumeratePhysicalDevices), INSTANCE_ENTRY(EnumerateDeviceExtensionProperties),
+    INSTANCE_ENTRY(GetPhysicalDeviceImageFormatProperties), INSTANCE_ENTRY(GetPhysicalDeviceImageFormatProperties2),
+};
+
+#define FOR_EACH(i, calls) for (size_t i = 0; i < sizeof calls / sizeof *calls; i++)
+
 static PFN_vkVoidFunction own_call(const char *name) {
-    for (size_t i = 0; i < sizeof CALLS / sizeof *CALLS; i++)
-        if (!strcmp(name, CALLS[i].name)) return CALLS[i].function;
+    FOR_EACH(i, CALLS) if (!strcmp(name, CALLS[i].name)) return CALLS[i].function;
     return NULL;
 }
 
 static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info, const VkAllocationCallbacks *callbacks, VkInstance *made) {
+    VkResult result = failure(DEVICE);
+    if (result != VK_SUCCESS) return result;
     VkLayerInstanceCreateInfo *chain = (VkLayerInstanceCreateInfo *)info->pNext;
     while (chain && !(chain->sType == VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO && chain->function == VK_LAYER_LINK_INFO))
         chain = (VkLayerInstanceCreateInfo *)chain->pNext;
     if (!chain) return VK_ERROR_INITIALIZATION_FAILED;
     next_instance = chain->u.pLayerInfo->pfnNextGetInstanceProcAddr;
     chain->u.pLayerInfo = chain->u.pLayerInfo->pNext;
-    VkResult result = ((PFN_vkCreateInstance)next_instance(NULL, "vkCreateInstance"))(info, callbacks, made);
-    if (result == VK_SUCCESS) instance = *made;
+    result = ((PFN_vkCreateInstance)next_instance(NULL, "vkCreateInstance"))(info, callbacks, made);
+    if (result != VK_SUCCESS) return result;
+    instance = *made;
+    FOR_EACH(i, INSTANCE_CALLS) *INSTANCE_CALLS[i].next = next_instance(instance, INSTANCE_CALLS[i].name);
     return result;
 }
 
@@ -161,6 +186,7 @@ EXPORT VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL vkGetInstanceProcAddr(VkInstance
     if (!strcmp(name, "vkGetDeviceProcAddr")) return (PFN_vkVoidFunction)vkGetDeviceProcAddr;
     if (!strcmp(name, "vkCreateInstance")) return (PFN_vkVoidFunction)create_instance;
     if (!strcmp(name, "vkCreateDevice")) return (PFN_vkVoidFunction)create_device;
+    FOR_EACH(i, INSTANCE_CALLS) if (!strcmp(name, INSTANCE_CALLS[i].name)) return INSTANCE_CALLS[i].function;
     PFN_vkVoidFunction own = own_call(name);
     return own ? own : next_instance(of, name);
 }

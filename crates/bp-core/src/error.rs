@@ -77,11 +77,11 @@ pub enum Error {
     #[error("{0}")]
     Plan(&'static str),
     /// More memory is needed than is available.
-    #[error("out of memory: {} needed for {what}{}", iec(*needed), but_only(*available))]
+    #[error("out of memory: {} needed for {what}{}", amount(*needed), but_only(*available))]
     OutOfMemory {
         /// The purpose of the memory.
         what: &'static str,
-        /// Bytes needed.
+        /// Bytes needed; 0 if they are not known.
         needed: u64,
         /// Bytes available, if known.
         available: Option<u64>,
@@ -136,6 +136,10 @@ pub enum Error {
 /// Formats a number of bytes with a readable unit.
 fn iec(bytes: u64) -> String {
     ByteSize(bytes).display().iec().to_string()
+}
+
+fn amount(needed: u64) -> String {
+    if needed == 0 { "more".to_owned() } else { iec(needed) }
 }
 
 fn but_only(available: Option<u64>) -> String {

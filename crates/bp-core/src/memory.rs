@@ -65,6 +65,7 @@ fn reserve<T>(what: &'static str, values: &mut Vec<T>, len: usize) -> Result<(),
 const MUCH: usize = 32 << 20;
 
 /// Fewer bytes are not worth a large page, which usually has 2 MiB.
+#[cfg(all(target_os = "linux", not(miri)))]
 const LARGE: usize = 2 << 20;
 
 /// Asks Linux to map memory that was not written yet in large pages. The first write to each page costs a visit to the system;

@@ -91,8 +91,10 @@ impl Chosen {
         let device = backend.open(index)?;
         let open_time = start.elapsed();
         log::debug!("opened device {index} of backend {name} in {open_time:?}");
-        let unlisted =
-            || bp_core::Error::Unavailable { backend: backend.name(), device: index, reason: "not listed".to_owned() };
+        let unlisted = || {
+            let reason = "its driver failed to list it at first and opens it now; run the command again".to_owned();
+            bp_core::Error::Unavailable { backend: backend.name(), device: index, reason }
+        };
         Ok(Opened { name, info: info.ok_or_else(unlisted)?, device, open_time, backend, index, lost: false })
     }
 }
@@ -208,6 +210,29 @@ mod tests {
             uuid: uuid.map(str::to_owned),
             workers: 1,
         }
+    }
+
+    /// A backend whose driver lists no device, as if memory were short for a moment, and then opens it.
+    struct Late;
+
+    impl Backend for Late {
+        fn name(&self) -> &'static str {
+            "late"
+        }
+
+        fn devices(&self) -> Vec<DeviceInfo> {
+            Vec::new()
+        }
+
+        fn open(&self, device: usize) -> Result<Box<dyn Device>, bp_core::Error> {
+            bp_cpu_scalar::Scalar.open(device)
+        }
+    }
+
+    #[test]
+    fn a_device_that_was_not_listed_says_what_to_do() {
+        let error = Opened::of(&Late, 0).err().unwrap().to_string();
+        assert!(error.contains("late") && error.contains("run the command again"), "{error}");
     }
 
     #[test]

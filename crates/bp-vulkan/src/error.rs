@@ -46,6 +46,7 @@ mod tests {
         assert!(other.starts_with("d: making a pipeline: "), "{other}");
         let host = failed("d", "a pipeline", vk::Result::ERROR_OUT_OF_HOST_MEMORY);
         assert!(matches!(host, Error::OutOfMemory { what: "a pipeline", .. }));
+        assert_eq!(host.to_string(), "out of memory: more needed for a pipeline");
         let full = not_allocated("d", "buffers", 7, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         assert_eq!(full, Error::OutOfMemory { what: "buffers", needed: 7, available: None });
         assert!(matches!(not_allocated("d", "x", 7, vk::Result::ERROR_DEVICE_LOST), Error::DeviceLost { .. }));

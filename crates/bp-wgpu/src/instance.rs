@@ -4,16 +4,16 @@ use bp_core::{DeviceInfo, DeviceKind};
 use bp_gpu::missing;
 use wgpu::{Adapter, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
 
-use crate::vulkan;
+use crate::{gpu::caught, vulkan};
 
 /// The APIs through which wgpu may reach devices.
 const BACKENDS: Backends = Backends::VULKAN;
 
-/// All adapters, starting with the probably fastest one. Empty without a driver.
-pub(crate) fn adapters() -> Vec<Adapter> {
+/// All adapters, starting with the probably fastest one. Empty without a driver. The error is the reason as text.
+pub(crate) fn adapters() -> Result<Vec<Adapter>, String> {
     // wgpu panics if no backend for this system is compiled in.
     if !Instance::enabled_backend_features().intersects(BACKENDS) {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let instance = Instance::new(InstanceDescriptor {
         backends: BACKENDS,
@@ -23,9 +23,10 @@ pub(crate) fn adapters() -> Vec<Adapter> {
         // GPU's memory, although the data can lie outside it. `WgpuDevice` itself checks how much is free.
         ..InstanceDescriptor::new_without_display_handle()
     });
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
+    // wgpu panics if a driver fails to list its extensions.
+    let mut adapters = caught(|| pollster::block_on(instance.enumerate_adapters(BACKENDS)))?;
     adapters.sort_by_key(kind);
-    adapters
+    Ok(adapters)
 }
 
 /// The kind of an adapter.
@@ -60,7 +61,8 @@ pub(crate) fn info(adapter: &Adapter) -> DeviceInfo {
 pub(crate) fn missing(count: usize) -> String {
     match count {
         0 if !vulkan::has_loader() => missing::loader(),
-        0 => missing::driver(),
+        // wgpu does not say why a driver lists nothing.
+        0 => format!("{}; if there is one, memory may be short", missing::driver()),
         _ => missing::device(count),
     }
 }

@@ -34,7 +34,7 @@ impl Wgpu {
     /// [`Error::Unavailable`] with the reason.
     pub fn open_with(&self, device: usize, change: impl FnOnce(&mut Limits)) -> Result<Box<dyn Device>, Error> {
         let open = || {
-            let adapters = instance::adapters();
+            let adapters = instance::adapters()?;
             let adapter = adapters.get(device).ok_or_else(|| instance::missing(adapters.len()))?;
             let opened = device::WgpuDevice::open(adapter, change)?;
             bp_gpu::check(&opened)?;
@@ -50,7 +50,7 @@ impl Backend for Wgpu {
     }
 
     fn devices(&self) -> Vec<DeviceInfo> {
-        instance::adapters().iter().map(instance::info).collect()
+        instance::adapters().unwrap_or_default().iter().map(instance::info).collect()
     }
 
     fn open(&self, device: usize) -> Result<Box<dyn Device>, Error> {

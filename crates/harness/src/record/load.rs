@@ -122,6 +122,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn numbers_are_read_as_they_were_written() {
+        let text = "9.406865999999999";
+        assert_eq!(serde_json::from_str::<f64>(text).unwrap().to_string(), text);
+    }
+
+    #[test]
     fn maps_lie_beside_their_record() {
         assert!(is_beside("maps/Baby1-bp.png"));
         for map in
