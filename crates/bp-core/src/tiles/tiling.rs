@@ -197,14 +197,13 @@ impl Tiling {
                 most = most.max(bytes.saturating_add(self.bytes_beside(&tile)));
             }
         }
-        let limit = self.likely.as_ref().map_or(u64::MAX, |likely| likely.bytes);
-        Ok(most.min(limit))
+        Ok(self.likely.as_ref().map_or(most, |likely| most.min(likely.bytes)))
     }
 
     /// The bytes beside those of a tile's driver: a copy of its part of the pair, joining it, and the labels of all tiles.
     fn bytes_beside(&self, tile: &Tile) -> u64 {
-        let labels = 2 * self.plan.image_size().pixels() as u64;
-        tile.pair_bytes(self.plan.model().profile()) + join::bytes(tile.size()) + labels
+        let (profile, pixels) = (self.plan.model().profile(), self.plan.image_size().pixels());
+        tile.pair_bytes(profile) + join::bytes(tile.size()) + 2 * pixels as u64
     }
 
     /// The number of matched pixels.
