@@ -223,39 +223,66 @@ mod tests {
         assert_eq!(border([&same, &same], 2, 1), [1; 2]);
     }
 
-    /// Tiles in any order, with other labels each: every pixel of the image is of a tile that has it.
-    #[test]
-    fn every_pixel_is_written_by_a_tile_that_shares_it() {
-        let spans = |len: usize, kept: usize, halo: usize| -> Vec<Span> {
-            let span = |start: usize| {
-                let end = (start + kept).min(len);
-                Span { all: start.saturating_sub(halo)..(end + halo).min(len), kept: start..end }
-            };
-            (0..len).step_by(kept).map(span).collect()
+    fn spans(len: usize, kept: usize, halo: usize) -> Vec<Span> {
+        let span = |start: usize| {
+            let end = (start + kept).min(len);
+            Span { all: start.saturating_sub(halo)..(end + halo).min(len), kept: start..end }
         };
-        let (width, height) = (170, 125);
+        (0..len).step_by(kept).map(span).collect()
+    }
+
+    fn tiles([width, height]: [usize; 2], [columns, rows]: [usize; 2], halo: usize) -> Vec<Tile> {
+        let (columns, rows) = (spans(width, columns, halo), spans(height, rows, halo));
+        let tile = |columns: &Span, rows: &Span| Tile { columns: columns.clone(), rows: rows.clone(), margin: 0 };
+        columns.iter().flat_map(|columns| rows.iter().map(|rows| tile(columns, rows)).collect::<Vec<_>>()).collect()
+    }
+
+    /// Joins tiles with random labels in this order. Returns the labels of each, and the image.
+    fn joined(tiles: &[Tile], width: usize, height: usize, random: &mut fastrand::Rng) -> (Vec<Vec<u16>>, Vec<u16>) {
+        let mut image = vec![u16::MAX; width * height];
+        let labels: Vec<Vec<u16>> =
+            tiles.iter().map(|tile| (0..tile.size().pixels()).map(|_| random.u16(..4)).collect()).collect();
+        for (index, tile) in tiles.iter().enumerate() {
+            Joint { tile, labels: &labels[index], matched: &tiles[..index], width, image: &mut image }.copy().unwrap();
+        }
+        (labels, image)
+    }
+
+    #[test]
+    fn every_pixel_is_written_in_any_order_of_tiles() {
         for (seed, halo) in [(1, 0), (2, 1), (3, 2), (4, 30), (5, 96)] {
             let mut random = fastrand::Rng::with_seed(seed);
-            let of_columns = |columns: &Span| {
-                spans(height, 32, halo)
-                    .into_iter()
-                    .map(|rows| Tile { columns: columns.clone(), rows, margin: 0 })
-                    .collect::<Vec<_>>()
-            };
-            let mut tiles: Vec<Tile> = spans(width, 32, halo).iter().flat_map(of_columns).collect();
+            let mut tiles = tiles([170, 125], [32, 32], halo);
             random.shuffle(&mut tiles);
-            let mut image = vec![u16::MAX; width * height];
-            for (index, tile) in tiles.iter().enumerate() {
-                // Labels differ by the tile and are random beside.
-                let labels: Vec<u16> =
-                    (0..tile.size().pixels()).map(|_| index as u16 * 100 + random.u16(..50)).collect();
-                Joint { tile, labels: &labels, matched: &tiles[..index], width, image: &mut image }.copy().unwrap();
+            let (_, image) = joined(&tiles, 170, 125, &mut random);
+            assert!(!image.contains(&u16::MAX));
+        }
+    }
+
+    /// Two tiles side by side, then one above the other, in both orders. Their halos reach all over the image.
+    #[test]
+    fn each_side_of_a_border_has_the_labels_of_its_tile() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let across = 32..96;
+        for (width, height, is_reversed) in [(128, 40, false), (128, 40, true), (40, 128, false), (40, 128, true)] {
+            let mut tiles = tiles([width, height], [64, 64], 64);
+            let [first, second] = if is_reversed { [1, 0] } else { [0, 1] };
+            if is_reversed {
+                tiles.reverse();
             }
-            for (at, label) in image.into_iter().enumerate() {
-                let tile = tiles.get(usize::from(label / 100)).unwrap();
-                let shared =
-                    [tile.columns.shared().contains(&(at % width)), tile.rows.shared().contains(&(at / width))];
-                assert_eq!(shared, [true; 2], "{at} {tile:?}");
+            let (labels, image) = joined(&tiles, width, height, &mut random);
+            let place = |across, along| if width == 128 { along * width + across } else { across * width + along };
+            let overlap = Overlap {
+                across: across.clone(),
+                along: 0..40,
+                first: |across, along| labels[first][place(across, along)],
+                second: |across, along| labels[second][place(across, along)],
+            };
+            for (along, border) in overlap.border().unwrap().into_iter().enumerate() {
+                for across in 0..128 {
+                    let tile = if across < border { first } else { second };
+                    assert_eq!(image[place(across, along)], labels[tile][place(across, along)], "{across} {along}");
+                }
             }
         }
     }
