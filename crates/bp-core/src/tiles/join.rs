@@ -248,6 +248,15 @@ mod tests {
         (labels, image)
     }
 
+    /// However the labels are: what the neighbour on one side may keep ends before what the other one may keep begins.
+    #[test]
+    fn the_borders_of_a_tile_never_cross() {
+        for halo in [0, 1, 16, 96] {
+            let spans = spans(300, 32, halo);
+            assert!(spans.windows(3).all(|three| three[0].shared().end <= three[2].shared().start), "{halo}");
+        }
+    }
+
     #[test]
     fn every_pixel_is_written_in_any_order_of_tiles() {
         for (seed, halo) in [(1, 0), (2, 1), (3, 2), (4, 30), (5, 96)] {
