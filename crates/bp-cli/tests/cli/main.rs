@@ -7,6 +7,7 @@ mod folder;
 mod hostile;
 mod manners;
 mod many;
+mod nobody;
 mod outputs;
 mod quality;
 mod recorded;
