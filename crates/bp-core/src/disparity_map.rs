@@ -62,6 +62,17 @@ impl DisparityMap {
         self.replaced(|values| values.iter_mut().filter(|value| value.is_finite()).for_each(limit))
     }
 
+    /// Makes the pixels unknown that are not valid, `[height][width]`.
+    ///
+    /// # Panics
+    /// If `valid` does not hold one value per pixel.
+    pub fn restrict(&mut self, valid: &[bool]) {
+        assert_eq!(valid.len(), self.size.pixels(), "one value a pixel");
+        for (value, _) in self.values.iter_mut().zip(valid).filter(|(_, valid)| !**valid) {
+            *value = Self::UNKNOWN;
+        }
+    }
+
     /// The map after `change` has edited its values. `change` must set non-finite values to [`DisparityMap::UNKNOWN`].
     pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
         change(&mut self.values);

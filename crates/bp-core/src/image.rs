@@ -1,14 +1,19 @@
 //! Images.
 
-use std::{borrow::Cow, ops::Range, sync::Arc};
+use std::{borrow::Cow, ops::Range};
 
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use crate::{Error, Size, limits::MAX_SIDE, memory};
 
+mod plane;
+mod samples;
 mod shades;
 
+use plane::Plane;
+
+pub use samples::{Samples, Stretch};
 pub use shades::{NotAShade, common_factor, factor_to_8_bits, narrow, scaled};
 
 /// The most rows of an apron (see [`Image::strip`]): no data cost reads rows further up or down.
@@ -41,10 +46,10 @@ pub struct Image {
     /// The rows of the apron above and below the image.
     above: usize,
     below: usize,
-    /// Grey values `[above + height + below][width]`. Clones share them.
-    greys: Arc<Vec<u8>>,
+    /// Grey values `[above + height + below][width]`.
+    greys: Plane,
     /// Colours, in the same order; `None` if all pixels are grey.
-    colours: Option<Arc<Vec<[u8; 3]>>>,
+    colours: Option<Plane>,
 }
 
 impl Image {
@@ -58,14 +63,27 @@ impl Image {
     /// # Errors
     /// As [`Size::new`]; [`Error::PixelCount`] if `pixels` does not hold `width * height` colours, [`Error::OutOfMemory`].
     pub fn from_rgb(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Result<Self, Error> {
-        let size = Size::new(width, height)?;
-        if pixels.len() != size.pixels() {
-            return Err(Error::PixelCount { size, found: pixels.len() });
+        Self::of_colours(width, height, pixels.into())
+    }
+
+    /// An image of colours in the caller's memory, three bytes a pixel, `[height][width][3]`. They are read there for as long as the
+    /// image or a clone lives, and must not change meanwhile.
+    ///
+    /// # Errors
+    /// As [`Image::from_rgb`].
+    pub fn lent_rgb(width: usize, height: usize, bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, Error> {
+        Self::of_colours(width, height, Plane::lent(bytes))
+    }
+
+    fn of_colours(width: usize, height: usize, colours: Plane) -> Result<Self, Error> {
+        let (size, pixels) = (Size::new(width, height)?, colours.colours());
+        if colours.len() != 3 * size.pixels() {
+            return Err(Error::PixelCount { size, found: colours.len().div_ceil(3) });
         }
         let mut greys = memory::filled("grey values", pixels.len(), 0)?;
         let parts = greys.par_chunks_mut(TOGETHER).zip(pixels.par_chunks(TOGETHER));
         let is_grey = parts.map(|(greys, pixels)| write_greys(pixels, greys)).reduce(|| true, |a, b| a && b);
-        let colours = (!is_grey).then(|| pixels.into());
+        let colours = (!is_grey).then_some(colours);
         Ok(Self { size, above: 0, below: 0, greys: greys.into(), colours })
     }
 
@@ -74,18 +92,31 @@ impl Image {
     /// # Errors
     /// As [`Image::from_rgb`].
     pub fn from_grey(width: usize, height: usize, values: impl Into<Vec<u8>>) -> Result<Self, Error> {
-        let (size, greys) = (Size::new(width, height)?, values.into());
+        Self::of_greys(width, height, values.into().into())
+    }
+
+    /// An image of grey values in the caller's memory, `[height][width]`. They are read there for as long as the image or a clone
+    /// lives, and must not change meanwhile.
+    ///
+    /// # Errors
+    /// As [`Image::from_grey`].
+    pub fn lent_grey(width: usize, height: usize, bytes: impl AsRef<[u8]> + Send + 'static) -> Result<Self, Error> {
+        Self::of_greys(width, height, Plane::lent(bytes))
+    }
+
+    fn of_greys(width: usize, height: usize, greys: Plane) -> Result<Self, Error> {
+        let size = Size::new(width, height)?;
         if greys.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: greys.len() });
         }
-        Ok(Self { size, above: 0, below: 0, greys: greys.into(), colours: None })
+        Ok(Self { size, above: 0, below: 0, greys, colours: None })
     }
 
     /// The image mirrored left to right.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let width = self.size.width;
-        let colours = self.colours.as_ref().map(|colours| mirrored(width, colours).into());
+        let colours = self.colours.as_ref().map(|colours| mirrored(width, colours.colours()).into());
         Self { greys: mirrored(width, &self.greys).into(), colours, ..*self }
     }
 
@@ -101,10 +132,10 @@ impl Image {
         self.size
     }
 
-    /// The bytes held, which clones share.
+    /// The bytes held, which clones share, without those that the caller lent.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        memory::bytes(&self.greys) + self.colours.as_ref().map_or(0, |colours| memory::bytes(colours))
+        self.greys.held() + self.colours.as_ref().map_or(0, Plane::held)
     }
 
     /// Whether the image has no colours.
@@ -122,7 +153,7 @@ impl Image {
     /// All colours, `[height][width]`, without those of an apron; `None` if all pixels are grey.
     #[must_use]
     pub fn colours(&self) -> Option<&[[u8; 3]]> {
-        let colours = self.colours.as_ref()?;
+        let colours = self.colours.as_ref()?.colours();
         Some(&colours[self.above * self.size.width..][..self.size.pixels()])
     }
 
@@ -142,7 +173,7 @@ impl Image {
     /// As [`Image::greys_near`], the colours; `None` if all pixels are grey.
     #[must_use]
     pub fn colours_near(&self, y: isize) -> Option<&[[u8; 3]]> {
-        self.colours.as_ref().map(|colours| &colours[self.row_near(y)])
+        self.colours.as_ref().map(|colours| &colours.colours()[self.row_near(y)])
     }
 
     fn row_near(&self, y: isize) -> Range<usize> {
@@ -199,7 +230,7 @@ impl Image {
             above,
             below,
             greys: part_of(&self.greys, width, &columns, &known).into(),
-            colours: self.colours.as_ref().map(|colours| part_of(colours, width, &columns, &known).into()),
+            colours: self.colours.as_ref().map(|colours| part_of(colours.colours(), width, &columns, &known).into()),
         }
     }
 
@@ -231,8 +262,8 @@ impl PartialEq for Image {
         let rows = -(self.above as isize)..(self.size.height + self.below) as isize;
         let is_same = |y: isize| (0..self.size.width as isize).all(|x| self.rgb_near(x, y) == other.rgb_near(x, y));
         shape(self) == shape(other)
-            && self.greys == other.greys
-            && (self.colours == other.colours || rows.into_iter().all(is_same))
+            && *self.greys == *other.greys
+            && (self.colours.as_deref() == other.colours.as_deref() || rows.into_iter().all(is_same))
     }
 }
 
@@ -309,6 +340,25 @@ mod tests {
         // Another colour of the same grey.
         let other = Image::from_rgb(3, 1, vec![[7; 3], [9; 3], [254, 0, 0]]).unwrap();
         assert!(other.greys() == coloured.greys() && other != coloured);
+    }
+
+    #[test]
+    fn lent_values_are_read_where_they_lie() {
+        let values = vec![7, 9, 76, 1, 2, 3];
+        let place = values.as_ptr();
+        let grey = Image::lent_grey(3, 2, values.clone()).unwrap();
+        assert_eq!((&grey, grey.bytes()), (&Image::from_grey(3, 2, values.clone()).unwrap(), 0));
+        let coloured = Image::lent_rgb(1, 2, values).unwrap();
+        assert_eq!(coloured, Image::from_rgb(1, 2, vec![[7, 9, 76], [1, 2, 3]]).unwrap());
+        assert_eq!((coloured.colours().unwrap().as_ptr().cast(), coloured.bytes()), (place, 2));
+        let clone = coloured.clone();
+        drop(coloured);
+        assert_eq!(clone.colours_near(0).unwrap().as_ptr().cast(), place);
+        // Copies are ours.
+        assert_eq!([clone.mirrored().bytes(), clone.strip(1..2).bytes()], [8, 8]);
+        for wrong in [Image::lent_rgb(2, 1, [0; 7]), Image::lent_grey(2, 1, [0; 3])] {
+            assert!(matches!(wrong, Err(Error::PixelCount { .. })));
+        }
     }
 
     /// Seven rows, each filled with its own index.

@@ -96,7 +96,7 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
 
-const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; save others so, or floats as PFM";
+const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; save others so, or `stretch` grey floats";
 
 /// Why a file could not be decoded.
 fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Error {

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use bp_core::{Image, Size, image::narrow};
+use bp_core::{
+    Image, Size,
+    image::{Samples, narrow},
+};
 use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
 use sha2::{Digest, Sha256};
 
@@ -10,6 +13,7 @@ use crate::{
     Contents, Error, Files, Limits,
     caught::caught,
     decode::{check_unscaled, decode, decoded},
+    maps::floats,
     pfm,
 };
 
@@ -44,6 +48,32 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
     }
     let decoded = decoded(path, || decode(path, bytes, limit))?;
     converted(path, decoded, in_8_bits)?.map_err(|error| Error::reading(path, &error))
+}
+
+/// Parses an image whose values have any range, grey or colour: as [`parse_image`], and TIFF and NPY of floats.
+///
+/// # Errors
+/// Those of [`read_image`].
+pub fn parse_samples(path: &Path, bytes: &[u8], limit: Limits) -> Result<Samples, Error> {
+    let (size, values) = if pfm::is_pfm(bytes) {
+        let pfm = pfm::parse(path, bytes, limit)?;
+        (pfm.size, pfm.values)
+    } else if let Some(floats) = floats(path, bytes, limit)? {
+        floats
+    } else {
+        let decoded = decoded(path, || decode(path, bytes, limit))?;
+        let channels = if decoded.color().has_color() { 3 } else { 1 };
+        let values = u64::from(decoded.width()) * u64::from(decoded.height()) * channels * 4;
+        // The file, what was decoded, and the values.
+        limit.check_memory(path, bytes.len() as u64 + decoded.as_bytes().len() as u64 + values)?;
+        (size(path, &decoded)?, converted(path, decoded, in_floats)?)
+    };
+    Samples::new(size, values).map_err(|error| Error::reading(path, &error))
+}
+
+/// The values from 0 to 1, of one channel or three.
+fn in_floats(image: DynamicImage) -> Vec<f32> {
+    if image.color().has_color() { image.into_rgb32f().into_raw() } else { image.to_luma32f().into_raw() }
 }
 
 /// Converts pixels. The crate `image` 0.25.10 panics if there is no memory for them.

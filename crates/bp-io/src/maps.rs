@@ -10,24 +10,27 @@ use crate::{
     decode::decoded,
     images::{StoredGrey, stored_grey},
     npy, pfm,
-    sidecar::{sidecar_of, told_quantity},
+    sidecar::{Told, sidecar_of, told},
     tiff,
 };
 
 /// Reads a disparity map. Stored integers are divided by `scale`, by default 256 for 16 bits and 1 for 8 bits; 0 means
 /// unknown. Floats are divided by `scale` if it is given; values that are not finite are unknown.
 ///
-/// Refuses the map if its sidecar says that it holds another quantity.
+/// Refuses the map if its sidecar says that it holds another quantity. If the sidecar says that values are negated, so are those
+/// that are read.
 ///
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
 pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<DisparityMap, Error> {
-    if let Some(quantity) = told_quantity(path)?.filter(|told| told != Quantity::Disparity.name()) {
+    let told = told(path)?;
+    if let Some(Told { quantity, .. }) = told.as_ref().filter(|told| told.quantity != Quantity::Disparity.name()) {
         let sidecar = sidecar_of(path);
         let what = format!("it holds {quantity}, as {} tells, and disparities are needed", sidecar.display());
         return Err(Error::reading(path, &what));
     }
-    parse_map(path, &Contents::of_pixels(path, limit)?.bytes, scale, limit)
+    let sign = if told.is_some_and(|told| told.is_negated) { -1.0 } else { 1.0 };
+    parse_signed(path, &Contents::of_pixels(path, limit)?.bytes, scale, sign, limit)
 }
 
 /// Parses a map in memory; messages call it `path`.
@@ -35,11 +38,22 @@ pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<Dispar
 /// # Errors
 /// Those of [`read_map`].
 pub fn parse_map(path: &Path, bytes: &[u8], scale: Option<f32>, limit: Limits) -> Result<DisparityMap, Error> {
+    parse_signed(path, bytes, scale, 1.0, limit)
+}
+
+/// [`parse_map`], with all values multiplied by `sign`.
+fn parse_signed(
+    path: &Path,
+    bytes: &[u8],
+    scale: Option<f32>,
+    sign: f32,
+    limit: Limits,
+) -> Result<DisparityMap, Error> {
     let (size, values) = match floats(path, bytes, limit)? {
-        Some((size, values)) => (size, values.into_iter().map(|value| value / scale.unwrap_or(1.0)).collect()),
+        Some((size, values)) => (size, values.into_iter().map(|value| value / (sign * scale.unwrap_or(1.0))).collect()),
         None => {
             let StoredGrey { size, values, has_16_bits } = stored_grey(path, bytes, limit)?;
-            let scale = scale.unwrap_or(if has_16_bits { 256.0 } else { 1.0 });
+            let scale = sign * scale.unwrap_or(if has_16_bits { 256.0 } else { 1.0 });
             let disparity = |value: u16| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / scale };
             (size, values.into_iter().map(disparity).collect())
         }
@@ -48,7 +62,7 @@ pub fn parse_map(path: &Path, bytes: &[u8], scale: Option<f32>, limit: Limits) -
 }
 
 /// The values of a file, if it holds floats.
-fn floats(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
+pub(crate) fn floats(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
     if pfm::is_pfm(bytes) {
         return pfm::parse(path, bytes, limit)?.into_map(path).map(Some);
     }

@@ -18,13 +18,15 @@ pub struct Raster<'a> {
     pub quantity: Quantity,
     /// Whether the formats TIFF and NPY hold NaN for unknown, and not plus infinity.
     pub nan: bool,
+    /// Whether the file holds the negative of each known value.
+    pub negate: bool,
 }
 
 impl<'a> Raster<'a> {
     /// The disparities of a map.
     #[must_use]
     pub fn disparities(map: &'a DisparityMap) -> Self {
-        Self { size: map.size(), values: map.values(), quantity: Quantity::Disparity, nan: false }
+        Self { size: map.size(), values: map.values(), quantity: Quantity::Disparity, nan: false, negate: false }
     }
 
     /// The least and the largest known value.
@@ -34,6 +36,11 @@ impl<'a> Raster<'a> {
         known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
+    /// What the stored values are multiplied by to get the values: 1, or -1 if they are negated.
+    pub(crate) fn sign(&self) -> f32 {
+        if self.negate { -1.0 } else { 1.0 }
+    }
+
     /// Whether a format holds NaN for unknown.
     pub(crate) fn has_nan(&self, format: MapFormat) -> bool {
         self.nan && matches!(format, MapFormat::Tiff | MapFormat::Npy)
@@ -41,10 +48,11 @@ impl<'a> Raster<'a> {
 
     /// The values as a format of floats holds them.
     fn stored(&self, format: MapFormat) -> Cow<'a, [f32]> {
-        if !self.has_nan(format) {
+        let unknown = if self.has_nan(format) { f32::NAN } else { DisparityMap::UNKNOWN };
+        if !self.negate && !unknown.is_nan() {
             return Cow::Borrowed(self.values);
         }
-        self.values.iter().map(|&value| if value.is_finite() { value } else { f32::NAN }).collect()
+        self.values.iter().map(|&value| if value.is_finite() { self.sign() * value } else { unknown }).collect()
     }
 
     /// Encodes the values in memory, in a format of floats. `None` for [`MapFormat::Png16`], which rounds.

@@ -28,8 +28,15 @@ pub fn sidecar_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// The quantity that a map's sidecar names; `None` if there is no sidecar of this program. Fails if one cannot be read.
-pub(crate) fn told_quantity(path: &Path) -> Result<Option<String>, Error> {
+/// What the sidecar of a map says of it.
+pub(crate) struct Told {
+    pub(crate) quantity: String,
+    /// Whether the map holds the negative of each value.
+    pub(crate) is_negated: bool,
+}
+
+/// What a map's sidecar says; `None` if there is no sidecar of this program. Fails if one cannot be read.
+pub(crate) fn told(path: &Path) -> Result<Option<Told>, Error> {
     let path = sidecar_of(path);
     match path.metadata() {
         Ok(about) if about.is_file() && about.len() <= MOST_DESCRIPTION => {}
@@ -37,10 +44,12 @@ pub(crate) fn told_quantity(path: &Path) -> Result<Option<String>, Error> {
         _ => return Ok(None),
     }
     let bytes = Contents::of(&path, MOST_DESCRIPTION)?.bytes;
-    let told = || -> Option<String> {
+    let told = || -> Option<Told> {
         let sidecar: Value = serde_json::from_slice(&bytes).ok()?;
         let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
-        Some(sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned())
+        let quantity = sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned();
+        let is_negated = sidecar.get("scale").and_then(Value::as_f64).is_some_and(|scale| scale < 0.0);
+        Some(Told { quantity, is_negated })
     };
     Ok(told())
 }
@@ -52,7 +61,7 @@ pub(crate) fn told_quantity(path: &Path) -> Result<Option<String>, Error> {
 /// [`Error::Write`].
 pub fn put_described(files: &Files, path: &Path, map: Staged, sidecar: Option<Staged>) -> Result<(), Error> {
     // Not another program's file of that name. Where the sidecar is a link, the link stays.
-    let old = told_quantity(path)?.map(|_| files.hide(&sidecar_of(path))).transpose()?;
+    let old = told(path)?.map(|_| files.hide(&sidecar_of(path))).transpose()?;
     let place = match map.moved() {
         Ok(place) => place,
         Err(error) => {
@@ -161,6 +170,7 @@ pub fn staged_sidecar<P: Serialize>(
         _ if raster.has_nan(format) => (1.0, Unknown::Text("nan")),
         MapFormat::Pfm | MapFormat::Tiff | MapFormat::Npy => (1.0, Unknown::Text("inf")),
     };
+    let scale = f64::from(raster.sign()) * scale;
     staged(files, path, raster, origin, Stored { format: format.name(), scale, offset: 0.0, unknown, colours: None })
 }
 

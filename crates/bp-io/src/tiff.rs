@@ -10,9 +10,13 @@ use tiff::{
     ColorType, TiffError, TiffResult,
     decoder::{Decoder, DecodingResult},
     encoder::{TiffEncoder, colortype::Gray32Float},
+    tags::Tag,
 };
 
 use crate::{Error, Limits, headers::tiff_lists};
+
+/// The tag with the text of the value that means none, by GDAL.
+const NO_DATA: Tag = Tag::Unknown(42113);
 
 /// Encodes values `[height][width]` as 32-bit floats.
 pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
@@ -21,7 +25,7 @@ pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
     Ok(file.into_inner())
 }
 
-/// The floats `[height][width]` of a grey file; `None` if it holds something else.
+/// The floats `[height][width]` of a grey file, NaN for those that it declares as missing; `None` if it holds something else.
 pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(Size, Vec<f32>)>, Error> {
     let failed = |error: TiffError| match error {
         TiffError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
@@ -38,16 +42,21 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
     // The values, and as many bytes of a strip or of the floats that doubles are converted to.
     let needed = 2 * u64::from(bits / 8) * size.pixels() as u64;
     limit.check_memory(path, needed.saturating_add(lists + bytes.len() as u64))?;
+    let no_data = decoder.get_tag_ascii_string(NO_DATA).ok();
+    let no_data = no_data.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok()).map(|value: f64| value as f32);
     let mut limits = tiff::decoder::Limits::default();
     limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
-    let values = match decoder.with_limits(limits).read_image().map_err(failed)? {
+    let mut values = match decoder.with_limits(limits).read_image().map_err(failed)? {
         DecodingResult::F32(values) => values,
         DecodingResult::F64(values) => values.into_iter().map(|value| value as f32).collect(),
         _ => return Err(Error::reading(path, &"a TIFF map holds 8 or 16 bits, or floats of 32 or 64")),
     };
     if values.len() != size.pixels() {
         return Err(Error::reading(path, &format!("{} values where {size} pixels were expected", values.len())));
+    }
+    if let Some(missing) = no_data {
+        values.iter_mut().filter(|value| **value == missing).for_each(|value| *value = f32::NAN);
     }
     Ok(Some((size, values)))
 }

@@ -2,8 +2,9 @@
 
 use bp_core::{
     DisparityMap, Image, Size, StereoPair,
-    image::{common_factor, factor_to_8_bits, narrow, scaled},
+    image::{Samples, Stretch, common_factor, factor_to_8_bits, narrow, scaled},
 };
+use bp_stereo::ReadPair;
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
     ndarray::{ArrayView2, Axis, Ix3},
@@ -13,15 +14,30 @@ use pyo3::{
     prelude::*,
 };
 
-use crate::errors::raised;
+use crate::{errors::raised, lent::lent};
 
 /// A pair of images from arrays `[height][width]`, `[height][width][1]` or `[height][width][3]` (red, green, blue) of uint8,
-/// uint16 or float32 with any strides. Values are read where NumPy keeps them, without another array between. Floats of
-/// both images have one scale.
+/// uint16 or float32 with any strides. Bytes without gaps stay where they are; others are converted. Floats of both images have one
+/// scale.
 pub(crate) fn pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<StereoPair> {
     let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
     let factor = common_factor([left.factor()?, right.factor()?]);
     StereoPair::new(left.image(factor)?, right.image(factor)?).map_err(raised)
+}
+
+/// A pair from such arrays whose values have any range, by one scale for both images.
+pub(crate) fn stretched_pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<ReadPair> {
+    let (left, right) = (Pixels::of("left", left)?.samples()?, Pixels::of("right", right)?.samples()?);
+    let (stretch, valid) = (Stretch::of(&[&left, &right]), left.valid());
+    let image = |samples: Samples| samples.stretched(&stretch).map_err(raised);
+    Ok(ReadPair { pair: StereoPair::new(image(left)?, image(right)?).map_err(raised)?, valid })
+}
+
+/// The address at which the values of an image are read: the array's own, unless they are copied. For tests.
+#[pyfunction]
+pub(crate) fn _read_at(image: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let image = self::image("image", image)?;
+    Ok(image.colours().map_or_else(|| image.greys().as_ptr(), |colours| colours.as_ptr().cast()).addr())
 }
 
 /// One image from such an array. `name` is the argument, for messages.
@@ -80,9 +96,39 @@ impl<'py> Pixels<'py> {
         Ok(Some(factor))
     }
 
+    /// The values as floats; those of integers go from 0 to 1.
+    fn samples(&self) -> PyResult<Samples> {
+        match &self.values {
+            Values::Bytes(array) => self.gathered(array, |value| f32::from(value) / f32::from(u8::MAX)),
+            Values::Words(array) => self.gathered(array, |value| f32::from(value) / f32::from(u16::MAX)),
+            Values::Floats(array) => self.gathered(array, |value| value),
+        }
+    }
+
+    fn gathered<T: Element + Copy + Default>(
+        &self,
+        array: &Bound<'_, PyArrayDyn<T>>,
+        float: impl Fn(T) -> f32,
+    ) -> PyResult<Samples> {
+        let mut values = Vec::new();
+        values.try_reserve_exact(array.len()).map_err(|_| self.no_room())?;
+        for_each_row(array, |row| {
+            values.extend(row.iter().map(|&value| float(value)));
+            Ok(())
+        })?;
+        Samples::new(self.size, values).map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
+    }
+
+    fn no_room(&self) -> PyErr {
+        PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size))
+    }
+
     fn image(&self, factor: f32) -> PyResult<Image> {
         match &self.values {
-            Values::Bytes(array) => self.converted(array, |value| value),
+            Values::Bytes(array) => match lent(self.size, array) {
+                Some(image) => image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name))),
+                None => self.converted(array, |value| value),
+            },
             Values::Words(array) => self.converted(array, narrow),
             Values::Floats(array) => self.converted(array, |value| scaled(value, factor)),
         }
@@ -95,10 +141,9 @@ impl<'py> Pixels<'py> {
         stored: impl Fn(T) -> u8,
     ) -> PyResult<Image> {
         let Size { width, height } = self.size;
-        let no_room = |_| PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size));
         let image = if let [_, _, 3] = array.shape() {
             let mut colours = Vec::new();
-            colours.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
+            colours.try_reserve_exact(self.size.pixels()).map_err(|_| self.no_room())?;
             for_each_row(array, |row| {
                 colours.extend(row.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored)));
                 Ok(())
@@ -106,7 +151,7 @@ impl<'py> Pixels<'py> {
             Image::from_rgb(width, height, colours)
         } else {
             let mut greys = Vec::new();
-            greys.try_reserve_exact(self.size.pixels()).map_err(no_room)?;
+            greys.try_reserve_exact(self.size.pixels()).map_err(|_| self.no_room())?;
             for_each_row(array, |row| {
                 greys.extend(row.iter().map(|&value| stored(value)));
                 Ok(())

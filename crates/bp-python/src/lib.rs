@@ -8,6 +8,7 @@ mod attended;
 mod calibration;
 mod errors;
 mod files;
+mod lent;
 mod matcher;
 mod options;
 mod rectifier;
@@ -20,6 +21,7 @@ use pyo3::{prelude::*, types::PyList};
 mod _bpstereo {
     #[pymodule_export]
     use super::{
+        arrays::_read_at,
         calibration::Calibration,
         devices,
         errors::{BackendUnavailable, DeviceError, PairWarning},

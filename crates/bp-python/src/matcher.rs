@@ -6,16 +6,16 @@ use std::{
     sync::{Mutex, MutexGuard, TryLockError},
 };
 
-use bp_stereo::{Disparity, Start, description};
+use bp_stereo::{Beside, Disparity, ReadPair, Start, description};
 use numpy::PyArray2;
 use pyo3::{exceptions::PyRuntimeError, prelude::*, types::PyDict};
 use pythonize::pythonize;
 
 use crate::{
-    arrays::{fill, pair, plane, target},
+    arrays::{fill, pair, plane, stretched_pair, target},
     attended::attended,
     errors::{PairWarning, raised},
-    options::options,
+    options::{STRETCH, options, stretch},
 };
 
 /// The disparity map of a rectified pair: float32 [height][width] in pixels, NaN where it is unknown.
@@ -52,10 +52,11 @@ pub(crate) fn match_pair<'py>(
 /// of the same size.
 ///
 /// Options, all with a default: `algorithm` ("sweep", or one of the thesis, such as "cfbp"), `quality` ("fast",
-/// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels`
+/// "balanced" or "best"), `stretch` (False), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels`
 /// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`,
 /// `confidence`, `energy`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes).
-/// The library's documentation describes them; `options` shows their values.
+/// The library's documentation describes them; `options` shows their values. With `stretch`, the values of both images have any
+/// range: by one scale, the 0.5 % darkest become black and the 0.5 % brightest white, and where `left` is NaN, so is the map.
 ///
 /// >>> matcher = bpstereo.Matcher(labels=16, confidence=True)
 /// >>> disparity = matcher.compute(left, right)
@@ -68,6 +69,7 @@ pub(crate) struct Matcher(Mutex<State>);
 
 struct State {
     matcher: ManuallyDrop<bp_stereo::Matcher>,
+    stretch: bool,
     /// The process that opened the device. Threads do not survive a fork.
     process: u32,
     answer: Option<Answer>,
@@ -84,9 +86,9 @@ impl Matcher {
     #[new]
     #[pyo3(signature = (**options))]
     fn new(py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let options = self::options(options)?;
-        let matcher = py.detach(|| bp_stereo::Matcher::new(&options)).map_err(raised)?;
-        Ok(Self(Mutex::new(State { matcher: ManuallyDrop::new(matcher), process: process::id(), answer: None })))
+        let (stretch, options) = stretch(options)?;
+        let matcher = opened(py, &self::options(options.as_ref())?, stretch)?;
+        Ok(Self(Mutex::new(State { matcher, stretch, process: process::id(), answer: None })))
     }
 
     /// The disparity map of a pair, as `match` returns it.
@@ -107,11 +109,12 @@ impl Matcher {
         let mut state = self.state()?;
         let state = &mut *state;
         state.answer = None;
-        let pair = pair(left, right)?;
+        let ReadPair { pair, valid } = state.pair(left, right)?;
         out.map_or(Ok(()), |out| target(out, pair.size()).map(drop))?;
         state.reopen_after_fork(py)?;
         let (matcher, start) = (&mut state.matcher, if warm { Start::Warm } else { Start::Cold });
-        let solved = attended(py, progress, |watch, attend| matcher.compute_attended(&pair, start, watch, attend))?;
+        let mut solved = attended(py, progress, |watch, attend| matcher.compute_attended(&pair, start, watch, attend))?;
+        valid.iter().for_each(|valid| solved.restrict(valid));
         let described = description::Answer::from(&solved);
         let Disparity { map, confidence, .. } = solved;
         let confidence = confidence.map(|values| plane(py, pair.size(), values)).transpose()?.map(Bound::unbind);
@@ -128,7 +131,7 @@ impl Matcher {
     /// own and the arrays. Nothing is matched. MemoryError if it does not fit.
     fn peak_bytes(&self, py: Python<'_>, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<u64> {
         let mut state = self.state()?;
-        let pair = pair(left, right)?;
+        let ReadPair { pair, .. } = state.pair(left, right)?;
         state.reopen_after_fork(py)?;
         // A matcher may go to another thread, but not be shared with one.
         let matcher = &mut *state.matcher;
@@ -169,7 +172,10 @@ impl Matcher {
     /// All options with their values.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(pythonize(py, self.state()?.matcher.options())?)
+        let state = self.state()?;
+        let options = pythonize(py, state.matcher.options())?;
+        options.set_item(STRETCH, state.stretch)?;
+        Ok(options)
     }
 
     /// The device: its name, kind, driver and number of threads.
@@ -202,14 +208,26 @@ impl Matcher {
     }
 }
 
+/// A matcher that knows what will be in memory beside it.
+fn opened(py: Python<'_>, options: &bp_stereo::Options, stretch: bool) -> PyResult<ManuallyDrop<bp_stereo::Matcher>> {
+    let beside = Beside { masked: stretch, ..Beside::default() };
+    let matcher = py.detach(|| bp_stereo::Matcher::new(options)).map_err(raised)?;
+    Ok(ManuallyDrop::new(matcher.beside(beside)))
+}
+
 impl State {
+    /// The pair that two arrays hold.
+    fn pair(&self, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<ReadPair> {
+        if self.stretch { stretched_pair(left, right) } else { pair(left, right).map(Into::into) }
+    }
+
     /// In a child process, opens the device again: its threads have stayed with the parent.
     fn reopen_after_fork(&mut self, py: Python<'_>) -> PyResult<()> {
         if self.process == process::id() {
             return Ok(());
         }
         let options = self.matcher.options().clone();
-        self.matcher = ManuallyDrop::new(py.detach(|| bp_stereo::Matcher::new(&options)).map_err(raised)?);
+        self.matcher = opened(py, &options, self.stretch)?;
         self.process = process::id();
         Ok(())
     }

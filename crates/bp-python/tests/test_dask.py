@@ -73,6 +73,8 @@ def test_what_cannot_work_is_told_at_once():
     for wrong in [{"labels": "auto"}, {"labels": 16, "labls": 3}, {"labels": 16, "median": 4}]:
         with pytest.raises(ValueError):
             bpstereo.dask.match(*images, **wrong)
+    with pytest.raises(ValueError, match="scale"):
+        bpstereo.dask.match(*images, labels=16, stretch=True)
     with pytest.raises(ValueError, match="shape"):
         bpstereo.dask.match(images[0], images[1][:10], labels=16)
 

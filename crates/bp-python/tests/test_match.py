@@ -56,6 +56,36 @@ def test_strides_make_no_difference():
                 assert numpy.array_equal(bpstereo.match(strange, other, labels=8), expected, equal_nan=True)
 
 
+def test_values_of_any_range_are_stretched_as_by_the_program(program, tmp_path, pair):
+    wide = [image.astype(numpy.float32) * 2.5 - 40 for image in pair]
+    wide[0][:6] = numpy.nan
+    for name, image in zip(["left.npy", "right.npy"], wide):
+        numpy.save(tmp_path / name, image)
+    command = [program, "match", "left.npy", "right.npy", "-o", "map.npy", "--stretch", "--unknown", "nan", "--quiet", "--confidence", "trust.npy"]
+    subprocess.run(list(map(str, command)), cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
+    expected = numpy.load(tmp_path / "map.npy")
+    assert numpy.isnan(expected[:6]).all() and numpy.isfinite(expected[6:]).all()
+    matcher = bpstereo.Matcher(stretch=True, confidence=True)
+    assert matcher.options["stretch"] is True and bpstereo.Matcher().options["stretch"] is False
+    assert matcher.compute(*wide).tobytes() == expected.tobytes()
+    assert matcher.confidence.tobytes() == numpy.load(tmp_path / "trust.npy").tobytes()
+    assert bpstereo.match(*wide, stretch=True).tobytes() == expected.tobytes()
+    with pytest.raises(ValueError, match="left"):
+        bpstereo.match(*wide)
+    with pytest.raises(TypeError, match="`stretch`"):
+        bpstereo.match(*wide, stretch=1)
+
+
+def test_integers_of_any_range_are_stretched(pair):
+    expected = bpstereo.match(*pair, labels=16, stretch=True)
+    assert abs(numpy.nanmedian(expected) - 3) < 0.1
+    for dtype, of in [(numpy.uint16, lambda image: image * 5 + 900), (numpy.float32, lambda image: image * 1e-6)]:
+        found = bpstereo.match(*(of(image.astype(dtype)) for image in pair), labels=16, stretch=True)
+        assert numpy.mean(numpy.abs(found - expected) < 0.25) > 0.98
+    coloured = [numpy.dstack([image] * 3) for image in pair]
+    assert numpy.array_equal(bpstereo.match(*coloured, labels=16, stretch=True), expected)
+
+
 def test_floats_of_a_pair_have_one_scale(pair):
     left, right = (image.astype(numpy.float32) for image in pair)
     dark = numpy.minimum(left, 1), right
@@ -90,6 +120,32 @@ def test_numpy_makes_no_copy_of_the_images():
     finally:
         tracemalloc.stop()
     assert peak < left.nbytes / 4, peak
+
+
+def test_bytes_without_gaps_are_read_where_they_lie(pair):
+    left, right = pair
+    place = bpstereo._bpstereo._read_at
+    coloured = numpy.dstack([left, right, left])
+    for array in [left, coloured, left[5:9], left[..., None]]:
+        assert place(array) == array.ctypes.data
+    for array in [left[:, 1:], left[::-1], coloured[..., ::-1], left.astype(numpy.uint16), left.astype(numpy.float32)]:
+        assert place(array) != array.ctypes.data
+    # What is not copied needs no memory.
+    matcher = bpstereo.Matcher(labels=16)
+    wide = numpy.repeat(left, 2, axis=1)[:, ::2]
+    assert matcher.peak_bytes(wide, right) - matcher.peak_bytes(left, right) == left.nbytes
+
+
+def test_an_array_that_changes_during_its_match_harms_nobody():
+    left, right = shifted(300, 400, 5)
+    matcher, noise = bpstereo.Matcher(labels=16), numpy.random.default_rng(3)
+
+    def change(done, total):
+        left[:] = noise.integers(256, size=left.shape)
+
+    found = matcher.compute(left, right, progress=change)
+    assert found.shape == left.shape
+    assert numpy.array_equal(matcher.compute(left, right), bpstereo.Matcher(labels=16).compute(left, right), equal_nan=True)
 
 
 def test_the_map_is_written_where_the_caller_says(pair):

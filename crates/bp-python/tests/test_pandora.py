@@ -68,6 +68,18 @@ def test_disparity_grids_and_masks_hold(tmp_path):
     assert rest.min() >= -4 and rest.max() <= 0
 
 
+def test_a_grid_says_what_each_pixel_may_have(tmp_path):
+    low = numpy.full((60, 100), -12, numpy.float32)
+    high = numpy.where(numpy.arange(100) < 50, 0, -7).astype(numpy.float32) + numpy.zeros((60, 1), numpy.float32)
+    with rasterio.open(tmp_path / "grid.tif", "w", driver="GTiff", height=60, width=100, count=2, dtype=low.dtype) as file:
+        file.write(numpy.stack([low, high]))
+    found = run(tmp_path, PIPELINE, str(tmp_path / "grid.tif"))
+    left, right = found[:, 20:50], found[:, 50:]
+    assert abs(numpy.median(left[left != -9999]) + 5) < 0.1
+    # The true -5 is not allowed here; the nearest that is allowed is.
+    assert right[right != -9999].max() <= -7 and abs(numpy.median(right[right != -9999]) + 7) < 0.1
+
+
 def test_cross_checking_uses_it_for_the_right_image_too(tmp_path):
     pipeline = PIPELINE | {"validation": {"validation_method": "cross_checking_accurate"}}
     found = run(tmp_path, pipeline, [-12, 0])

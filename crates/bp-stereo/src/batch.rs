@@ -6,6 +6,7 @@
 //! that share a batch need no other files.
 
 mod apart;
+mod images;
 mod job;
 mod places;
 mod record;
@@ -29,7 +30,7 @@ use bp_io::{Files, MapFormat, create_folder};
 use crate::{
     Align, Cause, Error, Event, Labels, Making, Options, Watch, align_camera,
     pairs::{Pair, Source, listed_bytes},
-    read_pair,
+    read_pair, read_stretched_pair,
     reading::Room,
 };
 
@@ -54,6 +55,8 @@ pub struct BatchOptions {
     pub warm_start: Option<u32>,
     /// Whether complete pairs are matched again.
     pub force: bool,
+    /// Whether values have any range and are stretched, as by [`read_stretched_pair`](crate::read_stretched_pair).
+    pub stretch: bool,
     /// Most megapixels of an image.
     pub max_megapixels: u32,
 }
@@ -172,8 +175,15 @@ fn with_alignment(
     let file = options.alignment.as_deref().map(|path| (files, path));
     let (pixels, memory) = (options.max_megapixels, options.matching.max_memory);
     let read = |pair: &Pair| {
-        let pair = pair.clone();
-        watch.unless_stopped(move || read_pair([&pair.left, &pair.right], pixels, memory))?
+        let (pair, stretch) = (pair.clone(), options.stretch);
+        watch.unless_stopped(move || {
+            let images = [pair.left.as_path(), &pair.right];
+            if stretch {
+                Ok(read_stretched_pair(images, pixels, memory)?.pair)
+            } else {
+                read_pair(images, pixels, memory)
+            }
+        })?
     };
     let align = align_camera(pairs.iter().map(read), file, watch)?;
     if let Align::Known(known) = align

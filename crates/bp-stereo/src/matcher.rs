@@ -6,14 +6,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bp_core::{
-    Alignment, DeviceInfo, DisparityMap, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, survey::Survey,
-};
+use bp_core::{Alignment, DeviceInfo, Energy, Image, Plan, Progress, Side, StereoPair, Tiled, survey::Survey};
 use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Align, AnswerTimes, Beside, Ending, Error, Options, Tiles, Warning, Watch, description,
+    Align, Beside, Disparity, Ending, Error, Options, Tiles, Warning, Watch,
     devices::{self, Opened},
     finishing::{Finished, View, finished},
     memory::{self, Fitted, Images},
@@ -61,49 +59,6 @@ pub enum Start {
     Cold,
     /// Those of the previous pair. For the next frame of a video; matches on the full grid alone.
     Warm,
-}
-
-/// The answer for a pair.
-#[derive(Clone, Debug)]
-pub struct Disparity {
-    /// The disparity map of the left image.
-    pub map: DisparityMap,
-    /// The confidence of each pixel, 0 to 1, `[height][width]`; `None` unless [`Options::confidence`] asks for it.
-    pub confidence: Option<Vec<f32>>,
-    /// Wall-clock times.
-    pub times: AnswerTimes,
-    /// The energy of the labels; `None` unless [`Options::energy`] asks for it.
-    pub energy: Option<Energy>,
-    /// The settings that were run.
-    pub settings: description::Settings,
-    /// The tiles; `None` if the pair was matched as a whole.
-    pub tiles: Option<Tiles>,
-    /// The message entries that were computed for one image. With label sets, fewer than [`Self::settings`] predict.
-    pub message_updates: u64,
-    /// Bytes that the device allocated for the plan.
-    pub allocated_bytes: u64,
-    /// Predicted peak memory of the program, in bytes.
-    pub peak_bytes: u64,
-    /// Possible problems with the pair or its labels.
-    pub warnings: Vec<Warning>,
-}
-
-impl From<&Disparity> for description::Answer {
-    fn from(answer: &Disparity) -> Self {
-        let seconds = |time: Duration| time.as_secs_f64();
-        let AnswerTimes { planning, matching, finishing } = answer.times;
-        Self {
-            times: description::Seconds {
-                planning: seconds(planning),
-                matching: seconds(matching.total),
-                finishing: seconds(finishing),
-                total: seconds(answer.times.total()),
-            },
-            energy: answer.energy.map(Into::into),
-            settings: answer.settings.clone(),
-            warnings: answer.warnings.iter().map(ToString::to_string).collect(),
-        }
-    }
 }
 
 impl Matcher {

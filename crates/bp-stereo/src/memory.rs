@@ -13,6 +13,9 @@ const KEPT: u64 = 32 << 20;
 /// Bytes per pixel of the ground truth.
 const TRUTH: u64 = 5;
 
+/// Byte per pixel that tells whether it is valid.
+const VALID: u64 = 1;
+
 /// Bytes per pixel of the map, and of the largest output made from it: a picture with a colour bar.
 const MAP: u64 = 4;
 const WRITING: u64 = 8;
@@ -48,6 +51,8 @@ const SPECKLE: u64 = 8;
 pub struct Beside {
     /// Whether ground truth is in memory.
     pub truth: bool,
+    /// Whether the pixels that are valid are known one by one.
+    pub masked: bool,
     /// Whether depths are made from the map.
     pub depth: bool,
     /// Whether a [`Rectifying`](crate::Rectifying) is kept for further pairs.
@@ -151,6 +156,7 @@ impl Bytes {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let if_so = |is_so: bool, bytes: u64| if is_so { bytes } else { 0 };
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
+        let valid = if_so(beside.masked, VALID);
         let (aligned, positions) = (if_so(images.is_aligned, images.compared), if_so(beside.rectified, POSITIONS));
         // The mirrored pair while the right image is matched, and its map after that.
         let right = if_so(options.needs_right(), RIGHT_MAP.max(2 * images.compared));
@@ -158,7 +164,7 @@ impl Bytes {
         // Assumes that the next and the previous pair of a batch have the same size as this one.
         let others = if_so(beside.batch, READING + 2 * Image::COLOUR_BYTES + MAP + trust + depth + WRITING);
         Self {
-            held: PROGRAM + beside.listed + images.bytes + a_pixel(aligned + positions + truth),
+            held: PROGRAM + beside.listed + images.bytes + a_pixel(aligned + positions + truth + valid),
             coming: a_pixel(right + others),
             finishing: a_pixel(MAP) + a_pixel(WRITING + depth).max(a_pixel(LABELS) + finishing(options, size)),
         }

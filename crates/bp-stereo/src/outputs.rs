@@ -37,6 +37,9 @@ pub struct Making {
     pub no_sidecar: bool,
     /// Whether the formats TIFF and NPY hold NaN for unknown, and not plus infinity.
     pub nan: bool,
+    /// Whether maps hold the negative of each disparity, as programs do that count the right column minus the left one. Pictures,
+    /// depth and points stay as they are.
+    pub negate: bool,
     /// The geometry of rectified pairs, which depth and points need.
     pub geometry: Option<Geometry>,
     /// Rectifies pairs before they are matched. Depth and points are then those of its view.
@@ -69,6 +72,12 @@ impl Making {
             (None, Some(Geometry { file: Some(file), .. })) => vec![&file.path],
             _ => Vec::new(),
         }
+    }
+
+    /// The values of a map as its file holds them.
+    #[must_use]
+    pub fn raster<'a>(&self, map: &'a DisparityMap) -> Raster<'a> {
+        Raster { negate: self.negate, ..Raster::disparities(map) }
     }
 
     /// Whether a sidecar is written beside this file.
@@ -124,12 +133,13 @@ impl Outputs {
     /// # Errors
     /// [`Error::File`].
     pub fn check_map(&self, making: &Making, range: (f32, f32), size: Size) -> Result<(), Error> {
-        self.check_range(range.0, range.1)?;
+        self.check_range(making, range.0, range.1)?;
         making.calibration(size).map(drop)
     }
 
     /// Fails if a format cannot hold disparities from `low` to `high`.
-    fn check_range(&self, low: f32, high: f32) -> Result<(), Error> {
+    fn check_range(&self, making: &Making, low: f32, high: f32) -> Result<(), Error> {
+        let (low, high) = if making.negate { (-high, -low) } else { (low, high) };
         Ok(self.map.as_deref().map_or(Ok(()), |map| check_range(map, low, high))?)
     }
 
@@ -145,7 +155,7 @@ impl Outputs {
     fn write_all(&self, making: &Making, content: &Content<'_>, watch: &Watch<'_>) -> Result<(), Error> {
         let plan = content.plan.map(|plan| description::Settings { planned_bytes: None, ..plan.clone() });
         let writer = Writer { making, content, plan, watch };
-        self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &Raster::disparities(content.map), None))?;
+        self.map.as_deref().map_or(Ok(()), |path| writer.map(path, &making.raster(content.map), None))?;
         self.picture.as_deref().map_or(Ok(()), |path| writer.picture(path))?;
         if let (Some(path), Some(values)) = (&self.confidence, content.confidence) {
             writer.map(

@@ -2,13 +2,19 @@
 
 use std::path::Path;
 
-use bp_core::{DeviceKind, Image, StereoPair};
-use bp_io::{Limits, read_image};
+use bp_core::{
+    DeviceKind, Image, Size, StereoPair,
+    image::{Samples, Stretch},
+};
+use bp_io::{Contents, Limits, parse_samples, read_image};
 
 use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
 
 /// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
 const RECTIFYING: u64 = 2 * Image::COLOUR_BYTES + POSITIONS;
+
+/// Bytes per pixel while values are stretched: the pair, and which pixels are valid.
+const STRETCHING: u64 = 2 * Image::COLOUR_BYTES + 1;
 
 /// How reading needs less memory.
 const IMAGES: &str = "use smaller images";
@@ -47,6 +53,38 @@ pub fn read_raw_pair(
     Room::new(max_megapixels, max_memory).pair(images, Some(rectifying), read)
 }
 
+/// A pair as it was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadPair {
+    /// The images.
+    pub pair: StereoPair,
+    /// The pixels of the left image that have a value, `[height][width]`; `None` if all have. A map should be restricted to them,
+    /// see [`Disparity::restrict`](crate::Disparity::restrict).
+    pub valid: Option<Vec<bool>>,
+}
+
+impl From<StereoPair> for ReadPair {
+    fn from(pair: StereoPair) -> Self {
+        Self { pair, valid: None }
+    }
+}
+
+/// As [`read_pair`], for images whose values have any range, in integers or floats. One scale for both images makes their 0.5 %
+/// darkest values black and their 0.5 % brightest white. Missing values, which are not finite, become black.
+///
+/// # Errors
+/// Those of [`read_pair`].
+pub fn read_stretched_pair(
+    images: [&Path; 2],
+    max_megapixels: u32,
+    max_memory: Option<u64>,
+) -> Result<ReadPair, Error> {
+    Room::new(max_megapixels, max_memory).stretched_pair(images, |room, path| {
+        let contents = room.explained(Contents::of_pixels(path, room.limits))?;
+        room.explained(parse_samples(path, &contents.bytes, room.limits))
+    })
+}
+
 /// How many pixels and bytes an image may take.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room {
@@ -78,22 +116,36 @@ impl Room {
         let [left, right] = images;
         let one = read(self, left)?;
         let other = read(self.without(one.bytes()), right)?;
-        let named = |error| Error::from(error).of(format!("{} and {}", left.display(), right.display()));
-        let pair = StereoPair::new(one, other).map_err(named)?;
+        let pair = StereoPair::new(one, other).map_err(|error| named(images, error))?;
         match rectifying {
             Some(rectifying) => {
-                self.without(pair.bytes()).check(&pair, RECTIFYING, "rectifying")?;
+                self.without(pair.bytes()).check(pair.size(), RECTIFYING, "rectifying")?;
                 rectifying.rectified(&pair)
             }
             None => Ok(pair),
         }
     }
 
-    /// Fails if so many bytes for each pixel of a pair are not left for this step.
-    fn check(self, pair: &StereoPair, a_pixel: u64, step: &str) -> Result<(), Error> {
-        let needed = a_pixel * pair.size().pixels() as u64;
+    /// A pair of images of any range of values, each from one call of `read`, in 8 bits.
+    pub(crate) fn stretched_pair(
+        self,
+        images: [&Path; 2],
+        mut read: impl FnMut(Self, &Path) -> Result<Samples, Error>,
+    ) -> Result<ReadPair, Error> {
+        let [left, right] = images;
+        let one = read(self, left)?;
+        let other = read(self.without(one.bytes()), right)?;
+        self.without(one.bytes() + other.bytes()).check(one.size(), STRETCHING, "stretching")?;
+        let (stretch, valid) = (Stretch::of(&[&one, &other]), one.valid());
+        let pair = StereoPair::new(one.stretched(&stretch)?, other.stretched(&stretch)?);
+        Ok(ReadPair { pair: pair.map_err(|error| named(images, error))?, valid })
+    }
+
+    /// Fails if so many bytes for each pixel of a pair of this size are not left for this step.
+    fn check(self, size: Size, a_pixel: u64, step: &str) -> Result<(), Error> {
+        let needed = a_pixel * size.pixels() as u64;
         let Some(left) = self.limits.memory.filter(|&left| left < needed) else { return Ok(()) };
-        let what = format!("{step} {}", pair.size());
+        let what = format!("{step} {size}");
         Err(self.refused(needed, left, IMAGES).of(what))
     }
 
@@ -132,6 +184,11 @@ impl Room {
             (error, ..) => error.into(),
         })
     }
+}
+
+/// The failure with the names of both images.
+fn named([left, right]: [&Path; 2], error: bp_core::Error) -> Error {
+    Error::from(error).of(format!("{} and {}", left.display(), right.display()))
 }
 
 #[cfg(test)]

@@ -10,8 +10,10 @@ use std::{
     path::{Component, Path},
 };
 
-use bp_core::{Size, depth_map};
-use bp_io::{Cameras, Frames, Layout, Limits, MapFormat, Mask, PairFrames, Raster, parse_image, parse_map, parse_mask};
+use bp_core::{Size, depth_map, image::Stretch};
+use bp_io::{
+    Cameras, Frames, Layout, Limits, MapFormat, Mask, PairFrames, Raster, parse_image, parse_map, parse_mask, parse_samples,
+};
 use bp_stereo::pairs;
 
 use crate::{
@@ -44,14 +46,23 @@ pub const TARGETS: [(&str, Target); 9] = [
     ("tiny_match", tiny_match),
 ];
 
-/// Reads an image: PNG, PNM, TIFF, JPEG or PFM.
+/// Reads an image: PNG, PNM, TIFF, JPEG or PFM. Reads it again with any range of values.
 ///
 /// # Panics
-/// If it is larger than allowed.
+/// If it is larger than allowed, or if it is an image but has no values.
 pub fn image(bytes: &[u8]) -> bool {
-    let Ok(image) = parse_image(Path::new(NAME), bytes, LIMIT) else { return false };
-    assert!(image.pixels().len() as u64 <= LIMIT.pixels, "{} pixels", image.size());
-    true
+    let samples = parse_samples(Path::new(NAME), bytes, LIMIT);
+    let image = parse_image(Path::new(NAME), bytes, LIMIT);
+    if let Ok(samples) = samples {
+        let (size, stretch) = (samples.size(), Stretch::of(&[&samples]));
+        assert!(samples.valid().is_none_or(|valid| valid.len() == size.pixels()));
+        let stretched = samples.stretched(&stretch).unwrap_or_else(|error| panic!("{error}"));
+        assert!(stretched.size() == size && size.pixels() as u64 <= LIMIT.pixels, "{size} pixels");
+        assert!(image.as_ref().is_ok_and(|image| image.size() == size) || image.is_err());
+    } else {
+        assert!(image.is_err(), "an image without values");
+    }
+    image.is_ok()
 }
 
 /// Reads frames of a video, with both images side by side.

@@ -19,8 +19,8 @@ use super::{
 pub(crate) struct MatchArgs {
     /// The left image.
     ///
-    /// PNG, PGM, PPM or TIFF with 8 or 16 bits, JPEG, or PFM with values from 0 to 1 or from 0 to 255; grey or colour.
-    /// The camera's orientation tag (EXIF) is ignored.
+    /// PNG, PGM, PPM or TIFF with 8 or 16 bits, JPEG, or PFM with values from 0 to 1 or from 0 to 255 (others with
+    /// --stretch); grey or colour. The camera's orientation tag (EXIF) is ignored.
     #[arg(required_unless_present = "many", conflicts_with = "many")]
     pub(crate) left: Option<PathBuf>,
     /// The right image of a rectified pair: same size, corresponding rows.
@@ -38,6 +38,16 @@ pub(crate) struct MatchArgs {
     /// The images are raw: rectify them with --calib before matching. The map is that of the rectified left image.
     #[arg(long, requires = "calib", hide_short_help = true)]
     pub(crate) rectify: bool,
+    /// Values have any range: stretch those of both images, by one scale, so that the 0.5 % darkest become black and the 0.5 % brightest
+    /// white.
+    ///
+    /// For satellite and scientific images: 16 bits that are not used in full, and TIFF, NPY or PFM of floats. Where the left image
+    /// has no value (NaN), the map is unknown.
+    #[arg(long, conflicts_with = "rectify", hide_short_help = true)]
+    pub(crate) stretch: bool,
+    /// Mask of the left image: an 8-bit image, 255 where it shows something. Elsewhere the map is unknown.
+    #[arg(long, value_name = "MASK", conflicts_with_all = ["many", "rectify"], hide_short_help = true)]
+    pub(crate) valid: Option<PathBuf>,
     /// Print a SHA-256 of all final messages: from the left, right, up and down, each `[row][column][label]`.
     #[arg(long, conflicts_with = "many", hide_short_help = true)]
     pub(crate) messages_hash: bool,

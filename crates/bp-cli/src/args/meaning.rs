@@ -80,6 +80,7 @@ impl MatchArgs {
             shard: self.many.shard.unwrap_or_default(),
             warm_start: self.many.warm_start,
             force: self.many.force,
+            stretch: self.stretch,
             max_megapixels: self.max_megapixels,
         }))
     }
@@ -162,6 +163,7 @@ impl OutputArgs {
             picture,
             no_sidecar: args.no_sidecar,
             nan: args.unknown == Some(true),
+            negate: args.negate,
             geometry: read.or(given),
             rectifying: rectifying.map(Arc::new),
             files: Files::default().stopping(interrupt::is_stopped),

@@ -43,6 +43,10 @@ pub(crate) struct MakingArgs {
     /// have values of their own. [default: inf]
     #[arg(long, value_name = "inf|nan", value_parser = named(&[false, true], unknown), hide_short_help = true)]
     pub(crate) unknown: Option<bool>,
+    /// Write the negative of each disparity, as programs do that count the right column minus the left one (MGM, s2p, Ames Stereo
+    /// Pipeline, Pandora). Only maps have this sign.
+    #[arg(long, hide_short_help = true)]
+    pub(crate) negate: bool,
     /// Do not write the sidecar MAP.json, which describes scale, unit, range, plan and inputs of a map or picture.
     #[arg(long, hide_short_help = true)]
     pub(crate) no_sidecar: bool,

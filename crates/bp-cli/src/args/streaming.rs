@@ -33,12 +33,17 @@ impl MatchArgs {
 
     /// Refuses arguments that would do nothing.
     fn check_stream(&self) -> Result<(), Failure> {
-        let (many, OutputArgs { picture, depth, points, .. }) = (&self.many, &self.outputs);
+        let (many, OutputArgs { picture, depth, points, making }) = (&self.many, &self.outputs);
         if !self.is_piped() {
             let what = "frames from pipes give maps to a pipe: --output -";
             return Err(Failure::usage(format!("{what}; for files, give patterns such as 'left/%04d.png'")));
         }
         let has_files = [picture, depth, points, &self.finish.confidence].into_iter().any(Option::is_some);
+        if self.stretch || making.negate {
+            return Err(Failure::usage(
+                "--stretch and --negate are for files: frames have 8 bits, and their maps our sign",
+            ));
+        }
         if has_files || !many.also.is_empty() || many.shard.is_some() || many.force || many.warm_start.is_some() {
             let what = "frames from pipes give maps alone, or with --format y4m their pictures";
             return Err(Failure::usage(format!("{what}: other outputs, --shard, --force and --warm-start need files")));

@@ -6,11 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bp_core::{DisparityMap, GroundTruth, StereoPair};
-use bp_io::{MapFormat, Raster};
+use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
+use bp_io::{MapFormat, Mask, read_mask};
 use bp_stereo::{
-    Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, Start,
-    align_camera, batch, read_pair, read_raw_pair, reading_limits,
+    Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, ReadPair, Start,
+    align_camera, batch, read_pair, read_raw_pair, read_stretched_pair, reading_limits,
 };
 
 use super::{
@@ -64,6 +64,7 @@ struct Job<'a> {
     args: &'a MatchArgs,
     files: [&'a PathBuf; 2],
     pair: StereoPair,
+    valid: Option<Vec<bool>>,
     truth: Option<GroundTruth>,
     outputs: Outputs,
     making: Making,
@@ -74,9 +75,9 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     // The report shows it.
     options.energy = true;
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
-    let inputs: Vec<&Path> = sources(args).chain(truths.chain(args.plan.align.file()).map(PathBuf::as_path)).collect();
-    outputs.check(&making, &inputs)?;
-    let pair = read(args, files.map(PathBuf::as_path), &making)?;
+    let others = truths.chain(args.plan.align.file()).map(PathBuf::as_path);
+    outputs.check(&making, &sources(args).chain(others).collect::<Vec<_>>())?;
+    let ReadPair { pair, valid } = read(args, files.map(PathBuf::as_path), &making)?;
     // Colours that nobody needs are freed.
     let pair = if outputs.points.is_some() { pair } else { options.compared(pair) };
     let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, &pair, &options)).transpose()?;
@@ -87,6 +88,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let whole = args.messages_hash.then_some("messages_hash");
     let beside = Beside {
         truth: truth.is_some(),
+        masked: valid.is_some(),
         depth: args.outputs.depth.is_some(),
         rectified: args.rectify,
         batch: false,
@@ -94,7 +96,7 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
         whole,
     };
     let mut matcher = Matcher::new(&options)?.beside(beside);
-    let job = Job { args, files, pair, truth, outputs, making };
+    let job = Job { args, files, pair, valid, truth, outputs, making };
     let report = job.run(&mut matcher)?;
     match () {
         () if args.json => print_json(&report),
@@ -121,7 +123,7 @@ impl Job<'_> {
         };
         self.outputs.write(&self.making, &content, &terminal::watch())?;
         if self.args.is_piped() {
-            pipe(&answer.map)?;
+            pipe(&self.making, &answer.map)?;
         }
         let asked = Asked { size: self.pair.size(), warnings, errors, messages_sha256 };
         Ok(Report::new(matcher, answer, &times, asked, self.outputs.paths(&self.making)))
@@ -153,7 +155,8 @@ impl Job<'_> {
     fn matched(&self, matcher: &mut Matcher, mut planned: Planned) -> Result<(Disparity, Vec<AnswerTimes>), Error> {
         let mut times = Vec::new();
         loop {
-            let answer = matcher.run(&self.pair, planned, Start::Cold, &terminal::watch())?;
+            let mut answer = matcher.run(&self.pair, planned, Start::Cold, &terminal::watch())?;
+            self.valid.iter().for_each(|valid| answer.restrict(valid));
             times.push(answer.times);
             if times.len() >= self.args.repeat as usize {
                 return Ok((answer, times));
@@ -169,24 +172,33 @@ impl Job<'_> {
     }
 }
 
-/// Reads the pair, and rectifies it if asked for.
-fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<StereoPair, Error> {
+/// Reads the pair, and rectifies or stretches it if asked for.
+fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<ReadPair, Failure> {
     let (megapixels, max_memory) = (args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()));
-    match &making.rectifying {
-        Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory),
-        None => read_pair(files, megapixels, max_memory),
+    let mut read = match &making.rectifying {
+        Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory)?.into(),
+        None if args.stretch => read_stretched_pair(files, megapixels, max_memory)?,
+        None => ReadPair::from(read_pair(files, megapixels, max_memory)?),
+    };
+    if let Some(path) = &args.valid {
+        let limits = reading_limits(megapixels, max_memory, read.pair.bytes());
+        let Mask { size, values } = read_mask(path, limits)?;
+        check_size(path, size, &read.pair)?;
+        let both = |other: Vec<bool>| other.into_iter().zip(&values).map(|(one, &other)| one && other).collect();
+        read.valid = Some(read.valid.map_or_else(|| values.clone(), both));
     }
+    Ok(read)
 }
 
 /// Writes a map to standard output.
-fn pipe(map: &DisparityMap) -> Result<(), Failure> {
-    let bytes = Raster::disparities(map).floats(MapFormat::Pfm).unwrap_or_else(|| Ok(Vec::new()));
+fn pipe(making: &Making, map: &DisparityMap) -> Result<(), Failure> {
+    let bytes = making.raster(map).floats(MapFormat::Pfm).unwrap_or_else(|| Ok(Vec::new()));
     Ok(std::io::stdout().write_all(&bytes.map_err(Failure::other)?)?)
 }
 
 /// The files that the outputs are made from.
 fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
-    [&args.left, &args.right].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
+    [&args.left, &args.right, &args.valid].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }
 
 /// Bytes per pixel of the left image's truth, beside further truth that is read.
@@ -197,9 +209,15 @@ fn read_truth(args: &MatchArgs, path: &Path, pair: &StereoPair, options: &Option
     let held = pair.bytes() + TRUTH * size.pixels() as u64;
     let limits = reading_limits(args.max_megapixels, options.max_memory, held);
     let truth = evaluate::read_truth(path, &args.truth, limits)?;
-    let found = truth.disparities().size();
+    check_size(path, truth.disparities().size(), pair)?;
+    Ok(truth)
+}
+
+/// Refuses a file whose size is not that of the images.
+fn check_size(path: &Path, found: Size, pair: &StereoPair) -> Result<(), Failure> {
+    let size = pair.size();
     if found == size {
-        return Ok(truth);
+        return Ok(());
     }
     Err(Failure::input(format!("{}: {found} pixels, but the images have {size}", path.display())))
 }

@@ -4,6 +4,7 @@
 mod align;
 mod devices;
 mod folder;
+mod foreign;
 mod hostile;
 mod manners;
 mod many;

@@ -15,6 +15,7 @@ __all__ = [
     "PairWarning",
     "Rectifier",
     "__version__",
+    "_read_at",
     "devices",
     "match",
     "read_image",
@@ -25,6 +26,8 @@ __all__ = [
 ]
 
 __version__: str
+
+def _read_at(image: _Image) -> int: ...
 
 class BackendUnavailable(RuntimeError): ...
 class DeviceError(RuntimeError): ...

@@ -76,6 +76,8 @@ def _extended(
         raise TypeError("uint8 or uint16 is needed: each block of floats by itself would find another scale")
     if isinstance(labels, bool) or not isinstance(labels, (int, numpy.integer)):
         raise ValueError("`labels` must be a number: each block by itself would find other labels")
+    if options.get("stretch"):
+        raise ValueError("`stretch`: each block by itself would find another scale")
     options = {"align": "off"} | options | {"labels": int(labels), "min_disparity": int(min_disparity)}
     Matcher(**options)
     before, after = halo(labels, min_disparity)

@@ -25,7 +25,8 @@ import rasterio  # type: ignore[import-untyped]
 from rasterio.errors import NotGeoreferencedWarning, RasterioError  # type: ignore[import-untyped]
 
 from ._bpstereo import Matcher, __version__
-from .values import Array, stretched
+
+Array = numpy.ndarray[Any, Any]
 
 #: Options of mgm with a value that have no counterpart here.
 WITHOUT_COUNTERPART = (
@@ -93,10 +94,11 @@ def _match(args: argparse.Namespace) -> None:
     height = max(len(left), len(right))
     width = max(left.shape[1], right.shape[1])
     # Ours is left minus right. The rows of these pairs are right already.
-    matcher = Matcher(labels=high - low + 1, min_disparity=-high, align="off", confidence=bool(args.confidence), **options(dict(os.environ)))
+    matcher = Matcher(labels=high - low + 1, min_disparity=-high, align="off", stretch=True, confidence=bool(args.confidence),
+                      **options(dict(os.environ)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = matcher.compute(*stretched(*(_padded(image, height, width) for image in (left, right))))
+        found = matcher.compute(*(_padded(image, height, width) for image in (left, right)))
     _write(args.disparity, -found, left)
     if matcher.confidence is not None:
         _write(args.confidence, matcher.confidence, left)

@@ -31,3 +31,4 @@ class Options(TypedDict, total=False):
     device: str | None
     threads: int | None
     max_memory: int | None
+    stretch: bool

@@ -17,7 +17,6 @@ import xarray
 from pandora.disparity import disparity
 
 from ._bpstereo import Matcher
-from .values import stretched
 
 
 @disparity.AbstractDisparity.register_subclass("bpstereo")
@@ -62,8 +61,9 @@ class BeliefPropagation(disparity.AbstractDisparity):
 def _matched(left: xarray.Dataset, right: xarray.Dataset, steps: numpy.ndarray[Any, Any], options: dict[str, Any]) -> Any:
     """Our map with Pandora's sign: there, the right column is the left one plus the disparity."""
     first, last = int(numpy.floor(steps[0])), int(numpy.ceil(steps[-1]))
-    matcher = Matcher(**({"align": "off"} | options | {"labels": last - first + 1, "min_disparity": -last}))
-    return -matcher.compute(*_as_images(left, right))
+    defaults: dict[str, Any] = {"align": "off", "stretch": True}
+    matcher = Matcher(**(defaults | options | {"labels": last - first + 1, "min_disparity": -last}))
+    return -matcher.compute(_as_image(left), _as_image(right))
 
 
 def _within(found: Any, steps: numpy.ndarray[Any, Any], allowed: numpy.ndarray[Any, Any]) -> Any:
@@ -79,8 +79,9 @@ def _nearest(found: Any, steps: numpy.ndarray[Any, Any]) -> Any:
     return numpy.where(found - low < high - found, low, high)
 
 
-def _as_images(*datasets: xarray.Dataset) -> list[numpy.ndarray[Any, Any]]:
-    """The images as float32 from 0 to 1, by the same scale for both; black where there is no data."""
-    images = [numpy.asarray(dataset["im"].data) for dataset in datasets]
-    # Bands come first: red, green and blue, or of fewer bands the first.
-    return stretched(*(image if image.ndim == 2 else numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0] for image in images))
+def _as_image(dataset: xarray.Dataset) -> numpy.ndarray[Any, Any]:
+    """The image as float32. Bands come first: red, green and blue, or of fewer bands the first."""
+    image = numpy.asarray(dataset["im"].data, numpy.float32)
+    if image.ndim == 2:
+        return image
+    return numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0]

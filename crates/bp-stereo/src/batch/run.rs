@@ -13,17 +13,17 @@ use std::{
 };
 
 use bp_core::StereoPair;
-use bp_io::{Contents, parse_image};
 
 use super::{
     Also, BatchOptions,
+    images::Images,
     job::Job,
     record::{Done, FileState, PairRecord, PairTimes, history},
     summary::Failed,
 };
 use crate::{
-    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Options, Rectifying, Start, Stopped, Warning,
-    Watch, description, pairs::Pair, reading::Room,
+    Beside, Cause, Content, Disparity, Error, Event, Making, Matcher, Options, ReadPair, Start, Stopped, Warning,
+    Watch, description, reading::Room,
 };
 
 /// A pair in memory.
@@ -31,12 +31,6 @@ struct Read<'a> {
     job: &'a Job<'a>,
     images: Images,
     read_ms: f64,
-}
-
-/// The images of a pair, and the states of the files that they were decoded from: none if a file cannot be read.
-struct Images {
-    pair: Result<StereoPair, Error>,
-    states: Vec<FileState>,
 }
 
 /// An answer, not yet written.
@@ -56,30 +50,6 @@ struct Answer {
     done: Done,
     disparity: Disparity,
     pair: StereoPair,
-}
-
-/// Files of images that failed are compared with those of an earlier run up to this length.
-const MOST_BYTES: u64 = 1 << 30;
-
-impl Images {
-    /// Reads the files once: what is hashed is what is decoded, even if somebody replaces a file meanwhile.
-    fn read(pair: &Pair, room: Room, rectifying: Option<&Rectifying>) -> Self {
-        let paths = [pair.left.as_path(), pair.right.as_path()];
-        let mut states = Vec::new();
-        let pair = room.pair(paths, rectifying, |room, path| {
-            let contents = room.explained(Contents::of_pixels(path, room.limits))?;
-            states.push(FileState::read(path, &contents)?);
-            room.explained(parse_image(path, &contents.bytes, room.limits))
-        });
-        if states.len() < paths.len() {
-            // The pair failed. Its files are only read again if that ends.
-            let is_image =
-                |path: &&Path| path.metadata().is_ok_and(|about| about.is_file() && about.len() <= MOST_BYTES);
-            let known = paths.iter().all(is_image).then(|| paths.into_iter().map(FileState::of).collect());
-            states = known.and_then(Result::ok).unwrap_or_default();
-        }
-        Self { pair, states }
-    }
 }
 
 /// A running batch.
@@ -174,9 +144,12 @@ impl Run<'_> {
 
     fn read<'a>(&self, job: &'a Job<'a>, room: Room) -> Result<Read<'a>, Stopped> {
         let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
-        let mut images = self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref()))?;
+        let stretch = self.options.stretch;
+        let mut images =
+            self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref(), stretch))?;
         if !self.options.also.contains(&Also::Points) {
-            images.pair = images.pair.map(|pair| self.options.matching.compared(pair));
+            let compared = |read: ReadPair| ReadPair { pair: self.options.matching.compared(read.pair), ..read };
+            images.pair = images.pair.map(compared);
         }
         Ok(Read { job, images, read_ms: milliseconds_since(start) })
     }
@@ -200,6 +173,7 @@ impl Run<'_> {
         let options = Options { energy: true, ..self.options.matching.clone() };
         Ok(Matcher::new(&options)?.beside(Beside {
             truth: false,
+            masked: self.options.stretch,
             depth,
             rectified: self.making.rectifying.is_some(),
             batch,
@@ -212,7 +186,7 @@ impl Run<'_> {
         &self,
         matcher: &mut Matcher,
         job: &Job<'_>,
-        pair: StereoPair,
+        ReadPair { pair, valid }: ReadPair,
         start: Start,
         read_ms: f64,
     ) -> Result<Answer, Error> {
@@ -231,7 +205,8 @@ impl Run<'_> {
                 self.watch.tell(event);
             }
         };
-        let disparity = matcher.run(&pair, planned, start, &self.watch.with_events(&events))?;
+        let mut disparity = matcher.run(&pair, planned, start, &self.watch.with_events(&events))?;
+        valid.iter().for_each(|valid| disparity.restrict(valid));
         let times = PairTimes { read_ms, match_ms: milliseconds_since(begun), ..PairTimes::default() };
         Ok(Answer { done: done(matcher, &pair, &disparity, warnings, times), disparity, pair })
     }
@@ -354,39 +329,5 @@ impl Writer<'_> {
         job.outputs().write(self.run.making, &content, self.run.watch)?;
         let outputs = job.paths().iter().map(|path| FileState::of(path)).collect::<Result<_, _>>()?;
         Ok(Done { outputs, times: PairTimes { write_ms: milliseconds_since(start), ..done.times }, ..done })
-    }
-}
-
-#[cfg(all(test, unix))]
-mod tests {
-    use std::{fs, process::Command, time::Duration};
-
-    use bp_io::hex;
-    use sha2::{Digest, Sha256};
-
-    use super::*;
-
-    /// A pipe gives other bytes to everybody who opens it.
-    #[test]
-    fn what_is_hashed_is_what_is_decoded() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name);
-        let image = |value: u8| [&b"P5 2 1 255\n"[..], &[value; 2]].concat();
-        for name in ["left.pgm", "right.pgm"] {
-            assert!(Command::new("mkfifo").arg(path(name)).status().unwrap().success());
-            let pipe = path(name);
-            thread::spawn(move || {
-                for value in 1..4 {
-                    fs::write(&pipe, image(value)).unwrap();
-                    // Otherwise the next image would follow the first one to the same reader.
-                    thread::sleep(Duration::from_millis(300));
-                }
-            });
-        }
-        let pair = Pair { name: "name".into(), left: path("left.pgm"), right: path("right.pgm") };
-        let Images { pair, states } = Images::read(&pair, Room::new(1, None), None);
-        assert_eq!(pair.unwrap().left().greys(), [1; 2]);
-        let expected = hex(&Sha256::digest(image(1)));
-        assert!(states.len() == 2 && states.iter().all(|state| state.sha256 == expected));
     }
 }
