@@ -4,7 +4,7 @@ use std::ffi::c_void;
 
 use bp_core::{
     Image, Size,
-    image::{factor_to_8_bits, narrow, scaled},
+    image::{Samples, factor_to_8_bits, narrow, scaled},
 };
 
 use crate::{BpstereoStatus, rows::Rows, status::Failure};
@@ -40,7 +40,7 @@ pub struct BpstereoImage {
 }
 
 impl BpstereoImage {
-    fn size(&self, name: &str) -> Result<Size, Failure> {
+    pub(crate) fn size(&self, name: &str) -> Result<Size, Failure> {
         let size = Size::new(self.width, self.height);
         let size = size.map_err(|error| bp_stereo::Error::from(error).of(name))?;
         match self.channels {
@@ -70,6 +70,37 @@ impl BpstereoImage {
         factors.reduce(|one, other| Ok(one?.min(other?))).transpose()
     }
 
+    /// The values as floats.
+    ///
+    /// # Safety
+    /// That of [`Self::copied`].
+    pub(crate) unsafe fn samples(&self, name: &str) -> Result<Samples, Failure> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            match self.value_type {
+                0 => self.gathered::<u8>(name, f32::from),
+                1 => self.gathered::<u16>(name, f32::from),
+                2 => self.gathered(name, |value: f32| value),
+                other => Err(unknown(name, other)),
+            }
+        }
+    }
+
+    /// Gathers the values, with `float` as that of each.
+    ///
+    /// # Safety
+    /// That of [`Self::copied`].
+    unsafe fn gathered<T: Copy>(&self, name: &str, float: impl Fn(T) -> f32) -> Result<Samples, Failure> {
+        let (size, rows) = (self.size(name)?, self.rows::<T>(name)?);
+        let mut values = Vec::new();
+        values.try_reserve_exact(size.pixels() * self.channels).map_err(|_| no_room(name, size))?;
+        for y in 0..size.height {
+            // SAFETY: the caller's promise.
+            values.extend(unsafe { rows.read(y) }.map(&float));
+        }
+        Ok(Samples::new(size, values)?)
+    }
+
     /// Copies the image. Floats are multiplied by `factor`. Messages call it `name`.
     ///
     /// # Safety
@@ -81,7 +112,7 @@ impl BpstereoImage {
                 0 => self.converted(name, |value: u8| value),
                 1 => self.converted(name, narrow),
                 2 => self.converted(name, |value| scaled(value, factor)),
-                other => Err(Failure::input(format!("{name}: unknown value_type {other}"))),
+                other => Err(unknown(name, other)),
             }
         }
     }
@@ -92,12 +123,11 @@ impl BpstereoImage {
     /// That of [`Self::copied`].
     unsafe fn converted<T: Copy>(&self, name: &str, stored: impl Fn(T) -> u8) -> Result<Image, Failure> {
         let (size, rows) = (self.size(name)?, self.rows::<T>(name)?);
-        let no_room = |_| Failure(BpstereoStatus::Memory, format!("{name}: no memory for {size} pixels"));
         let (mut greys, mut colours) = (Vec::new(), Vec::new());
         if self.channels == 3 {
-            colours.try_reserve_exact(size.pixels()).map_err(no_room)?;
+            colours.try_reserve_exact(size.pixels()).map_err(|_| no_room(name, size))?;
         } else {
-            greys.try_reserve_exact(size.pixels()).map_err(no_room)?;
+            greys.try_reserve_exact(size.pixels()).map_err(|_| no_room(name, size))?;
         }
         for y in 0..size.height {
             // SAFETY: the caller's promise.
@@ -115,4 +145,12 @@ impl BpstereoImage {
             Image::from_grey(size.width, size.height, greys)?
         })
     }
+}
+
+fn unknown(name: &str, value_type: u32) -> Failure {
+    Failure::input(format!("{name}: unknown value_type {value_type}"))
+}
+
+fn no_room(name: &str, size: Size) -> Failure {
+    Failure(BpstereoStatus::Memory, format!("{name}: no memory for {size} pixels"))
 }

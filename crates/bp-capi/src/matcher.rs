@@ -9,7 +9,7 @@ use std::{
 };
 
 use bp_core::{DisparityMap, StereoPair, image::common_factor};
-use bp_stereo::{Event, Matcher, Options, Start, Stop, Watch, description};
+use bp_stereo::{Event, Matcher, Options, ReadPair, Start, Stop, Watch, check_stretching, description};
 
 use crate::{
     BpstereoImage, BpstereoStatus,
@@ -110,7 +110,15 @@ pub unsafe extern "C" fn bpstereo_compute(
         let mut work = matcher.work()?;
         work.answer = CString::default();
         // SAFETY: the caller's promise.
-        let pair = unsafe { pair(left, right)? };
+        let read = unsafe {
+            if work.matcher.options().stretch {
+                check_stretching(work.matcher.options(), left.size("left")?, left.channels.max(right.channels))?;
+                ReadPair::stretched(left.samples("left")?, right.samples("right")?)?
+            } else {
+                pair(left, right)?.into()
+            }
+        };
+        let ReadPair { pair, valid } = read;
         let map = Rows::new("disparity", disparity.cast_const(), stride, pair.size(), 1)?;
         let trust = if confidence.is_null() {
             None
@@ -127,7 +135,8 @@ pub unsafe extern "C" fn bpstereo_compute(
         let solved = work.matcher.compute_watched(&pair, Start::Cold, &watch);
         // A stop ends one match.
         mem::take(&mut *matcher.stop());
-        let answer = solved?;
+        let mut answer = solved?;
+        valid.iter().for_each(|valid| answer.restrict(valid));
         let known = |&value: &f32| if value == DisparityMap::UNKNOWN { f32::NAN } else { value };
         // SAFETY: the caller's promise.
         unsafe { map.write(answer.map.values().iter().map(known)) };

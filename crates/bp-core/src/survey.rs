@@ -50,6 +50,8 @@ pub struct Survey {
     pub exchanged: bool,
     /// The offsets between corresponding rows, if an offset other than 0 is clearly better in any part of the image.
     pub rows: Option<RowOffsets>,
+    /// The shades, of 256, from the darkest to the brightest of the shrunk left image, without 0.5 % of its pixels on either side.
+    pub shades: u16,
     /// Whether both images are the same.
     pub identical: bool,
     /// Whether hardly any pixel has a match, although the images are large enough: they do not show the same scene.
@@ -80,6 +82,7 @@ impl Survey {
         );
         Ok(Self {
             identical: pair.left() == pair.right(),
+            shades: shades(small.left().greys()),
             matched,
             seen,
             exchanged: best.is_some() && negative as f64 >= NEARLY_ALL * count as f64,
@@ -88,6 +91,22 @@ impl Survey {
             unlike: best.is_none() && small.size().pixels() as f64 * LEAST_SHARE >= LEAST_MATCHES as f64,
         })
     }
+}
+
+/// The values from the least to the largest, without 0.5 % of all on either side.
+fn shades(greys: &[u8]) -> u16 {
+    let mut counts = [0_usize; 256];
+    greys.iter().for_each(|&grey| counts[usize::from(grey)] += 1);
+    let least = greys.len() / 200;
+    let first = |counts: &mut dyn Iterator<Item = &usize>| {
+        let sums = counts.scan(0, |sum, &count| {
+            *sum += count;
+            Some(*sum)
+        });
+        sums.take_while(|&sum| sum <= least).count() as u16
+    };
+    let (below, above) = (first(&mut counts.iter()), first(&mut counts.iter().rev()));
+    256_u16.saturating_sub(below + above)
 }
 
 /// Matches the small pair row by row. If it finds few matches, it also tries the right image shifted up and down.

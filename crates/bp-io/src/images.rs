@@ -6,7 +6,7 @@ use bp_core::{
     Image, Size,
     image::{Samples, narrow},
 };
-use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
+use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, ImageFormat, codecs::png::PngEncoder};
 use sha2::{Digest, Sha256};
 
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
     caught::caught,
     decode::{check_unscaled, decode, decoded},
     maps::floats,
-    pfm,
+    pfm, tiff,
 };
 
 /// Reads an image with 8 or 16 bits, or a PFM, grey or colour. Ignores transparency and the orientation tag of cameras.
@@ -50,7 +50,8 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
     converted(path, decoded, in_8_bits)?.map_err(|error| Error::reading(path, &error))
 }
 
-/// Parses an image whose values have any range, grey or colour: as [`parse_image`], and TIFF and NPY of floats.
+/// Parses an image whose values have any range, grey or colour: as [`parse_image`], and TIFF and NPY of floats in grey. Values that a
+/// TIFF declares as missing are NaN.
 ///
 /// # Errors
 /// Those of [`read_image`].
@@ -66,14 +67,23 @@ pub fn parse_samples(path: &Path, bytes: &[u8], limit: Limits) -> Result<Samples
         let values = u64::from(decoded.width()) * u64::from(decoded.height()) * channels * 4;
         // The file, what was decoded, and the values.
         limit.check_memory(path, bytes.len() as u64 + decoded.as_bytes().len() as u64 + values)?;
-        (size(path, &decoded)?, converted(path, decoded, in_floats)?)
+        let (size, mut values) = (size(path, &decoded)?, converted(path, decoded, in_floats)?);
+        if image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Tiff) {
+            tiff::drop_missing(path, bytes, &mut values)?;
+        }
+        (size, values)
     };
     Samples::new(size, values).map_err(|error| Error::reading(path, &error))
 }
 
-/// The values from 0 to 1, of one channel or three.
+/// The values as they are stored, of one channel or three.
 fn in_floats(image: DynamicImage) -> Vec<f32> {
-    if image.color().has_color() { image.into_rgb32f().into_raw() } else { image.to_luma32f().into_raw() }
+    match (image.color().has_color(), has_16_bits(&image)) {
+        (true, true) => image.into_rgb16().iter().copied().map(f32::from).collect(),
+        (true, false) => image.into_rgb8().iter().copied().map(f32::from).collect(),
+        (false, true) => image.into_luma16().iter().copied().map(f32::from).collect(),
+        (false, false) => image.into_luma8().iter().copied().map(f32::from).collect(),
+    }
 }
 
 /// Converts pixels. The crate `image` 0.25.10 panics if there is no memory for them.

@@ -29,8 +29,17 @@ pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<Dispar
         let what = format!("it holds {quantity}, as {} tells, and disparities are needed", sidecar.display());
         return Err(Error::reading(path, &what));
     }
-    let sign = if told.is_some_and(|told| told.is_negated) { -1.0 } else { 1.0 };
-    parse_signed(path, &Contents::of_pixels(path, limit)?.bytes, scale, sign, limit)
+    let bytes = Contents::of_pixels(path, limit)?.bytes;
+    let Some(range) = told.and_then(|told| told.negated) else { return parse_map(path, &bytes, scale, limit) };
+    let map = parse_signed(path, &bytes, scale, -1.0, limit)?;
+    // Another program may have written the map anew, and not the sidecar.
+    let scale = scale.unwrap_or(1.0);
+    if map.range() != range.map(|[min, max]| (min / scale, max / scale)) {
+        let sidecar = sidecar_of(path);
+        let what = format!("its values are not those that {} tells of; remove that if it is old", sidecar.display());
+        return Err(Error::reading(path, &what));
+    }
+    Ok(map)
 }
 
 /// Parses a map in memory; messages call it `path`.

@@ -92,9 +92,8 @@ impl Pfm {
     /// An image, from values from 0 to 1 or from 0 to 255. If no value is above 1, all are multiplied by 255.
     pub(crate) fn into_image(self, path: &Path) -> Result<Image, Error> {
         let factor = factor_to_8_bits(self.values.iter().copied()).map_err(|wrong| {
-            let is_map = wrong.0 == DisparityMap::UNKNOWN;
-            let advice = if is_map { "is it a disparity map?" } else { "`stretch` takes any range" };
-            Error::reading(path, &format!("{wrong}; {advice}"))
+            let is_map = if wrong.0 == DisparityMap::UNKNOWN { "; is it a disparity map?" } else { "" };
+            Error::reading(path, &format!("{wrong}{is_map}"))
         })?;
         let Size { width, height } = self.size;
         let values = self.values.into_iter().map(|value| scaled(value, factor)).collect::<Vec<_>>();

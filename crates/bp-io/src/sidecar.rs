@@ -31,8 +31,8 @@ pub fn sidecar_of(path: &Path) -> PathBuf {
 /// What the sidecar of a map says of it.
 pub(crate) struct Told {
     pub(crate) quantity: String,
-    /// Whether the map holds the negative of each value.
-    pub(crate) is_negated: bool,
+    /// If the map holds the negative of each value: the range of values in it, if any is known.
+    pub(crate) negated: Option<Option<[f32; 2]>>,
 }
 
 /// What a map's sidecar says; `None` if there is no sidecar of this program. Fails if one cannot be read.
@@ -49,7 +49,9 @@ pub(crate) fn told(path: &Path) -> Result<Option<Told>, Error> {
         let is_own = sidecar.get("program")?.as_str()?.starts_with(PROGRAM);
         let quantity = sidecar.get("quantity").filter(|_| is_own)?.as_str()?.to_owned();
         let is_negated = sidecar.get("scale").and_then(Value::as_f64).is_some_and(|scale| scale < 0.0);
-        Some(Told { quantity, is_negated })
+        let found = |end: &str| sidecar.get("found")?.get(end)?.as_f64().map(|value| value as f32);
+        let range = found("min").zip(found("max")).map(|(min, max)| [min, max]);
+        Some(Told { quantity, negated: is_negated.then_some(range) })
     };
     Ok(told())
 }

@@ -18,6 +18,9 @@ use crate::{Error, Limits, headers::tiff_lists};
 /// The tag with the text of the value that means none, by GDAL.
 const NO_DATA: Tag = Tag::Unknown(42113);
 
+/// The largest difference from the missing value, as a share of it. Programs write the least float as -3.40282e+38.
+const NEAR: f64 = 2e-6;
+
 /// Encodes values `[height][width]` as 32-bit floats.
 pub(crate) fn encode(size: Size, values: &[f32]) -> TiffResult<Vec<u8>> {
     let mut file = Cursor::new(Vec::new());
@@ -42,8 +45,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
     // The values, and as many bytes of a strip or of the floats that doubles are converted to.
     let needed = 2 * u64::from(bits / 8) * size.pixels() as u64;
     limit.check_memory(path, needed.saturating_add(lists + bytes.len() as u64))?;
-    let no_data = decoder.get_tag_ascii_string(NO_DATA).ok();
-    let no_data = no_data.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok()).map(|value: f64| value as f32);
+    let missing = missing(&mut decoder);
     let mut limits = tiff::decoder::Limits::default();
     limits.decoding_buffer_size = usize::try_from(needed).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
@@ -55,10 +57,29 @@ pub(crate) fn parse(path: &Path, bytes: &[u8], limit: Limits) -> Result<Option<(
     if values.len() != size.pixels() {
         return Err(Error::reading(path, &format!("{} values where {size} pixels were expected", values.len())));
     }
-    if let Some(missing) = no_data {
-        values.iter_mut().filter(|value| **value == missing).for_each(|value| *value = f32::NAN);
-    }
+    drop_values(missing, &mut values);
     Ok(Some((size, values)))
+}
+
+/// Makes the values NaN that a file declares as missing.
+pub(crate) fn drop_missing(path: &Path, bytes: &[u8], values: &mut [f32]) -> Result<(), Error> {
+    tiff_lists(path, bytes)?;
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|error| Error::reading(path, &error))?;
+    drop_values(missing(&mut decoder), values);
+    Ok(())
+}
+
+/// The value that a file declares as missing.
+fn missing(decoder: &mut Decoder<Cursor<&[u8]>>) -> Option<f64> {
+    let text = decoder.get_tag_ascii_string(NO_DATA).ok()?;
+    text.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace()).parse().ok()
+}
+
+/// Makes values NaN that are the missing one, or as near to it as text with six digits tells.
+fn drop_values(missing: Option<f64>, values: &mut [f32]) {
+    let Some(missing) = missing else { return };
+    let is_missing = |value: f32| (f64::from(value) - missing).abs() <= NEAR * missing.abs();
+    values.iter_mut().filter(|value| is_missing(**value)).for_each(|value| *value = f32::NAN);
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use bp_core::{
     DisparityMap, Image, Size, StereoPair,
-    image::{Samples, Stretch, common_factor, factor_to_8_bits, narrow, scaled},
+    image::{Samples, common_factor, factor_to_8_bits, narrow, scaled},
 };
-use bp_stereo::ReadPair;
+use bp_stereo::{Options, ReadPair, check_stretching, stretching_bytes};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
     ndarray::{ArrayView2, Axis, Ix3},
@@ -14,23 +14,40 @@ use pyo3::{
     prelude::*,
 };
 
-use crate::{errors::raised, lent::lent};
+use crate::{errors::raised, lent::Lent, threads::together};
 
 /// A pair of images from arrays `[height][width]`, `[height][width][1]` or `[height][width][3]` (red, green, blue) of uint8,
 /// uint16 or float32 with any strides. Bytes without gaps stay where they are; others are converted. Floats of both images have one
 /// scale.
 pub(crate) fn pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<StereoPair> {
-    let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
+    let (py, left, right) = (left.py(), Pixels::of("left", left)?, Pixels::of("right", right)?);
     let factor = common_factor([left.factor()?, right.factor()?]);
-    StereoPair::new(left.image(factor)?, right.image(factor)?).map_err(raised)
+    let planes = [left.planes(factor)?, right.planes(factor)?];
+    let sizes = [left.size, right.size];
+    together(py, move || {
+        let [left, right] = planes;
+        StereoPair::new(left.image(sizes[0])?, right.image(sizes[1])?)
+    })?
+    .map_err(raised)
 }
 
-/// A pair from such arrays whose values have any range, by one scale for both images.
-pub(crate) fn stretched_pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<ReadPair> {
-    let (left, right) = (Pixels::of("left", left)?.samples()?, Pixels::of("right", right)?.samples()?);
-    let (stretch, valid) = (Stretch::of(&[&left, &right]), left.valid());
-    let image = |samples: Samples| samples.stretched(&stretch).map_err(raised);
-    Ok(ReadPair { pair: StereoPair::new(image(left)?, image(right)?).map_err(raised)?, valid })
+/// A pair from such arrays whose values have any range, by one scale for both images; within the memory that the options allow.
+pub(crate) fn stretched_pair(
+    options: &Options,
+    left: &Bound<'_, PyAny>,
+    right: &Bound<'_, PyAny>,
+) -> PyResult<ReadPair> {
+    let (py, left, right) = (left.py(), Pixels::of("left", left)?, Pixels::of("right", right)?);
+    check_stretching(options, left.size, left.channels.max(right.channels)).map_err(raised)?;
+    let (left, right) = (left.samples()?, right.samples()?);
+    together(py, move || ReadPair::stretched(left, right))?.map_err(raised)
+}
+
+/// The most bytes that reading such arrays takes beside them, if their values are stretched; otherwise the prediction of the match has them.
+pub(crate) fn reading_bytes(options: &Options, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<u64> {
+    let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
+    let channels = left.channels.max(right.channels);
+    Ok(if options.stretch { stretching_bytes(left.size, channels) } else { 0 })
 }
 
 /// The address at which the values of an image are read: the array's own, unless they are copied. For tests.
@@ -43,13 +60,33 @@ pub(crate) fn _read_at(image: &Bound<'_, PyAny>) -> PyResult<usize> {
 /// One image from such an array. `name` is the argument, for messages.
 pub(crate) fn image(name: &'static str, object: &Bound<'_, PyAny>) -> PyResult<Image> {
     let pixels = Pixels::of(name, object)?;
-    pixels.image(common_factor([pixels.factor()?]))
+    let (size, planes) = (pixels.size, pixels.planes(common_factor([pixels.factor()?]))?);
+    together(object.py(), move || planes.image(size))?.map_err(raised)
+}
+
+/// The values of an image in 8 bits.
+enum Planes {
+    Lent(Lent),
+    Greys(Vec<u8>),
+    Colours(Vec<[u8; 3]>),
+}
+
+impl Planes {
+    fn image(self, Size { width, height }: Size) -> Result<Image, bp_core::Error> {
+        match self {
+            Self::Lent(bytes) if bytes.as_ref().len() == width * height => Image::lent_grey(width, height, bytes),
+            Self::Lent(bytes) => Image::lent_rgb(width, height, bytes),
+            Self::Greys(greys) => Image::from_grey(width, height, greys),
+            Self::Colours(colours) => Image::from_rgb(width, height, colours),
+        }
+    }
 }
 
 /// An array that holds an image.
 struct Pixels<'py> {
     name: &'static str,
     size: Size,
+    channels: usize,
     values: Values<'py>,
 }
 
@@ -64,8 +101,9 @@ const NEEDED: &str = "an array of uint8, uint16 or float32 is needed";
 impl<'py> Pixels<'py> {
     fn of(name: &'static str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array = array(name, object)?;
-        let [height, width] = match *array.shape() {
-            [height, width] | [height, width, 1 | 3] => [height, width],
+        let [height, width, channels] = match *array.shape() {
+            [height, width] => [height, width, 1],
+            [height, width, channels @ (1 | 3)] => [height, width, channels],
             _ => {
                 let what = "an image is [height][width] or [height][width][3]";
                 return Err(PyValueError::new_err(format!("{name} has the shape {:?}; {what}", array.shape())));
@@ -81,7 +119,7 @@ impl<'py> Pixels<'py> {
         } else {
             return Err(PyTypeError::new_err(format!("{name} holds {}; {NEEDED}", array.dtype())));
         };
-        Ok(Self { name, size, values })
+        Ok(Self { name, size, channels, values })
     }
 
     /// The factor that makes 8-bit values of floats. Fails at values that no image has.
@@ -96,11 +134,11 @@ impl<'py> Pixels<'py> {
         Ok(Some(factor))
     }
 
-    /// The values as floats; those of integers go from 0 to 1.
+    /// The values as floats.
     fn samples(&self) -> PyResult<Samples> {
         match &self.values {
-            Values::Bytes(array) => self.gathered(array, |value| f32::from(value) / f32::from(u8::MAX)),
-            Values::Words(array) => self.gathered(array, |value| f32::from(value) / f32::from(u16::MAX)),
+            Values::Bytes(array) => self.gathered(array, f32::from),
+            Values::Words(array) => self.gathered(array, f32::from),
             Values::Floats(array) => self.gathered(array, |value| value),
         }
     }
@@ -110,55 +148,52 @@ impl<'py> Pixels<'py> {
         array: &Bound<'_, PyArrayDyn<T>>,
         float: impl Fn(T) -> f32,
     ) -> PyResult<Samples> {
-        let mut values = Vec::new();
-        values.try_reserve_exact(array.len()).map_err(|_| self.no_room())?;
+        let mut values = self.room(array.len())?;
         for_each_row(array, |row| {
             values.extend(row.iter().map(|&value| float(value)));
             Ok(())
         })?;
-        Samples::new(self.size, values).map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
+        Samples::new(self.size, values).map_err(raised)
     }
 
-    fn no_room(&self) -> PyErr {
-        PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size))
-    }
-
-    fn image(&self, factor: f32) -> PyResult<Image> {
+    fn planes(&self, factor: f32) -> PyResult<Planes> {
         match &self.values {
-            Values::Bytes(array) => match lent(self.size, array) {
-                Some(image) => image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name))),
-                None => self.converted(array, |value| value),
-            },
+            Values::Bytes(array) if array.is_c_contiguous() => Ok(Planes::Lent(Lent::of(array))),
+            Values::Bytes(array) => self.converted(array, |value| value),
             Values::Words(array) => self.converted(array, narrow),
             Values::Floats(array) => self.converted(array, |value| scaled(value, factor)),
         }
     }
 
-    /// The image, with `stored` as the 8-bit value of each value.
+    /// The planes, with `stored` as the 8-bit value of each value.
     fn converted<T: Element + Copy + Default>(
         &self,
         array: &Bound<'_, PyArrayDyn<T>>,
         stored: impl Fn(T) -> u8,
-    ) -> PyResult<Image> {
-        let Size { width, height } = self.size;
-        let image = if let [_, _, 3] = array.shape() {
-            let mut colours = Vec::new();
-            colours.try_reserve_exact(self.size.pixels()).map_err(|_| self.no_room())?;
+    ) -> PyResult<Planes> {
+        if self.channels == 3 {
+            let mut colours = self.room(self.size.pixels())?;
             for_each_row(array, |row| {
                 colours.extend(row.as_chunks().0.iter().map(|pixel: &[T; 3]| pixel.map(&stored)));
                 Ok(())
             })?;
-            Image::from_rgb(width, height, colours)
-        } else {
-            let mut greys = Vec::new();
-            greys.try_reserve_exact(self.size.pixels()).map_err(|_| self.no_room())?;
-            for_each_row(array, |row| {
-                greys.extend(row.iter().map(|&value| stored(value)));
-                Ok(())
-            })?;
-            Image::from_grey(width, height, greys)
-        };
-        image.map_err(|error| raised(bp_stereo::Error::from(error).of(self.name)))
+            return Ok(Planes::Colours(colours));
+        }
+        let mut greys = self.room(self.size.pixels())?;
+        for_each_row(array, |row| {
+            greys.extend(row.iter().map(|&value| stored(value)));
+            Ok(())
+        })?;
+        Ok(Planes::Greys(greys))
+    }
+
+    /// An empty vector with room for so many elements.
+    fn room<T>(&self, len: usize) -> PyResult<Vec<T>> {
+        let mut values = Vec::new();
+        match values.try_reserve_exact(len) {
+            Ok(()) => Ok(values),
+            Err(_) => Err(PyMemoryError::new_err(format!("{}: no memory for {} pixels", self.name, self.size))),
+        }
     }
 }
 

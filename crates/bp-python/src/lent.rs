@@ -4,12 +4,11 @@
 
 use std::slice;
 
-use bp_core::{Error, Image, Size};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// The bytes of an array without gaps, and the array, which keeps them.
-struct Lent {
+pub(crate) struct Lent {
     start: *const u8,
     length: usize,
     _array: Py<PyArrayDyn<u8>>,
@@ -18,22 +17,19 @@ struct Lent {
 // SAFETY: the bytes stay where they are as long as the array lives, whichever thread reads them.
 unsafe impl Send for Lent {}
 
-impl AsRef<[u8]> for Lent {
-    fn as_ref(&self) -> &[u8] {
-        // SAFETY: the array holds that many bytes, and NumPy neither frees nor moves them while somebody holds the array. As for all
-        // functions that let other threads run while they read an array, its owner must not write to it meanwhile.
-        unsafe { slice::from_raw_parts(self.start, self.length) }
+impl Lent {
+    /// The values of an array side by side, `[height][width]` or `[height][width][channels]`.
+    pub(crate) fn of(array: &Bound<'_, PyArrayDyn<u8>>) -> Self {
+        debug_assert!(array.is_c_contiguous());
+        Self { start: array.data().cast_const(), length: array.len(), _array: array.clone().unbind() }
     }
 }
 
-/// The image that an array `[height][width]` or `[height][width][channels]` holds, read in its place. `None` if its values do not
-/// lie side by side.
-pub(crate) fn lent(size: Size, array: &Bound<'_, PyArrayDyn<u8>>) -> Option<Result<Image, Error>> {
-    if !array.is_c_contiguous() {
-        return None;
+impl AsRef<[u8]> for Lent {
+    fn as_ref(&self) -> &[u8] {
+        // SAFETY: the array holds that many bytes. While somebody holds the array, NumPy neither frees nor moves them, unless its owner
+        // says `resize(..., refcheck=False)`, whose documentation warns of just that. As for all functions that let other threads run
+        // while they read an array, the owner must not write to it meanwhile.
+        unsafe { slice::from_raw_parts(self.start, self.length) }
     }
-    let lent = Lent { start: array.data().cast_const(), length: array.len(), _array: array.clone().unbind() };
-    let Size { width, height } = size;
-    let is_coloured = matches!(array.shape(), [_, _, 3]);
-    Some(if is_coloured { Image::lent_rgb(width, height, lent) } else { Image::lent_grey(width, height, lent) })
 }

@@ -12,8 +12,9 @@ mod lent;
 mod matcher;
 mod options;
 mod rectifier;
+mod threads;
 
-use bp_stereo::{description::Device, devices::ALL, thread_pool};
+use bp_stereo::{description::Device, devices::ALL};
 use pyo3::{prelude::*, types::PyList};
 
 /// The native part of `bpstereo`.
@@ -44,10 +45,7 @@ mod _bpstereo {
 #[pyfunction]
 fn devices(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
-    // In a pool that ends again; Rayon's own would stay.
-    let pool = thread_pool(None).map_err(errors::raised)?;
-    let all = || ALL.iter().map(|backend| (*backend, backend.devices())).collect::<Vec<_>>();
-    let found = py.detach(|| pool.install(all));
+    let found = threads::together(py, || ALL.iter().map(|backend| (*backend, backend.devices())).collect::<Vec<_>>())?;
     for (backend, devices) in found {
         for (index, device) in devices.iter().enumerate() {
             let described = pythonize::pythonize(py, &Device::from(device))?;

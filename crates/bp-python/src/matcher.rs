@@ -6,16 +6,16 @@ use std::{
     sync::{Mutex, MutexGuard, TryLockError},
 };
 
-use bp_stereo::{Beside, Disparity, ReadPair, Start, description};
+use bp_stereo::{Disparity, ReadPair, Start, description};
 use numpy::PyArray2;
 use pyo3::{exceptions::PyRuntimeError, prelude::*, types::PyDict};
 use pythonize::pythonize;
 
 use crate::{
-    arrays::{fill, pair, plane, stretched_pair, target},
+    arrays::{fill, pair, plane, reading_bytes, stretched_pair, target},
     attended::attended,
     errors::{PairWarning, raised},
-    options::{STRETCH, options, stretch},
+    options::options,
 };
 
 /// The disparity map of a rectified pair: float32 [height][width] in pixels, NaN where it is unknown.
@@ -52,7 +52,7 @@ pub(crate) fn match_pair<'py>(
 /// of the same size.
 ///
 /// Options, all with a default: `algorithm` ("sweep", or one of the thesis, such as "cfbp"), `quality` ("fast",
-/// "balanced" or "best"), `stretch` (False), `profile`, `slope`, `truncation`, `edge_threshold`, `align` ("auto" or "off"), `labels`
+/// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `stretch`, `align` ("auto" or "off"), `labels`
 /// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`,
 /// `confidence`, `energy`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes).
 /// The library's documentation describes them; `options` shows their values. With `stretch`, the values of both images have any
@@ -69,7 +69,6 @@ pub(crate) struct Matcher(Mutex<State>);
 
 struct State {
     matcher: ManuallyDrop<bp_stereo::Matcher>,
-    stretch: bool,
     /// The process that opened the device. Threads do not survive a fork.
     process: u32,
     answer: Option<Answer>,
@@ -86,9 +85,9 @@ impl Matcher {
     #[new]
     #[pyo3(signature = (**options))]
     fn new(py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let (stretch, options) = stretch(options)?;
-        let matcher = opened(py, &self::options(options.as_ref())?, stretch)?;
-        Ok(Self(Mutex::new(State { matcher, stretch, process: process::id(), answer: None })))
+        let options = self::options(options)?;
+        let matcher = py.detach(|| bp_stereo::Matcher::new(&options)).map_err(raised)?;
+        Ok(Self(Mutex::new(State { matcher: ManuallyDrop::new(matcher), process: process::id(), answer: None })))
     }
 
     /// The disparity map of a pair, as `match` returns it.
@@ -132,10 +131,12 @@ impl Matcher {
     fn peak_bytes(&self, py: Python<'_>, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<u64> {
         let mut state = self.state()?;
         let ReadPair { pair, .. } = state.pair(left, right)?;
+        let reading = reading_bytes(state.matcher.options(), left, right)?;
         state.reopen_after_fork(py)?;
         // A matcher may go to another thread, but not be shared with one.
         let matcher = &mut *state.matcher;
-        py.detach(move || matcher.peak_bytes(&pair)).map_err(raised)
+        let peak = py.detach(move || matcher.peak_bytes(&pair)).map_err(raised)?;
+        Ok(peak.max(reading))
     }
 
     /// The confidence of the last map, 0 to 1: float32 [height][width]. None unless the option `confidence` is set.
@@ -172,10 +173,7 @@ impl Matcher {
     /// All options with their values.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let state = self.state()?;
-        let options = pythonize(py, state.matcher.options())?;
-        options.set_item(STRETCH, state.stretch)?;
-        Ok(options)
+        Ok(pythonize(py, self.state()?.matcher.options())?)
     }
 
     /// The device: its name, kind, driver and number of threads.
@@ -208,17 +206,11 @@ impl Matcher {
     }
 }
 
-/// A matcher that knows what will be in memory beside it.
-fn opened(py: Python<'_>, options: &bp_stereo::Options, stretch: bool) -> PyResult<ManuallyDrop<bp_stereo::Matcher>> {
-    let beside = Beside { masked: stretch, ..Beside::default() };
-    let matcher = py.detach(|| bp_stereo::Matcher::new(options)).map_err(raised)?;
-    Ok(ManuallyDrop::new(matcher.beside(beside)))
-}
-
 impl State {
     /// The pair that two arrays hold.
     fn pair(&self, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<ReadPair> {
-        if self.stretch { stretched_pair(left, right) } else { pair(left, right).map(Into::into) }
+        let options = self.matcher.options();
+        if options.stretch { stretched_pair(options, left, right) } else { pair(left, right).map(Into::into) }
     }
 
     /// In a child process, opens the device again: its threads have stayed with the parent.
@@ -227,7 +219,7 @@ impl State {
             return Ok(());
         }
         let options = self.matcher.options().clone();
-        self.matcher = opened(py, &options, self.stretch)?;
+        self.matcher = ManuallyDrop::new(py.detach(|| bp_stereo::Matcher::new(&options)).map_err(raised)?);
         self.process = process::id();
         Ok(())
     }

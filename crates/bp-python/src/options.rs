@@ -9,19 +9,7 @@ use pyo3::{
 use pythonize::depythonize;
 
 /// The options that are true or false. Python would take every other value for one of both.
-const FLAGS: [&str; 6] = ["check", "fill", "subpixel", "confidence", "energy", STRETCH];
-
-/// The keyword that is not an option of the library's matcher, which takes 8 bits: how arrays become images.
-pub(crate) const STRETCH: &str = "stretch";
-
-/// Whether values are stretched, and the other keywords.
-pub(crate) fn stretch<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<(bool, Option<Bound<'py, PyDict>>)> {
-    let Some(keywords) = keywords else { return Ok((false, None)) };
-    let others = keywords.copy()?;
-    let Some(given) = others.get_item(STRETCH)? else { return Ok((false, Some(others))) };
-    others.del_item(STRETCH)?;
-    Ok((in_full(STRETCH, given)?.is_truthy()?, Some(others)))
-}
+const FLAGS: [&str; 6] = ["stretch", "check", "fill", "subpixel", "confidence", "energy"];
 
 /// The options that keywords name. Two of them have a short form: `labels=64`, and `algorithm="cfbp"`.
 pub(crate) fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {

@@ -14,6 +14,7 @@ use crate::{
     arrays::pair,
     calibration::Calibration,
     errors::{raised, there},
+    threads::together,
 };
 
 /// The maps of one image: columns and rows.
@@ -44,7 +45,7 @@ impl Rectifier {
     fn new(py: Python<'_>, paths: Vec<PathBuf>, size: (usize, usize)) -> PyResult<Self> {
         paths.iter().try_for_each(|path| there(path))?;
         let size = Size::new(size.0, size.1).map_err(raised)?;
-        let rectifier = py.detach(|| Rectifying::read(&paths)?.rectifier(size)).map_err(raised)?;
+        let rectifier = together(py, || Rectifying::read(&paths)?.rectifier(size))?.map_err(raised)?;
         Ok(Self { rectifier, path: paths.into_iter().next().unwrap_or_default() })
     }
 
@@ -58,7 +59,7 @@ impl Rectifier {
         let has_colours =
             [left, right].map(|image| image.getattr("ndim").is_ok_and(|n| n.extract().is_ok_and(|n: u8| n > 2)));
         let raw = pair(left, right)?;
-        let rectified = py.detach(|| self.rectifier.rectified(raw.left(), raw.right())).map_err(raised)?;
+        let rectified = together(py, || self.rectifier.rectified(raw.left(), raw.right()))?.map_err(raised)?;
         Ok((bytes(py, rectified.left(), has_colours[0])?, bytes(py, rectified.right(), has_colours[1])?))
     }
 

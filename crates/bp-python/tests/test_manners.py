@@ -127,8 +127,11 @@ matcher.compute(image, image)
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_matcher_works_after_a_fork(pair):
-    matcher = bpstereo.Matcher(labels=16)
+@pytest.mark.parametrize("kind", ["grey", "stretched", "large colours"])
+def test_a_matcher_works_after_a_fork(pair, kind):
+    matcher = bpstereo.Matcher(labels=16, stretch=kind == "stretched")
+    if kind == "large colours":
+        pair = [numpy.dstack([image, image, 255 - image]) for image in shifted(500, 600, 3)]
     expected = matcher.compute(*pair)
     child = os.fork()
     if child == 0:

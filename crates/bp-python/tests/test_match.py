@@ -1,5 +1,6 @@
 """Arrays in, arrays out: the program's answer, whatever the arrays look like."""
 import subprocess
+import threading
 import warnings
 
 import bpstereo
@@ -84,6 +85,17 @@ def test_integers_of_any_range_are_stretched(pair):
         assert numpy.mean(numpy.abs(found - expected) < 0.25) > 0.98
     coloured = [numpy.dstack([image] * 3) for image in pair]
     assert numpy.array_equal(bpstereo.match(*coloured, labels=16, stretch=True), expected)
+    # One image may have been made of floats since.
+    mixed = pair[0].astype(numpy.uint16) * 5 + 900, pair[1].astype(numpy.float32) * 5 + 900
+    assert numpy.mean(numpy.abs(bpstereo.match(*mixed, labels=16, stretch=True) - expected) < 0.25) > 0.98
+
+
+def test_stretching_counts_as_memory():
+    image = numpy.zeros((1000, 1000, 3), numpy.uint16)
+    matcher = bpstereo.Matcher(labels=16, stretch=True, max_memory=50 << 20)
+    with pytest.raises(MemoryError, match="stretching 1000x1000"):
+        matcher.compute(image, image)
+    assert bpstereo.Matcher(labels=16, stretch=True).peak_bytes(image, image) >= image.size * 8
 
 
 def test_floats_of_a_pair_have_one_scale(pair):
@@ -140,11 +152,20 @@ def test_an_array_that_changes_during_its_match_harms_nobody():
     left, right = shifted(300, 400, 5)
     matcher, noise = bpstereo.Matcher(labels=16), numpy.random.default_rng(3)
 
-    def change(done, total):
-        left[:] = noise.integers(256, size=left.shape)
+    ended = threading.Event()
 
-    found = matcher.compute(left, right, progress=change)
-    assert found.shape == left.shape
+    def change():
+        while not ended.is_set():
+            left[:] = noise.integers(256, size=left.shape)
+
+    writer = threading.Thread(target=change)
+    writer.start()
+    try:
+        for options in [{}, {"check": True, "confidence": True}, {"profile": "census32"}]:
+            assert bpstereo.Matcher(labels=16, **options).compute(left, right).dtype == numpy.float32
+    finally:
+        ended.set()
+        writer.join()
     assert numpy.array_equal(matcher.compute(left, right), bpstereo.Matcher(labels=16).compute(left, right), equal_nan=True)
 
 

@@ -90,11 +90,16 @@ def test_the_lines_without_python_give_the_same_map(scene, program):
     page = (ROOT / "docs" / "python.md").read_text()
     lines = page[page.index("**Without Python**"):].split("```")[1].removeprefix("sh\n")
     path = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
-    missing = numpy.nan_to_num(load(scene / "left.tif"), nan=-9999)
-    for low, high in [(-12, 3), (-30, -2)]:
+    left, right = load(scene / "left.tif"), load(scene / "right.tif")
+    for case, (low, high) in enumerate([(-12, 3), (-30, -2), (-12, 3), (-12, 3)]):
         # First with NaN, then with what GDAL takes for none.
-        if high < 0:
-            save(scene / "left.tif", missing, nodata=-9999)
+        if case == 1:
+            save(scene / "left.tif", numpy.nan_to_num(left, nan=-9999), nodata=-9999)
+        if case == 2:
+            save(scene / "left.tif", numpy.nan_to_num(left, nan=-3.4028234663852886e38), nodata=-3.40282e38)
+        if case == 3:
+            for name, image in [("left.tif", left), ("right.tif", right)]:
+                save(scene / name, numpy.nan_to_num(image, nan=65535).astype(numpy.uint16), nodata=65535)
         arguments = ["-r", str(low), "-R", str(high), "left.tif", "right.tif"]
         subprocess.run(["sh", "-c", lines, "mgm", *arguments, "plain.tif"], cwd=scene, env=os.environ | {"PATH": path}, check=True)
         assert run(scene, " ".join([*arguments, "disp.tif"])).returncode == 0

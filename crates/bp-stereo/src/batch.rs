@@ -55,8 +55,6 @@ pub struct BatchOptions {
     pub warm_start: Option<u32>,
     /// Whether complete pairs are matched again.
     pub force: bool,
-    /// Whether values have any range and are stretched, as by [`read_stretched_pair`](crate::read_stretched_pair).
-    pub stretch: bool,
     /// Most megapixels of an image.
     pub max_megapixels: u32,
 }
@@ -106,7 +104,7 @@ impl Also {
 /// such as a device that is gone. A pair that fails, or whose outputs cannot be written, is an entry of
 /// [`Summary::failures`].
 pub fn run(options: &BatchOptions, making: &Making, watch: &Watch<'_>) -> Result<Summary, Error> {
-    check(options)?;
+    check(options, making)?;
     let max_memory = options.matching.max_memory;
     let found = options.source.find(&options.output, max_memory, watch)?;
     let listed = listed_bytes(&found.pairs, &options.output);
@@ -175,11 +173,11 @@ fn with_alignment(
     let file = options.alignment.as_deref().map(|path| (files, path));
     let (pixels, memory) = (options.max_megapixels, options.matching.max_memory);
     let read = |pair: &Pair| {
-        let (pair, stretch) = (pair.clone(), options.stretch);
+        let (pair, stretch) = (pair.clone(), options.matching.stretch);
         watch.unless_stopped(move || {
             let images = [pair.left.as_path(), &pair.right];
             if stretch {
-                Ok(read_stretched_pair(images, pixels, memory)?.pair)
+                Ok(read_stretched_pair(images, None, pixels, memory)?.pair)
             } else {
                 read_pair(images, pixels, memory)
             }
@@ -209,8 +207,11 @@ fn match_due(run: &Run<'_>, due: &[&Job<'_>]) -> Result<Vec<Failed>, Error> {
 }
 
 /// Fails if options contradict each other, if the format of maps is unknown, or if the name of a folder is not UTF-8, which records need.
-fn check(options: &BatchOptions) -> Result<(), Error> {
+fn check(options: &BatchOptions, making: &Making) -> Result<(), Error> {
     options.matching.check()?;
+    if options.matching.stretch && making.rectifying.is_some() {
+        return Err(Error::Options("`stretch` is for rectified images, without `rectify`".to_owned()));
+    }
     if MapFormat::named(&options.format).is_none() {
         return Err(Error::Options(format!("format {}: a map ends in {}", options.format, MapFormat::ENDINGS)));
     }

@@ -47,6 +47,9 @@ pub struct Settings {
     pub label_sets: bool,
     /// Where the image is cut.
     pub cut: Option<Cut>,
+    /// Whether the values of the images were stretched to all shades.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stretched: bool,
     /// How the rows of the images differed, if that was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<Rows>,
@@ -302,6 +305,7 @@ impl Settings {
             coarse_clip: settings.coarse_clip,
             label_sets: settings.label_sets,
             cut: settings.cut.map(|bp_core::Cut { x, y, seed_start }| Cut { x, y, seed_start }),
+            stretched: false,
             rows: None,
             finish: None,
             message_updates: plan.message_updates(),

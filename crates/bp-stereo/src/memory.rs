@@ -1,6 +1,6 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish};
+use bp_core::{Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish, image::Samples};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
@@ -27,6 +27,9 @@ const LABELS: u64 = 2;
 /// copied.
 const READING: u64 = Image::COLOUR_BYTES + 9;
 
+/// The same if values are stretched: both images as floats in three channels, and one of them in colour with its shades.
+const STRETCHING: u64 = 6 * Samples::VALUE_BYTES + 2 * Image::COLOUR_BYTES + 1;
+
 /// Bytes per pixel of the confidence.
 const TRUST: u64 = 4;
 
@@ -51,7 +54,7 @@ const SPECKLE: u64 = 8;
 pub struct Beside {
     /// Whether ground truth is in memory.
     pub truth: bool,
-    /// Whether the pixels that are valid are known one by one.
+    /// Whether a mask says which pixels are valid.
     pub masked: bool,
     /// Whether depths are made from the map.
     pub depth: bool,
@@ -156,13 +159,14 @@ impl Bytes {
         let a_pixel = |bytes: u64| bytes * size.pixels() as u64;
         let if_so = |is_so: bool, bytes: u64| if is_so { bytes } else { 0 };
         let (truth, depth) = (if_so(beside.truth, TRUTH), if_so(beside.depth, DEPTH));
-        let valid = if_so(beside.masked, VALID);
+        let valid = if_so(beside.masked || options.stretch, VALID);
         let (aligned, positions) = (if_so(images.is_aligned, images.compared), if_so(beside.rectified, POSITIONS));
         // The mirrored pair while the right image is matched, and its map after that.
         let right = if_so(options.needs_right(), RIGHT_MAP.max(2 * images.compared));
         let trust = if_so(options.confidence, TRUST);
+        let reading = if options.stretch { STRETCHING } else { READING };
         // Assumes that the next and the previous pair of a batch have the same size as this one.
-        let others = if_so(beside.batch, READING + 2 * Image::COLOUR_BYTES + MAP + trust + depth + WRITING);
+        let others = if_so(beside.batch, reading + 2 * Image::COLOUR_BYTES + MAP + trust + depth + WRITING);
         Self {
             held: PROGRAM + beside.listed + images.bytes + a_pixel(aligned + positions + truth + valid),
             coming: a_pixel(right + others),

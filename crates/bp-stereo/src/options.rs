@@ -36,6 +36,9 @@ pub struct Options {
     /// Halves slope and truncation where neighbouring grey values of the left image differ by more than this; 255 gives all
     /// edges the same cost. `None` means the profile's levels; see [`bp_core::EdgeLevels`].
     pub edge_threshold: Option<u8>,
+    /// Whether values of any range become shades: by one scale for both images, the 0.5 % darkest black, the 0.5 % brightest white.
+    /// For those who read images: files, and arrays of other languages. An [`Image`](bp_core::Image) has shades already.
+    pub stretch: bool,
     /// Whether the rows of the right image are aligned with those of the left one first.
     pub align: Align,
     /// The labels.
@@ -135,6 +138,7 @@ impl Default for Options {
             slope: None,
             truncation: None,
             edge_threshold: None,
+            stretch: false,
             align: Align::default(),
             labels: Labels::default(),
             min_disparity: None,
@@ -174,6 +178,8 @@ setters! {
     with_quality: Quality => quality = std::convert::identity;
     /// With [`Options::profile`].
     with_profile: Profile => profile = Some;
+    /// With [`Options::stretch`].
+    with_stretch: bool => stretch = std::convert::identity;
     /// With [`Options::align`].
     with_align: Align => align = std::convert::identity;
     /// With this number of labels; see [`Options::labels`].

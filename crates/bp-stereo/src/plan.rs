@@ -71,6 +71,7 @@ pub(crate) fn described(
         z,
         message_updates: tiling.message_updates(),
         planned_bytes: Some(tiling.bytes(&|plan| Ok(device.planned_bytes(plan)))?),
+        stretched: options.stretch,
         rows: alignment.map(Into::into),
         finish: description::Finish::of(options.finish()),
         ..description::Settings::new(plan, Some(device), options.algorithm.kind())

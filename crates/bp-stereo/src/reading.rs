@@ -8,7 +8,7 @@ use bp_core::{
 };
 use bp_io::{Contents, Limits, parse_samples, read_image};
 
-use crate::{Error, Memory, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
+use crate::{Error, Memory, Options, Rectifying, memory::PROGRAM, rectifying::POSITIONS};
 
 /// Bytes per raw pixel while a pair is rectified: the rectified pair, and the positions of its pixels.
 const RECTIFYING: u64 = 2 * Image::COLOUR_BYTES + POSITIONS;
@@ -63,26 +63,58 @@ pub struct ReadPair {
     pub valid: Option<Vec<bool>>,
 }
 
+impl ReadPair {
+    /// A pair whose values have any range. One scale for both images makes their 0.5 % darkest values black and their 0.5 % brightest white.
+    /// Missing values, which are not finite, become black.
+    ///
+    /// # Errors
+    /// [`bp_core::Error::SizesDiffer`], [`bp_core::Error::OutOfMemory`].
+    pub fn stretched(left: Samples, right: Samples) -> Result<Self, bp_core::Error> {
+        let (stretch, valid) = (Stretch::of(&[&left, &right]), left.valid());
+        Ok(Self { pair: StereoPair::new(left.stretched(&stretch)?, right.stretched(&stretch)?)?, valid })
+    }
+}
+
 impl From<StereoPair> for ReadPair {
     fn from(pair: StereoPair) -> Self {
         Self { pair, valid: None }
     }
 }
 
-/// As [`read_pair`], for images whose values have any range, in integers or floats. One scale for both images makes their 0.5 %
-/// darkest values black and their 0.5 % brightest white. Missing values, which are not finite, become black.
+/// As [`read_pair`], for images whose values have any range, in integers or floats; see [`ReadPair::stretched`]. Pixels of the left image
+/// that are not valid, `[height][width]`, count as missing.
 ///
 /// # Errors
 /// Those of [`read_pair`].
 pub fn read_stretched_pair(
     images: [&Path; 2],
+    valid: Option<&[bool]>,
     max_megapixels: u32,
     max_memory: Option<u64>,
 ) -> Result<ReadPair, Error> {
-    Room::new(max_megapixels, max_memory).stretched_pair(images, |room, path| {
+    Room::new(max_megapixels, max_memory).stretched_pair(images, valid, |room, path| {
         let contents = room.explained(Contents::of_pixels(path, room.limits))?;
         room.explained(parse_samples(path, &contents.bytes, room.limits))
     })
+}
+
+/// The most bytes that the program holds while it stretches a pair of this size, of one channel or three, in memory.
+#[must_use]
+pub fn stretching_bytes(size: Size, channels: usize) -> u64 {
+    PROGRAM + stretching(channels) * size.pixels() as u64
+}
+
+/// Fails if a pair in memory cannot be stretched within the memory that is free or, by the options, allowed.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn check_stretching(options: &Options, size: Size, channels: usize) -> Result<(), Error> {
+    Room::new(Limits::MEGAPIXELS, options.max_memory).check(size, stretching(channels), "stretching")
+}
+
+/// Bytes per pixel of both images as floats, and of what is made of them.
+fn stretching(channels: usize) -> u64 {
+    2 * channels as u64 * Samples::VALUE_BYTES + STRETCHING
 }
 
 /// How many pixels and bytes an image may take.
@@ -130,15 +162,15 @@ impl Room {
     pub(crate) fn stretched_pair(
         self,
         images: [&Path; 2],
+        valid: Option<&[bool]>,
         mut read: impl FnMut(Self, &Path) -> Result<Samples, Error>,
     ) -> Result<ReadPair, Error> {
         let [left, right] = images;
-        let one = read(self, left)?;
+        let mut one = read(self, left)?;
+        valid.iter().for_each(|valid| one.restrict(valid));
         let other = read(self.without(one.bytes()), right)?;
         self.without(one.bytes() + other.bytes()).check(one.size(), STRETCHING, "stretching")?;
-        let (stretch, valid) = (Stretch::of(&[&one, &other]), one.valid());
-        let pair = StereoPair::new(one.stretched(&stretch)?, other.stretched(&stretch)?);
-        Ok(ReadPair { pair: pair.map_err(|error| named(images, error))?, valid })
+        ReadPair::stretched(one, other).map_err(|error| named(images, error))
     }
 
     /// Fails if so many bytes for each pixel of a pair of this size are not left for this step.

@@ -63,6 +63,9 @@ impl Stream {
     /// # Errors
     /// [`Error::Options`], [`Error::File`] if the source is no such video, [`Error::Stopped`], and those of [`Matcher::new`].
     pub fn open(options: StreamOptions, watch: &Watch<'_>) -> Result<Self, Error> {
+        if options.matching.stretch {
+            return Err(Error::Options("`stretch` is for files: frames have 8 bits".to_owned()));
+        }
         let beside = Beside { rectified: options.rectifying.is_some(), batch: true, ..Beside::default() };
         let matcher = Matcher::new(&options.matching)?.beside(beside);
         let (source, room) = (options.source.clone(), Room::new(options.max_megapixels, options.matching.max_memory));

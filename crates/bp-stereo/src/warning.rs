@@ -17,6 +17,8 @@ pub enum Warning {
     Identical,
     /// Hardly anything matches.
     Unlike,
+    /// The images have this number of shades only.
+    FewShades(u16),
     /// Too little matches to find labels; a quarter of the width is used.
     NoLabelsFound,
     /// The images look exchanged.
@@ -28,6 +30,9 @@ pub enum Warning {
     /// Some labels match nothing inside the right image.
     Unused(Unused),
 }
+
+/// So many shades are few. Values of 14 bits that were stored in 16 have these at most; public photographs have more than 120.
+const FEW_SHADES: u16 = 64;
 
 /// Disparities beyond the labels, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,7 +70,10 @@ pub(crate) fn of(
     let exchanged = survey.exchanged && options.min_disparity.is_none_or(|first| first >= 0);
     let mut warnings = Vec::new();
     let mut add = |is_so: bool, warning| warnings.extend(is_so.then_some(warning));
-    add(survey.identical, Warning::Identical);
+    let has_few_shades = survey.shades <= FEW_SHADES && !options.stretch;
+    add(has_few_shades, Warning::FewShades(survey.shades));
+    // In so few shades, different images may be the same.
+    add(survey.identical && !has_few_shades, Warning::Identical);
     add(survey.unlike, Warning::Unlike);
     add(!found_labels, Warning::NoLabelsFound);
     add(exchanged, Warning::Exchanged);
@@ -121,6 +129,7 @@ impl Warning {
         match self {
             Self::Identical => "show the same image twice",
             Self::Unlike => "hardly match",
+            Self::FewShades(_) => "have few shades",
             Self::NoLabelsFound => "match too little to find labels",
             Self::Exchanged => "look exchanged",
             Self::Rows(_) => "have rows that do not correspond",
@@ -137,6 +146,11 @@ impl Warning {
             Self::Unlike => {
                 format!(
                     "hardly anything in {pair} matches: they show different scenes, are far from rectified, or are blank"
+                )
+            }
+            Self::FewShades(shades) => {
+                format!(
+                    "{pair} have only {shades} of 256 shades: if their values do not use their bits in full, `stretch` them"
                 )
             }
             Self::NoLabelsFound => {

@@ -37,7 +37,6 @@ fn a_tiny_batch_is_matched_once() {
         shard: Shard::default(),
         warm_start: None,
         force: false,
-        stretch: false,
         max_megapixels: 1,
     };
     let done = |options| {

@@ -12,7 +12,8 @@ use std::{
 
 use bp_core::{Size, depth_map, image::Stretch};
 use bp_io::{
-    Cameras, Frames, Layout, Limits, MapFormat, Mask, PairFrames, Raster, parse_image, parse_map, parse_mask, parse_samples,
+    Cameras, Frames, Layout, Limits, MapFormat, Mask, PairFrames, Raster, parse_image, parse_map, parse_mask,
+    parse_samples,
 };
 use bp_stereo::pairs;
 

@@ -41,8 +41,8 @@ pub(crate) struct MatchArgs {
     /// Values have any range: stretch those of both images, by one scale, so that the 0.5 % darkest become black and the 0.5 % brightest
     /// white.
     ///
-    /// For satellite and scientific images: 16 bits that are not used in full, and TIFF, NPY or PFM of floats. Where the left image
-    /// has no value (NaN), the map is unknown.
+    /// For satellite and scientific images: 16 bits that are not used in full, and grey TIFF, NPY or PFM of floats. Where the left
+    /// image has no value (NaN, or what a TIFF declares as missing), the map is unknown.
     #[arg(long, conflicts_with = "rectify", hide_short_help = true)]
     pub(crate) stretch: bool,
     /// Mask of the left image: an 8-bit image, 255 where it shows something. Elsewhere the map is unknown.

@@ -32,6 +32,7 @@ impl MatchArgs {
             slope: plan.slope,
             truncation: plan.truncation,
             edge_threshold: plan.edge_threshold,
+            stretch: self.stretch,
             align: plan.align.meaning()?,
             labels: plan.labels.unwrap_or_default(),
             min_disparity: plan.min_disparity,
@@ -80,7 +81,6 @@ impl MatchArgs {
             shard: self.many.shard.unwrap_or_default(),
             warm_start: self.many.warm_start,
             force: self.many.force,
-            stretch: self.stretch,
             max_megapixels: self.max_megapixels,
         }))
     }

@@ -39,10 +39,8 @@ impl MatchArgs {
             return Err(Failure::usage(format!("{what}; for files, give patterns such as 'left/%04d.png'")));
         }
         let has_files = [picture, depth, points, &self.finish.confidence].into_iter().any(Option::is_some);
-        if self.stretch || making.negate {
-            return Err(Failure::usage(
-                "--stretch and --negate are for files: frames have 8 bits, and their maps our sign",
-            ));
+        if making.negate {
+            return Err(Failure::usage("--negate is for files: the maps of frames have our sign"));
         }
         if has_files || !many.also.is_empty() || many.shard.is_some() || many.force || many.warm_start.is_some() {
             let what = "frames from pipes give maps alone, or with --format y4m their pictures";

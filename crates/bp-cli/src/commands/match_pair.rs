@@ -175,19 +175,29 @@ impl Job<'_> {
 /// Reads the pair, and rectifies or stretches it if asked for.
 fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<ReadPair, Failure> {
     let (megapixels, max_memory) = (args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()));
+    let mask = args.valid.as_deref().map(|path| read_valid(args, path)).transpose()?;
+    let valid = mask.as_ref().map(|mask| mask.values.as_slice());
     let mut read = match &making.rectifying {
         Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory)?.into(),
-        None if args.stretch => read_stretched_pair(files, megapixels, max_memory)?,
+        None if args.stretch => read_stretched_pair(files, valid, megapixels, max_memory)?,
         None => ReadPair::from(read_pair(files, megapixels, max_memory)?),
     };
-    if let Some(path) = &args.valid {
-        let limits = reading_limits(megapixels, max_memory, read.pair.bytes());
-        let Mask { size, values } = read_mask(path, limits)?;
-        check_size(path, size, &read.pair)?;
-        let both = |other: Vec<bool>| other.into_iter().zip(&values).map(|(one, &other)| one && other).collect();
-        read.valid = Some(read.valid.map_or_else(|| values.clone(), both));
+    if let Some((mask, path)) = mask.zip(args.valid.as_deref()) {
+        check_size(path, mask.size, &read.pair)?;
+        // Stretching has put both together.
+        read.valid.get_or_insert(mask.values);
     }
     Ok(read)
+}
+
+/// Reads the mask of the left image.
+fn read_valid(args: &MatchArgs, path: &Path) -> Result<Mask, Failure> {
+    let limits = reading_limits(args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()), 0);
+    let mask = read_mask(path, limits)?;
+    if mask.values.contains(&true) {
+        return Ok(mask);
+    }
+    Err(Failure::input(format!("{}: no pixel is 255, so the mask selects none", path.display())))
 }
 
 /// Writes a map to standard output.

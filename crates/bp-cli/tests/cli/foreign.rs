@@ -44,7 +44,7 @@ fn values_of_any_range_are_stretched() {
     write_pair(&folder);
     for format in ["pfm", "tif", "npy"] {
         let pair = format!("left.{format} right.{format}");
-        folder.fails(&format!("match {pair} -o no.pfm"), 3, &[&format!("left.{format}")]);
+        folder.fails(&format!("match {pair} -o no.pfm"), 3, &[&format!("left.{format}"), "--stretch"]);
         succeeds(&folder, &format!("match {pair} -o {format}.pfm --stretch --labels 12 --no-sidecar"));
         assert_eq!(map(&folder, &format!("{format}.pfm")), map(&folder, "pfm.pfm"));
     }
@@ -60,6 +60,25 @@ fn values_of_any_range_are_stretched() {
     };
     let [plain, stretched] = [bad(""), bad("--stretch")];
     assert!(stretched < 0.5 * plain, "{stretched} % wrong, {plain} % without");
+}
+
+#[test]
+fn images_that_need_to_be_stretched_are_told_so() {
+    let folder = Folder::new();
+    let told = |options: &str| {
+        let arguments = format!("match {options} -o map.pfm --labels 12");
+        text(&folder.run(&arguments).stderr).contains("of 256 shades")
+    };
+    for (most, is_told) in [(0_u8, true), (1, true), (60, true), (90, false)] {
+        for side in ["left", "right"] {
+            let mut image = image::open(folder.path(&format!("{side}.png"))).unwrap().into_luma8();
+            image.iter_mut().for_each(|value| *value = (f32::from(*value) / 255.0 * f32::from(most)).round() as u8);
+            image.save(folder.path(&format!("{side}.ppm"))).unwrap();
+        }
+        assert_eq!(told("left.ppm right.ppm"), is_told, "{most}");
+        assert!(!told("left.ppm right.ppm --stretch"));
+    }
+    assert!(!told("left.png right.png"));
 }
 
 #[test]
@@ -95,8 +114,26 @@ fn a_mask_says_what_the_left_image_shows() {
     let both = map(&folder, "both.pfm");
     let expected = |index: usize| index >= 4 * SIZE.width && index % SIZE.width < 30;
     assert!(both.values().iter().enumerate().all(|(index, value)| value.is_finite() == expected(index)));
+    folder.fails(&format!("{MATCH} no.pfm --valid truth.png"), 3, &["truth.png: no pixel is 255"]);
+    image::GrayImage::from_pixel(WIDTH + 1, HEIGHT, image::Luma([255])).save(folder.path("wide.png")).unwrap();
     folder.fails(&format!("{MATCH} no.pfm --valid wide.png"), 3, &["wide.png: 41x24", "40x24"]);
+    folder.fails("match left.tif right.tif -o no.pfm --stretch --valid wide.png", 3, &["wide.png: 41x24", "40x24"]);
     folder.fails(&format!("{MATCH} no.pfm --valid none.png"), 3, &["none.png"]);
+}
+
+#[test]
+fn what_is_not_valid_has_no_shade() {
+    let folder = Folder::new();
+    write_pair(&folder);
+    let mask = image::GrayImage::from_fn(WIDTH, HEIGHT, |x, _| image::Luma([if x < 30 { 255 } else { 0 }]));
+    mask.save(folder.path("mask.png")).unwrap();
+    let mut left = image::open(folder.path("left16.png")).unwrap().into_luma16();
+    left.enumerate_pixels_mut().filter(|(x, ..)| *x >= 30).for_each(|(_, _, pixel)| pixel.0 = [u16::MAX]);
+    left.save(folder.path("filled.png")).unwrap();
+    let options = "--stretch --valid mask.png --labels 12 --ground-truth truth.png --scale 2 --json";
+    let report = folder.json(&format!("match filled.png right16.png -o map.pfm {options}"));
+    assert!(report["errors"]["all"]["bad"][1].as_f64().unwrap() < 5.0, "{}", report["errors"]);
+    assert_eq!(report["settings"]["stretched"], true);
 }
 
 #[test]
@@ -110,8 +147,16 @@ fn maps_may_have_the_other_sign() {
         // A value is what is stored times the scale.
         assert_eq!(sidecar["scale"], -1.0);
         assert!(sidecar["found"]["max"].as_f64().unwrap() > f64::from(SHIFT) - 1.0);
-        // Who reads the sidecar gets our sign again.
+        // Who reads the sidecar gets our sign again, unless it is that of another map.
         assert_eq!(map(&folder, negated), map(&folder, "plain.tif"));
+        let report = folder.json(&format!("evaluate {negated} truth.png --scale 2 --json"));
+        assert!(report["all"]["bad"][1].as_f64().unwrap() < 20.0, "{report}");
+        let stored = fs::read(folder.path(negated)).unwrap();
+        let plain = Raster::disparities(&map(&folder, "plain.tif"))
+            .floats(bp_io::MapFormat::of(&folder.path(negated)).unwrap());
+        fs::write(folder.path(negated), plain.unwrap().unwrap()).unwrap();
+        folder.fails(&format!("convert {negated} -o no.npy"), 3, &[negated, "remove that if it is old"]);
+        fs::write(folder.path(negated), stored).unwrap();
         fs::remove_file(folder.path(&format!("{negated}.json"))).unwrap();
         let negative: Vec<f32> = map(&folder, "plain.tif").values().iter().map(|value| -value).collect();
         assert_eq!(map(&folder, negated).values(), negative);

@@ -20,6 +20,9 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// Bytes of a value.
+    pub const VALUE_BYTES: u64 = size_of::<f32>() as u64;
+
     /// An image from its values, `[height][width]`, or `[height][width][3]` for colours.
     ///
     /// # Errors
@@ -48,6 +51,12 @@ impl Samples {
         let is_valid = |pixel: &[f32]| pixel.iter().all(|value| value.is_finite());
         let pixels = self.values.chunks_exact(self.channels);
         (!is_valid(&self.values)).then(|| pixels.map(is_valid).collect())
+    }
+
+    /// Makes the values of the pixels missing that are not valid, `[height][width]`; pixels beyond its end stay.
+    pub fn restrict(&mut self, valid: &[bool]) {
+        let pixels = self.values.chunks_exact_mut(self.channels).zip(valid);
+        pixels.filter(|(_, valid)| !**valid).for_each(|(pixel, _)| pixel.fill(f32::NAN));
     }
 
     /// The image in 8 bits. Missing values become black.

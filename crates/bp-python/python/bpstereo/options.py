@@ -17,6 +17,7 @@ class Options(TypedDict, total=False):
     slope: int | None
     truncation: int | None
     edge_threshold: int | None
+    stretch: bool
     align: Literal["off", "auto"] | dict[str, Any]
     labels: Literal["auto", "quarter_of_width"] | int | dict[str, int]
     min_disparity: int | None
@@ -31,4 +32,3 @@ class Options(TypedDict, total=False):
     device: str | None
     threads: int | None
     max_memory: int | None
-    stretch: bool

@@ -27,7 +27,7 @@ impl Images {
             Ok::<_, Error>(contents.bytes)
         };
         let pair = if stretch {
-            room.stretched_pair(paths, |room, path| {
+            room.stretched_pair(paths, None, |room, path| {
                 let bytes = contents(room, path)?;
                 room.explained(parse_samples(path, &bytes, room.limits))
             })

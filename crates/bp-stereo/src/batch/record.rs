@@ -209,15 +209,7 @@ struct OutputSettings<'a> {
     /// SHA-256 of the calibration, if pairs are rectified with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     rectified: Option<&'a str>,
-    #[serde(skip_serializing_if = "is_off")]
-    stretch: bool,
-    #[serde(skip_serializing_if = "is_off")]
     negate: bool,
-}
-
-/// Settings that are off need not be there, as in older records.
-fn is_off(setting: &bool) -> bool {
-    !setting
 }
 
 /// The values of a geometry, since its file may change later.
@@ -255,7 +247,6 @@ pub(super) fn settings_sha256(options: &BatchOptions, making: &Making) -> Result
         nan: making.nan,
         geometry: making.geometry.as_ref().map(Into::into),
         rectified: making.rectifying.as_deref().map(Rectifying::sha256),
-        stretch: options.stretch,
         negate: making.negate,
     };
     let text = serde_json::to_vec(&settings).map_err(|error| Error::System(format!("settings: {error}")))?;

@@ -144,7 +144,7 @@ impl Run<'_> {
 
     fn read<'a>(&self, job: &'a Job<'a>, room: Room) -> Result<Read<'a>, Stopped> {
         let (start, pair, rectifying) = (Instant::now(), job.pair.clone(), self.making.rectifying.clone());
-        let stretch = self.options.stretch;
+        let stretch = self.options.matching.stretch;
         let mut images =
             self.watch.unless_stopped(move || Images::read(&pair, room, rectifying.as_deref(), stretch))?;
         if !self.options.also.contains(&Also::Points) {
@@ -173,7 +173,7 @@ impl Run<'_> {
         let options = Options { energy: true, ..self.options.matching.clone() };
         Ok(Matcher::new(&options)?.beside(Beside {
             truth: false,
-            masked: self.options.stretch,
+            masked: false,
             depth,
             rectified: self.making.rectifying.is_some(),
             batch,
