@@ -28,7 +28,7 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
         Some(ImageFormat::Png) => png::decode(path, bytes, limit),
         Some(ImageFormat::Jpeg) if !has_jpeg_end(bytes) => Err(failed(&ENDS_EARLY)),
         Some(format) => decode_as(format, path, bytes, limit),
-        None => Err(failed(&"not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM; NPY to `stretch`)")),
+        None => Err(failed(&"not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM; with `stretch`, NPY)")),
     }
 }
 
@@ -96,8 +96,7 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];
 
-const OTHER_TIFF: &str =
-    "a TIFF image holds 8 or 16 bits, grey or RGB, or floats in grey that are to `stretch`; save it so";
+const OTHER_TIFF: &str = "a TIFF image holds 8 or 16 bits, grey or RGB; with `stretch`, also grey floats";
 
 /// Why a file could not be decoded.
 fn undecoded(path: &Path, format: ImageFormat, error: ImageError) -> Error {

@@ -2,19 +2,15 @@
 
 use std::path::Path;
 
-use bp_core::{
-    Image, Size,
-    image::{Samples, narrow},
-};
-use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, ImageFormat, codecs::png::PngEncoder};
+use bp_core::{Image, Size, image::narrow};
+use image::{DynamicImage, ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
 use sha2::{Digest, Sha256};
 
 use crate::{
     Contents, Error, Files, Limits,
     caught::caught,
     decode::{check_unscaled, decode, decoded},
-    maps::floats,
-    pfm, tiff,
+    pfm,
 };
 
 /// Reads an image with 8 or 16 bits, or a PFM, grey or colour. Ignores transparency and the orientation tag of cameras.
@@ -50,44 +46,12 @@ pub fn parse_image(path: &Path, bytes: &[u8], limit: Limits) -> Result<Image, Er
     converted(path, decoded, in_8_bits)?.map_err(|error| Error::reading(path, &error))
 }
 
-/// Parses an image whose values have any range, grey or colour: as [`parse_image`], and TIFF and NPY of floats in grey. Values that a
-/// TIFF declares as missing are NaN.
-///
-/// # Errors
-/// Those of [`read_image`].
-pub fn parse_samples(path: &Path, bytes: &[u8], limit: Limits) -> Result<Samples, Error> {
-    let (size, values) = if pfm::is_pfm(bytes) {
-        let pfm = pfm::parse(path, bytes, limit)?;
-        (pfm.size, pfm.values)
-    } else if let Some(floats) = floats(path, bytes, limit)? {
-        floats
-    } else {
-        let decoded = decoded(path, || decode(path, bytes, limit))?;
-        let channels = if decoded.color().has_color() { 3 } else { 1 };
-        let values = u64::from(decoded.width()) * u64::from(decoded.height()) * channels * 4;
-        // The file, what was decoded, and the values.
-        limit.check_memory(path, bytes.len() as u64 + decoded.as_bytes().len() as u64 + values)?;
-        let (size, mut values) = (size(path, &decoded)?, converted(path, decoded, in_floats)?);
-        if image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Tiff) {
-            tiff::drop_missing(path, bytes, &mut values)?;
-        }
-        (size, values)
-    };
-    Samples::new(size, values).map_err(|error| Error::reading(path, &error))
-}
-
-/// The values as they are stored, of one channel or three.
-fn in_floats(image: DynamicImage) -> Vec<f32> {
-    match (image.color().has_color(), has_16_bits(&image)) {
-        (true, true) => image.into_rgb16().iter().copied().map(f32::from).collect(),
-        (true, false) => image.into_rgb8().iter().copied().map(f32::from).collect(),
-        (false, true) => image.into_luma16().iter().copied().map(f32::from).collect(),
-        (false, false) => image.into_luma8().iter().copied().map(f32::from).collect(),
-    }
-}
-
 /// Converts pixels. The crate `image` 0.25.10 panics if there is no memory for them.
-fn converted<T>(path: &Path, image: DynamicImage, convert: impl FnOnce(DynamicImage) -> T) -> Result<T, Error> {
+pub(crate) fn converted<T>(
+    path: &Path,
+    image: DynamicImage,
+    convert: impl FnOnce(DynamicImage) -> T,
+) -> Result<T, Error> {
     let needed = 3 * u64::from(image.width()) * u64::from(image.height());
     caught(|| convert(image)).map_err(|_| Error::OutOfMemory { path: path.to_owned(), needed, available: None })
 }
@@ -121,12 +85,12 @@ fn greys(image: DynamicImage) -> Vec<u8> {
 }
 
 /// The size. Fails if it is 0, which some formats allow.
-fn size(path: &Path, image: &DynamicImage) -> Result<Size, Error> {
+pub(crate) fn size(path: &Path, image: &DynamicImage) -> Result<Size, Error> {
     let size = Size::new(image.width() as usize, image.height() as usize);
     size.map_err(|error| Error::reading(path, &error))
 }
 
-fn has_16_bits(image: &DynamicImage) -> bool {
+pub(crate) fn has_16_bits(image: &DynamicImage) -> bool {
     image.color().bytes_per_pixel() == 2 * image.color().channel_count()
 }
 

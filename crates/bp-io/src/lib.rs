@@ -40,6 +40,7 @@ mod ply;
 mod png;
 mod raster;
 mod read;
+mod samples;
 mod sidecar;
 mod tiff;
 mod write;
@@ -52,14 +53,13 @@ pub use error::Error;
 pub use folders::create_folder;
 pub use format::{MapFormat, Quantity, check_ending, check_range};
 pub use frames::{FrameFormat, Frames, Layout, PairFrames};
-pub use images::{
-    StoredGrey, hex, parse_image, parse_samples, pixels_sha256, read_image, read_stored_grey, write_image,
-};
+pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey, write_image};
 pub use limits::Limits;
 pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};
 pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};
 pub use ply::write_points;
 pub use raster::Raster;
 pub use read::{Contents, MOST_DESCRIPTION, MOST_TEXT, read_source, read_text};
+pub use samples::parse_samples;
 pub use sidecar::{Origin, put_described, sidecar_of, staged_picture_sidecar, staged_sidecar};
 pub use write::{Files, Staged, check_distinct, check_new, is_stream, resolved};

@@ -300,8 +300,8 @@ fn floats_are_images_only_within_a_known_range() {
     succeeds(&folder, "convert map.pfm -o map.tif");
     succeeds(&folder, "convert map.pfm -o map.npy");
     folder.fails("match map.pfm right.png -o a.pfm", 3, &["map.pfm", "0 to 1", "disparity map"]);
-    folder.fails("match map.tif right.png -o a.pfm", 3, &["map.tif", "PFM"]);
-    folder.fails("match map.npy right.png -o a.pfm", 3, &["map.npy", "known format"]);
+    folder.fails("match map.tif right.png -o a.pfm", 3, &["map.tif", "--stretch"]);
+    folder.fails("match map.npy right.png -o a.pfm", 3, &["map.npy", "known format", "--stretch"]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ pub fn narrow(value: u16) -> u8 {
 
 /// A value that no image of floats has.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("an image's values go from 0 to 1 or from 0 to 255, or any range is to `stretch`; this has {0}")]
+#[error("an image's values go from 0 to 1 or from 0 to 255, with `stretch` anywhere; this has {0}")]
 pub struct NotAShade(pub f32);
 
 /// The factor by which [`scaled`] makes 8-bit values of an image's floats: 255 if none is above 1, else 1.
