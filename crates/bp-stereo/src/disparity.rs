@@ -11,11 +11,11 @@ use crate::{AnswerTimes, Tiles, Warning, description};
 pub struct Disparity {
     /// The disparity map of the left image.
     pub map: DisparityMap,
-    /// The confidence of each pixel, 0 to 1, `[height][width]`; `None` unless [`Options::confidence`] asks for it.
+    /// The confidence of each pixel, 0 to 1, `[height][width]`; `None` unless [`Options::confidence`](crate::Options::confidence) asks for it.
     pub confidence: Option<Vec<f32>>,
     /// Wall-clock times.
     pub times: AnswerTimes,
-    /// The energy of the labels; `None` unless [`Options::energy`] asks for it.
+    /// The energy of the labels; `None` unless [`Options::energy`](crate::Options::energy) asks for it.
     pub energy: Option<Energy>,
     /// The settings that were run.
     pub settings: description::Settings,
