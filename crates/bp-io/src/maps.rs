@@ -36,7 +36,7 @@ pub fn read_map(path: &Path, scale: Option<f32>, limit: Limits) -> Result<Dispar
     let scale = scale.unwrap_or(1.0);
     if map.range() != range.map(|[min, max]| (min / scale, max / scale)) {
         let sidecar = sidecar_of(path);
-        let what = format!("its values are not those that {} tells of; remove that if it is old", sidecar.display());
+        let what = format!("{} describes another map; remove it if it is out of date", sidecar.display());
         return Err(Error::reading(path, &what));
     }
     Ok(map)
@@ -93,7 +93,7 @@ pub struct Mask {
     pub values: Vec<bool>,
 }
 
-/// Reads an 8-bit mask. Pixels with the value 255 are selected.
+/// Reads an 8-bit mask. Pixels with the value 255 are selected; there must be one.
 ///
 /// # Errors
 /// [`Error::Read`] and [`Error::OutOfMemory`].
@@ -109,6 +109,9 @@ pub fn parse_mask(path: &Path, bytes: &[u8], limit: Limits) -> Result<Mask, Erro
     let StoredGrey { size, values, has_16_bits } = stored_grey(path, bytes, limit)?;
     if has_16_bits {
         return Err(Error::reading(path, &"a mask has 8 bits, 255 where a pixel counts"));
+    }
+    if !values.contains(&255) {
+        return Err(Error::reading(path, &"no pixel is 255, so the mask selects none"));
     }
     Ok(Mask { size, values: values.into_iter().map(|value| value == 255).collect() })
 }

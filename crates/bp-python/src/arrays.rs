@@ -43,7 +43,8 @@ pub(crate) fn stretched_pair(
     together(py, move || ReadPair::stretched(left, right))?.map_err(raised)
 }
 
-/// The most bytes that reading such arrays takes beside them, if their values are stretched; otherwise the prediction of the match has them.
+/// The most bytes that stretching the values of such arrays takes, beside the arrays. 0 without the option: the prediction of the match
+/// includes reading.
 pub(crate) fn reading_bytes(options: &Options, left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<u64> {
     let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
     let channels = left.channels.max(right.channels);

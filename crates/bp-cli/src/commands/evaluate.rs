@@ -150,9 +150,6 @@ pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Res
         if size != truth.size() {
             return Err(Error::reading(mask, &format!("{size} pixels, but the truth has {}", truth.size())).into());
         }
-        if !visible.contains(&true) {
-            return Err(Error::reading(mask, &"no pixel is 255, so the mask selects none").into());
-        }
         return GroundTruth::with_mask(truth, visible).map_err(|error| Error::reading(mask, &error).into());
     }
     Ok(GroundTruth::new(truth))

@@ -7,7 +7,7 @@ use std::{
 };
 
 use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
-use bp_io::{MapFormat, Mask, read_mask};
+use bp_io::{MapFormat, read_mask};
 use bp_stereo::{
     Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, ReadPair, Start,
     align_camera, batch, read_pair, read_raw_pair, read_stretched_pair, reading_limits,
@@ -175,7 +175,8 @@ impl Job<'_> {
 /// Reads the pair, and rectifies or stretches it if asked for.
 fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<ReadPair, Failure> {
     let (megapixels, max_memory) = (args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()));
-    let mask = args.valid.as_deref().map(|path| read_valid(args, path)).transpose()?;
+    let limits = reading_limits(megapixels, max_memory, 0);
+    let mask = args.valid.as_deref().map(|path| read_mask(path, limits)).transpose()?;
     let valid = mask.as_ref().map(|mask| mask.values.as_slice());
     let mut read = match &making.rectifying {
         Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory)?.into(),
@@ -188,16 +189,6 @@ fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<ReadPair
         read.valid.get_or_insert(mask.values);
     }
     Ok(read)
-}
-
-/// Reads the mask of the left image.
-fn read_valid(args: &MatchArgs, path: &Path) -> Result<Mask, Failure> {
-    let limits = reading_limits(args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()), 0);
-    let mask = read_mask(path, limits)?;
-    if mask.values.contains(&true) {
-        return Ok(mask);
-    }
-    Err(Failure::input(format!("{}: no pixel is 255, so the mask selects none", path.display())))
 }
 
 /// Writes a map to standard output.

@@ -155,7 +155,7 @@ fn maps_may_have_the_other_sign() {
         let plain = Raster::disparities(&map(&folder, "plain.tif"))
             .floats(bp_io::MapFormat::of(&folder.path(negated)).unwrap());
         fs::write(folder.path(negated), plain.unwrap().unwrap()).unwrap();
-        folder.fails(&format!("convert {negated} -o no.npy"), 3, &[negated, "remove that if it is old"]);
+        folder.fails(&format!("convert {negated} -o no.npy"), 3, &[negated, "describes another map"]);
         fs::write(folder.path(negated), stored).unwrap();
         fs::remove_file(folder.path(&format!("{negated}.json"))).unwrap();
         let negative: Vec<f32> = map(&folder, "plain.tif").values().iter().map(|value| -value).collect();
