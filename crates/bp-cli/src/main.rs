@@ -14,19 +14,22 @@ mod notes;
 mod shortage;
 mod terminal;
 
-use std::process::ExitCode;
+use std::{env, process::ExitCode};
 
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;
 use harness::threads;
-use notes::tell;
+use notes::{printable, tell};
 
 fn main() -> ExitCode {
     notes::quieten_driver();
     interrupt::survive_size_limit();
     shortage::set_up();
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return misunderstood(&error),
+    };
     notes::set_up(cli.quiet);
     match args::check_environment().and_then(|()| run(&cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
@@ -37,6 +40,19 @@ fn main() -> ExitCode {
             ExitCode::from(failure.code())
         }
     }
+}
+
+/// Tells what is wrong with the arguments, or shows the help that they ask for. Messages repeat arguments: those that a terminal
+/// would obey are shown without colours, as escapes.
+fn misunderstood(error: &clap::Error) -> ExitCode {
+    let is_plain = |argument: String| printable(&argument) == argument;
+    if env::args_os().all(|argument| is_plain(argument.to_string_lossy().into_owned())) {
+        // As clap does: nothing can be done if nobody reads it.
+        drop(error.print());
+    } else {
+        tell(error.to_string().trim_end());
+    }
+    u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
 fn run(command: &Command) -> Result<(), Failure> {

@@ -1,12 +1,15 @@
-//! Shows the work of the libraries: a progress bar, notes and warnings on standard error.
+//! Shows the work of the libraries: a progress bar, notes and warnings on standard error. Maps go to standard output.
 
-use std::sync::{Mutex, PoisonError};
+use std::{
+    io::{self, Write as _, stdout},
+    sync::{Mutex, PoisonError},
+};
 
 use bp_stereo::{Event, Watch};
 
 use crate::{
     bar::ProgressBar,
-    failure::as_options,
+    failure::{Failure, as_options},
     interrupt::STOP,
     notes::{self, note, printable, tell},
 };
@@ -24,6 +27,17 @@ pub(crate) fn watched<T>(work: impl FnOnce(&Watch<'_>) -> T) -> T {
     let outcome = work(&watch());
     finish();
     outcome
+}
+
+/// Writes bytes to standard output. A stop ends the wait for a reader that does not read.
+pub(crate) fn emit(bytes: Vec<u8>) -> Result<(), Failure> {
+    let write = move || {
+        let mut out = stdout().lock();
+        out.write_all(&bytes)?;
+        out.flush()
+    };
+    let written: io::Result<()> = watch().unless_stopped(write)?;
+    Ok(written?)
 }
 
 /// Removes the bar.

@@ -4,7 +4,7 @@
 
 use std::{env, fs, path::Path, process::Command};
 
-use image::{DynamicImage, GrayImage, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use nix::sys::resource::{UsageWho, getrusage};
 use tempfile::TempDir;
 
@@ -60,7 +60,8 @@ fn save_pair(folder: &Path, ending: &str, convert: impl Fn(RgbImage) -> DynamicI
 /// A limit that was too low names a larger one. Ends when the program keeps to the limit that it asked for, and returns that.
 fn least_limit_kept(folder: &TempDir, arguments: &str, code: i32) -> u64 {
     let mut limit = "1".to_owned();
-    for _ in 0..6 {
+    // Each file is refused first for its length, then for its pixels.
+    for _ in 0..9 {
         let end = run(folder, &format!("{arguments} --max-memory {limit}"));
         let allowed = limit.strip_suffix("MiB").map_or(0, |number| (number.parse::<f64>().unwrap() * 1048576.0) as u64);
         assert!(allowed == 0 || end.peak <= allowed, "{arguments}: {limit} allowed, {} bytes held", end.peak);
@@ -94,6 +95,28 @@ fn the_least_memory_limit_is_kept() {
         let arguments =
             format!("match left.{ending} right.{ending} -o m.pfm --labels 16 --threads 2 --quiet {options}");
         least_limit_kept(&folder, &arguments, 0);
+    }
+}
+
+/// Masks and ground truth take more while they are read than afterwards.
+#[test]
+fn the_least_memory_limit_is_kept_for_maps_beside_a_pair() {
+    let folder = tempfile::tempdir().unwrap();
+    save_pair(folder.path(), "pgm", |image| DynamicImage::from(image).into_luma8().into());
+    let [width, height] = SIZE;
+    let values = GrayImage::from_fn(width, height, |x, _| Luma([if x % 9 == 0 { 0 } else { 255 }]));
+    values.save(folder.path().join("mask.pgm")).unwrap();
+    DynamicImage::from(values.clone()).into_luma_alpha8().save(folder.path().join("mask.png")).unwrap();
+    DynamicImage::from(values).into_rgb16().save(folder.path().join("truth.png")).unwrap();
+    for options in [
+        "--valid mask.pgm",
+        "--valid mask.png",
+        "--valid mask.pgm --stretch",
+        "--ground-truth truth.png",
+        "--ground-truth mask.pgm",
+    ] {
+        let arguments = "match left.pgm right.pgm -o m.pfm --labels 16 --threads 1 --whole-pixels --align off --quiet";
+        least_limit_kept(&folder, &format!("{arguments} {options}"), 0);
     }
 }
 

@@ -94,6 +94,8 @@ fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
     check_report(&folders[0]);
 
     fs::remove_file(folders[0].join("report.html")).unwrap();
+    #[cfg(unix)]
+    links_are_not_followed(results, &folders[0]);
     assert!(start(results).wait().unwrap().success());
     assert_eq!((run_folders(results).len(), &record(&folders[0]).cells), (1, &complete.cells));
     check_report(&folders[0]);
@@ -107,6 +109,22 @@ fn an_interrupted_run_goes_on_where_it_was_and_makes_every_table_and_chart() {
         child.wait().unwrap();
     }
     assert_eq!(record(&folders[0]), complete, "a complete run is never written over");
+}
+
+/// A link in the folder of a run would replace a file elsewhere.
+#[cfg(unix)]
+fn links_are_not_followed(results: &Path, folder: &Path) {
+    let elsewhere = tempfile::NamedTempFile::new().unwrap();
+    fs::write(elsewhere.path(), "of somebody").unwrap();
+    for name in [".lock", "REPORT.md"] {
+        let (path, kept) = (folder.join(name), folder.join("kept"));
+        fs::rename(&path, &kept).unwrap();
+        std::os::unix::fs::symlink(elsewhere.path(), &path).unwrap();
+        assert_eq!(start(results).wait().unwrap().code(), Some(1), "{name}");
+        assert_eq!(fs::read_to_string(elsewhere.path()).unwrap(), "of somebody", "{name}");
+        fs::remove_file(&path).unwrap();
+        fs::rename(&kept, &path).unwrap();
+    }
 }
 
 fn check_report(folder: &Path) {

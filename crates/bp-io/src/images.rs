@@ -105,32 +105,43 @@ pub struct StoredGrey {
     pub has_16_bits: bool,
 }
 
-/// Reads the grey values of an image as they are stored.
+/// Parses the grey values of an image in memory as they are stored; messages call it `path`.
 ///
 /// # Errors
 /// [`Error::Read`] if it is not an image or has colours, [`Error::OutOfMemory`].
-pub fn read_stored_grey(path: &Path, limit: Limits) -> Result<StoredGrey, Error> {
-    stored_grey(path, &Contents::of_pixels(path, limit)?.bytes, limit)
-}
-
-/// Parses the grey values of a file in memory.
-pub(crate) fn stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<StoredGrey, Error> {
+pub fn parse_stored_grey(path: &Path, bytes: &[u8], limit: Limits) -> Result<StoredGrey, Error> {
     let decoded = decoded(path, || {
         check_unscaled(path, bytes)?;
         decode(path, bytes, limit)
     })?;
-    let size = size(path, &decoded)?;
-    let sixteen = has_16_bits(&decoded);
-    let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
-    let values: Option<Vec<u16>> = converted(path, decoded, |decoded| {
-        if sixteen {
-            decoded.into_rgb16().pixels().map(|pixel| grey(pixel.0)).collect()
-        } else {
-            decoded.into_rgb8().pixels().map(|pixel| grey(pixel.0.map(u16::from))).collect()
-        }
-    })?;
+    let (size, has_16_bits) = (size(path, &decoded)?, has_16_bits(&decoded));
+    limit.check_memory(path, bytes.len() as u64 + grey_bytes(&decoded))?;
+    let values = converted(path, decoded, grey_values)?;
     let coloured = || Error::reading(path, &"a map holds grey values, this image has colours");
-    Ok(StoredGrey { size, values: values.ok_or_else(coloured)?, has_16_bits: sixteen })
+    Ok(StoredGrey { size, values: values.ok_or_else(coloured)?, has_16_bits })
+}
+
+/// Bytes for each pixel of what is made of grey values, beside the values: a map of floats.
+const OF_GREY: u64 = 4;
+
+/// The most bytes that an image, its grey values and what is made of them take, one after another: the transparency is dropped,
+/// then each value becomes 16 bits.
+fn grey_bytes(image: &DynamicImage) -> u64 {
+    let (pixels, color) = (u64::from(image.width()) * u64::from(image.height()), image.color());
+    let (total, channels) = (u64::from(color.bytes_per_pixel()), u64::from(color.channel_count()));
+    let kept = if color.has_alpha() { total / channels * (channels - 1) } else { 0 };
+    pixels * (total + kept).max(total + 2).max(2 + OF_GREY)
+}
+
+/// The grey values of an image; `None` if it has colours.
+fn grey_values(image: DynamicImage) -> Option<Vec<u16>> {
+    let grey = |[r, g, b]: [u16; 3]| (r == g && g == b).then_some(r);
+    match (image.color().has_color(), has_16_bits(&image)) {
+        (false, true) => Some(image.into_luma16().into_raw()),
+        (false, false) => Some(image.into_luma8().iter().map(|&value| value.into()).collect()),
+        (true, true) => image.into_rgb16().pixels().map(|pixel| grey(pixel.0)).collect(),
+        (true, false) => image.into_rgb8().pixels().map(|pixel| grey(pixel.0.map(u16::from))).collect(),
+    }
 }
 
 /// SHA-256 of the decoded pixels, row by row, with one byte each for red, green and blue.

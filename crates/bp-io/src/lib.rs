@@ -53,7 +53,7 @@ pub use error::Error;
 pub use folders::create_folder;
 pub use format::{MapFormat, Quantity, check_ending, check_range};
 pub use frames::{FrameFormat, Frames, Layout, PairFrames};
-pub use images::{StoredGrey, hex, parse_image, pixels_sha256, read_image, read_stored_grey, write_image};
+pub use images::{StoredGrey, hex, parse_image, parse_stored_grey, pixels_sha256, read_image, write_image};
 pub use limits::Limits;
 pub use maps::{Mask, parse_map, parse_mask, read_map, read_mask};
 pub use picture::{ColourBar, DrawBar, Picture, Pixels, encode_picture};

@@ -43,7 +43,8 @@ impl Limits {
     }
 
     /// Most bytes that a file within the limit may have.
-    pub(crate) fn file_bytes(self) -> u64 {
+    #[must_use]
+    pub fn file_bytes(self) -> u64 {
         self.pixels.saturating_mul(16).saturating_add(1 << 20)
     }
 

@@ -8,7 +8,7 @@ use image::ImageFormat;
 use crate::{
     Contents, Error, Limits, Quantity,
     decode::decoded,
-    images::{StoredGrey, stored_grey},
+    images::{StoredGrey, parse_stored_grey},
     npy, pfm,
     sidecar::{Told, sidecar_of, told},
     tiff,
@@ -61,7 +61,7 @@ fn parse_signed(
     let (size, values) = match floats(path, bytes, limit)? {
         Some((size, values)) => (size, values.into_iter().map(|value| value / (sign * scale.unwrap_or(1.0))).collect()),
         None => {
-            let StoredGrey { size, values, has_16_bits } = stored_grey(path, bytes, limit)?;
+            let StoredGrey { size, values, has_16_bits } = parse_stored_grey(path, bytes, limit)?;
             let scale = sign * scale.unwrap_or(if has_16_bits { 256.0 } else { 1.0 });
             let disparity = |value: u16| if value == 0 { DisparityMap::UNKNOWN } else { f32::from(value) / scale };
             (size, values.into_iter().map(disparity).collect())
@@ -106,7 +106,7 @@ pub fn read_mask(path: &Path, limit: Limits) -> Result<Mask, Error> {
 /// # Errors
 /// Those of [`read_mask`].
 pub fn parse_mask(path: &Path, bytes: &[u8], limit: Limits) -> Result<Mask, Error> {
-    let StoredGrey { size, values, has_16_bits } = stored_grey(path, bytes, limit)?;
+    let StoredGrey { size, values, has_16_bits } = parse_stored_grey(path, bytes, limit)?;
     if has_16_bits {
         return Err(Error::reading(path, &"a mask has 8 bits, 255 where a pixel counts"));
     }

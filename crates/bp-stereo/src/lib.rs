@@ -58,7 +58,8 @@ pub use memory::Beside;
 pub use options::{Align, Labels, Options, Quality};
 pub use outputs::{Content, Making, Outputs};
 pub use reading::{
-    ReadPair, check_stretching, read_pair, read_raw_pair, read_stretched_pair, reading_limits, stretching_bytes,
+    ReadPair, check_stretching, read_beside, read_pair, read_raw_pair, read_stretched_pair, reading_limits,
+    stretching_bytes,
 };
 pub use rectifying::Rectifying;
 pub use system::{Memory, thread_pool};

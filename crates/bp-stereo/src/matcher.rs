@@ -181,7 +181,8 @@ impl Matcher {
     /// Matches a pair as planned. Progress goes to `watch`, in message entries.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] if the plan does not fit, [`Error::Stopped`], and those of the device.
+    /// [`Error::OutOfMemory`] if the plan does not fit, [`Error::Stopped`], and those of the device. [`Error::Core`] if it cannot
+    /// start warm.
     pub fn run(
         &mut self,
         pair: &StereoPair,
@@ -191,12 +192,16 @@ impl Matcher {
     ) -> Result<Disparity, Error> {
         let Self { options, pool, opened, beside, prepared } = self;
         let Planned { plan, alignment, warnings, time } = planned;
+        if start == Start::Warm {
+            // The first pair has no messages to start from yet. Its answer would not tell that the second one fails.
+            opened.device.check_warm(&plan)?;
+        }
         // A different plan is freed before the new one is prepared.
         let applied = applied(alignment);
         let images = Images::of(pair, plan.model().profile(), applied.is_some());
         let fits = |prepared: &Prepared| *prepared.tiled.plan() == plan && prepared.images == images;
         let before = prepared.take().filter(fits);
-        let (ready, finished, energy) = pool.install(|| {
+        let (ready, finished, energy, settings) = pool.install(|| {
             let mut ready = before.map_or_else(|| Prepared::new(options, *beside, &plan, images, opened, watch), Ok)?;
             let begun = Instant::now();
             let pair = aligned(pair.clone().compared_by(plan.model().profile()), applied.as_ref())?;
@@ -205,7 +210,9 @@ impl Matcher {
             finished.times.planning = planning;
             let energy_of = |labels| Energy::of(&pair, ready.tiled.plan().model(), labels);
             let energy = options.energy.then(|| energy_of(ready.tiled.labels())).transpose()?;
-            Ok::<_, Error>((ready, finished, energy))
+            // The memory that is planned depends on the number of threads.
+            let settings = plan::described(options, ready.tiled.tiling(), alignment.as_ref(), opened)?;
+            Ok::<_, Error>((ready, finished, energy, settings))
         })?;
         watch.check()?;
         let answer = Disparity {
@@ -213,7 +220,7 @@ impl Matcher {
             confidence: finished.confidence,
             times: finished.times,
             energy,
-            settings: plan::described(options, ready.tiled.tiling(), alignment.as_ref(), opened)?,
+            settings,
             tiles: Tiles::of(ready.tiled.tiling()),
             message_updates: ready.tiled.message_updates(),
             allocated_bytes: ready.tiled.allocated_bytes(),

@@ -24,11 +24,25 @@ const LIST: &str = "split the list";
 /// are refused when their plan is known, with advice that suits it.
 const SMALL: u64 = 4 << 20;
 
-/// The limits for a file that a program reads besides `taken` bytes in memory: those of its pixels, and the memory that is free
-/// or, if `max_memory` is given, allowed.
+/// Calls `read` with the limits for a file that the program reads beside `taken` bytes in memory: those of its pixels, and the
+/// memory that is free or, if `max_memory` is given, allowed.
+///
+/// # Errors
+/// That of `read`. A lack of memory is explained.
+pub fn read_beside<T>(
+    taken: u64,
+    max_megapixels: u32,
+    max_memory: Option<u64>,
+    read: impl FnOnce(Limits) -> Result<T, bp_io::Error>,
+) -> Result<T, Error> {
+    let room = Room::new(max_megapixels, max_memory).without(taken);
+    room.explained(read(room.limits))
+}
+
+/// The limits for files of so many megapixels within the free memory.
 #[must_use]
-pub fn reading_limits(max_megapixels: u32, max_memory: Option<u64>, taken: u64) -> Limits {
-    Room::new(max_megapixels, max_memory).without(taken).limits
+pub fn reading_limits(max_megapixels: u32) -> Limits {
+    Room::new(max_megapixels, None).limits
 }
 
 /// Reads the two images of a pair. The program stays within `max_memory` bytes, if they are given.
@@ -92,7 +106,8 @@ pub fn read_stretched_pair(
     max_megapixels: u32,
     max_memory: Option<u64>,
 ) -> Result<ReadPair, Error> {
-    Room::new(max_megapixels, max_memory).stretched_pair(images, valid, |room, path| {
+    let room = Room::new(max_megapixels, max_memory).without(valid.map_or(0, |valid| valid.len() as u64));
+    room.stretched_pair(images, valid, |room, path| {
         let contents = room.explained(Contents::of_pixels(path, room.limits))?;
         room.explained(parse_samples(path, &contents.bytes, room.limits))
     })

@@ -108,12 +108,15 @@ impl<'a> Watch<'a> {
         self.stop.is_some_and(Stop::is_stopped)
     }
 
-    /// Does work that may wait for others, such as a read from a pipe, on a thread of its own. If it should stop meanwhile, that
+    /// Does work that may wait for others, such as reading or writing a pipe, on a thread of its own. If it should stop meanwhile, that
     /// thread is left behind. If the system starts none, the work cannot be stopped.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(crate) fn unless_stopped<T: Send + 'static, Work: FnOnce() -> T + Send + 'static>(
+    ///
+    /// # Panics
+    /// If the work does.
+    pub fn unless_stopped<T: Send + 'static, Work: FnOnce() -> T + Send + 'static>(
         &self,
         work: Work,
     ) -> Result<T, Stopped> {

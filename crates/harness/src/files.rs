@@ -1,19 +1,16 @@
 //! Reads and writes the files of the experiments.
 
-use std::{fmt::Display, io::Write, path::Path};
+use std::path::Path;
 
 use bp_io::Files;
-pub(crate) use bp_io::{Limits as PixelLimit, hex, pixels_sha256, read_image, read_map, read_stored_grey};
+pub(crate) use bp_io::{hex, pixels_sha256};
 use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// Writes a file whole or not at all; `write` fills it.
-pub(crate) fn write_whole<E: Display>(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
-) -> Result<(), Failure> {
-    Ok(Files::default().whole(path, write)?)
+/// The files of a folder, in which no link is followed: another user of the folder may have made it.
+pub(crate) fn below(folder: &Path) -> Files {
+    Files::default().owning(folder)
 }
 
 /// Writes a text.
@@ -35,11 +32,6 @@ pub(crate) fn json_text(path: &Path, value: &impl Serialize) -> Result<String, F
 /// Writes a new file; fails if it exists.
 pub(crate) fn write_new(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     Ok(Files::default().new_file(path, contents)?)
-}
-
-/// Fails if no file could be written at `path`.
-pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
-    Ok(Files::default().check_writable(path)?)
 }
 
 /// Fails if a file exists at `path`.

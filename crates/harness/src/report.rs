@@ -25,7 +25,7 @@ pub use opening::{device_fact, machine_fact, program_fact};
 
 use crate::{
     failure::Failure,
-    files::{write_text, write_whole},
+    files::{below, write_text},
     record::{RECORD_FILE, Record, load},
 };
 use results::Results;
@@ -86,16 +86,16 @@ impl<'a> Report<'a> {
 
 /// Writes REPORT.md, report.html and the drawings beside a record.
 pub fn write(folder: &Path, record: &Record) -> Result<(), Failure> {
-    let report = Report::new(folder, record)?;
+    let (report, files) = (Report::new(folder, record)?, below(folder));
     for drawing in report.drawings() {
-        write_text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
+        files.text(&folder.join(format!("{}.svg", drawing.name)), &drawing.svg)?;
     }
     for chart in report.charts() {
         let picture = png(&chart.svg).map_err(|error| Failure::other(format!("{}: {error}", chart.name)))?;
-        write_whole(&folder.join(format!("{}.png", chart.name)), |file| file.write_all(&picture))?;
+        files.whole(&folder.join(format!("{}.png", chart.name)), |file| file.write_all(&picture))?;
     }
-    write_text(&folder.join("REPORT.md"), &markdown::page(&report))?;
-    write_text(&folder.join(PAGE_FILE), &html::page(&report))
+    files.text(&folder.join("REPORT.md"), &markdown::page(&report))?;
+    Ok(files.text(&folder.join(PAGE_FILE), &html::page(&report))?)
 }
 
 /// The pages of a record without its maps, and the part for a README.

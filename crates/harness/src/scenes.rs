@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use bp_core::{DisparityMap, GroundTruth, Image, StereoPair};
+use bp_io::{Contents, Limits, parse_image, parse_map};
 use bp_testkit::synthetic;
 use serde::Deserialize;
 
 use crate::{
     failure::Failure,
-    files::{PixelLimit, pixels_sha256, read_image, read_map},
+    files::pixels_sha256,
     record::{self, ImageSum},
 };
 
@@ -159,12 +160,12 @@ fn middlebury(folder: &Path, set: &Set, scene: &str) -> Result<Scene, Failure> {
         Ok((folder.join(&entry.path), entry.scale.unwrap_or(1.0)))
     };
     let [left, right, truth, truth_right] = ["view1.png", "view5.png", "disp1.png", "disp5.png"].map(&mut load);
-    let image = |file: Result<(PathBuf, f32), Failure>| manifest.checked(folder, &file?.0);
+    let image = |file: Result<(PathBuf, f32), Failure>| Ok::<_, Failure>(manifest.checked(folder, &file?.0)?.0);
     let (left, right) = (image(left)?, image(right)?);
     let map = |file: Result<(PathBuf, f32), Failure>| -> Result<DisparityMap, Failure> {
         let (path, scale) = file?;
-        manifest.checked(folder, &path)?;
-        Ok(read_map(&path, Some(scale), PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?)
+        let (_, contents) = manifest.checked(folder, &path)?;
+        Ok(parse_map(&path, &contents.bytes, Some(scale), Limits::default())?)
     };
     let truth = GroundTruth::with_right(map(truth)?, &map(truth_right)?)?;
     let pair = StereoPair::new(left, right)?;
@@ -210,11 +211,13 @@ impl Manifest {
         entry.ok_or_else(|| Failure::other(format!("{MANIFEST} does not list {path}")))
     }
 
-    /// Reads a listed image. Fails, and names it, if its size or pixels differ from the manifest.
-    pub fn checked(&self, folder: &Path, path: &Path) -> Result<Image, Failure> {
+    /// Reads a listed image, and returns its file, too. Fails, and names it, if its size or pixels differ from the manifest.
+    pub fn checked(&self, folder: &Path, path: &Path) -> Result<(Image, Contents), Failure> {
         let below = path.strip_prefix(folder).unwrap_or(path);
         let entry = self.entry(&below.to_string_lossy().replace('\\', "/"))?;
-        let image = read_image(path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+        // A pipe could be empty for ever.
+        let contents = Contents::of_regular(path, Limits::default().file_bytes())?;
+        let image = parse_image(path, &contents.bytes, Limits::default())?;
         let (width, height) = (image.size().width, image.size().height);
         if (width, height) != (entry.width, entry.height) {
             let expected = format!("{}x{}", entry.width, entry.height);
@@ -224,6 +227,6 @@ impl Manifest {
             let what = format!("its pixels are not those that {MANIFEST} lists; delete it and fetch it again");
             return Err(Failure::reading(path, &what));
         }
-        Ok(image)
+        Ok((image, contents))
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let images = [Some(&args.map), args.image.as_ref()].into_iter().flatten();
     let inputs: Vec<&Path> = images.chain(args.outputs.calibration()).map(PathBuf::as_path).collect();
     outputs.check(&making, &inputs)?;
-    let limit = reading_limits(args.max_megapixels, None, 0);
+    let limit = reading_limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     outputs.check_map(&making, map.range().unwrap_or((0.0, 0.0)), map.size())?;
     let image = args.image.as_deref().map(|path| read_image_of(&map, path, limit)).transpose()?;

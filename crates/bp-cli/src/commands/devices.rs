@@ -1,11 +1,9 @@
 //! `bp devices`: lists the devices of all backends.
 
-use std::io::Write;
-
 use bytesize::ByteSize;
 use serde::Serialize;
 
-use super::{indented, print_json};
+use super::{indented, print, print_json};
 use bp_stereo::{description, devices as listed, devices::device_name};
 
 use crate::{args::DevicesArgs, failure::Failure};
@@ -38,24 +36,27 @@ pub(crate) fn devices(args: &DevicesArgs) -> Result<(), Failure> {
     if args.json {
         return print_json(&reports);
     }
-    let mut out = std::io::stdout().lock();
-    for report in &reports {
-        if let Some(reason) = &report.unavailable {
-            writeln!(out, "{:<12}{:<21}{}", report.backend, "unavailable", indented(reason, INDENT))?;
+    print(&reports.iter().map(text).collect::<String>())
+}
+
+/// The lines of a backend.
+fn text(report: &BackendReport) -> String {
+    let reason = report.unavailable.as_ref();
+    let mut text = reason.map_or_else(String::new, |reason| {
+        format!("{:<12}{:<21}{}\n", report.backend, "unavailable", indented(reason, INDENT))
+    });
+    for DeviceReport { option, device } in &report.devices {
+        let kind = device.kind.as_deref().unwrap_or_default();
+        text += &format!("{option:<12}{kind:<21}{}\n", device.name);
+        let details = details(device);
+        if !details.is_empty() {
+            text += &format!("{:<INDENT$}{}\n", "", details.join(", "));
         }
-        for DeviceReport { option, device } in &report.devices {
-            let kind = device.kind.as_deref().unwrap_or_default();
-            writeln!(out, "{option:<12}{kind:<21}{}", device.name)?;
-            let details = details(device);
-            if !details.is_empty() {
-                writeln!(out, "{:<INDENT$}{}", "", details.join(", "))?;
-            }
-            if let Some(uuid) = &device.uuid {
-                writeln!(out, "{:<INDENT$}uuid {uuid}", "")?;
-            }
+        if let Some(uuid) = &device.uuid {
+            text += &format!("{:<INDENT$}uuid {uuid}\n", "");
         }
     }
-    Ok(())
+    text
 }
 
 fn report(backend: &dyn bp_core::Backend) -> BackendReport {

@@ -1,13 +1,11 @@
 //! `bp doctor`: checks this machine and reports what is missing.
 
-use std::io::Write;
-
 use bp_core::{Backend, DeviceInfo, DeviceKind};
 use bp_stereo::Memory;
 use bytesize::ByteSize;
 use serde::Serialize;
 
-use super::{indented, print_json};
+use super::{indented, print, print_json};
 use bp_stereo::devices::{self as listed, device_name};
 use harness::{machine, scenes::Source};
 
@@ -51,7 +49,7 @@ pub(crate) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
     if args.json {
         print_json(&checks)?;
     } else {
-        print(&checks)?;
+        print(&text(&checks))?;
     }
     match checks.iter().find(|check| check.state == State::Failed) {
         None => Ok(()),
@@ -59,20 +57,20 @@ pub(crate) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
     }
 }
 
-fn print(checks: &[Check]) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
+fn text(checks: &[Check]) -> String {
+    let mut text = String::new();
     for Check { what, state, found, advice } in checks {
         let state = match state {
             State::Ok => "ok",
             State::Note => "note",
             State::Failed => "FAILED",
         };
-        writeln!(out, "{state:<8}{what:<12}{}", indented(found, 20))?;
+        text += &format!("{state:<8}{what:<12}{}\n", indented(found, 20));
         if let Some(advice) = advice {
-            writeln!(out, "{:<20}{}", "", indented(advice, 20))?;
+            text += &format!("{:<20}{}\n", "", indented(advice, 20));
         }
     }
-    Ok(())
+    text
 }
 
 fn checks(args: &DoctorArgs) -> Vec<Check> {

@@ -113,7 +113,7 @@ impl Measured {
 
 /// Runs the command.
 pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
-    let limit = reading_limits(args.max_megapixels, None, 0);
+    let limit = reading_limits(args.max_megapixels);
     let map = read_map(&args.map, args.map_scale, limit)?;
     let truth = read_truth(&args.truth, &args.options, limit)?;
     let map = args.limit.into_iter().fold(map, |map, largest| map.limited(0.0, largest));
@@ -135,22 +135,26 @@ pub(crate) fn evaluate(args: &EvaluateArgs) -> Result<(), Failure> {
     print(&error_table(&errors))
 }
 
+/// Bytes per pixel of ground truth.
+const TRUTH: u64 = 4;
+
 /// Reads ground truth, and the right ground truth or the mask that shows its non-occluded pixels.
-pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Result<GroundTruth, Failure> {
+pub(crate) fn read_truth(path: &Path, options: &TruthArgs, limit: Limits) -> Result<GroundTruth, Error> {
     let truth = read_map(path, options.scale, limit)?;
     if truth.range().is_none() {
-        return Err(Error::reading(path, &"ground truth without a known pixel").into());
+        return Err(Error::reading(path, &"ground truth without a known pixel"));
     }
+    let limit = limit.without(TRUTH * truth.size().pixels() as u64);
     if let Some(right) = &options.ground_truth_right {
         let map = read_map(right, options.scale, limit)?;
-        return GroundTruth::with_right(truth, &map).map_err(|error| Error::reading(right, &error).into());
+        return GroundTruth::with_right(truth, &map).map_err(|error| Error::reading(right, &error));
     }
     if let Some(mask) = &options.mask {
         let Mask { size, values: visible } = read_mask(mask, limit)?;
         if size != truth.size() {
-            return Err(Error::reading(mask, &format!("{size} pixels, but the truth has {}", truth.size())).into());
+            return Err(Error::reading(mask, &format!("{size} pixels, but the truth has {}", truth.size())));
         }
-        return GroundTruth::with_mask(truth, visible).map_err(|error| Error::reading(mask, &error).into());
+        return GroundTruth::with_mask(truth, visible).map_err(|error| Error::reading(mask, &error));
     }
     Ok(GroundTruth::new(truth))
 }

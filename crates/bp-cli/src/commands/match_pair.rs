@@ -1,16 +1,15 @@
 //! `bp match`: matches one pair or many.
 
 use std::{
-    io::Write as _,
     iter,
     path::{Path, PathBuf},
 };
 
 use bp_core::{DisparityMap, GroundTruth, Size, StereoPair};
-use bp_io::{MapFormat, read_mask};
+use bp_io::{MapFormat, Mask, read_mask};
 use bp_stereo::{
     Align, AnswerTimes, Beside, Content, Disparity, Error, Making, Matcher, Options, Outputs, Planned, ReadPair, Start,
-    align_camera, batch, read_pair, read_raw_pair, read_stretched_pair, reading_limits,
+    align_camera, batch, read_beside, read_pair, read_raw_pair, read_stretched_pair,
 };
 
 use super::{
@@ -77,10 +76,13 @@ fn match_one(args: &MatchArgs, files: [&PathBuf; 2]) -> Result<(), Failure> {
     let truths = [&args.ground_truth, &args.truth.ground_truth_right, &args.truth.mask].into_iter().flatten();
     let others = truths.chain(args.plan.align.file()).map(PathBuf::as_path);
     outputs.check(&making, &sources(args).chain(others).collect::<Vec<_>>())?;
-    let ReadPair { pair, valid } = read(args, files.map(PathBuf::as_path), &making)?;
-    // Colours that nobody needs are freed.
-    let pair = if outputs.points.is_some() { pair } else { options.compared(pair) };
-    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, &pair, &options)).transpose()?;
+    let mut read = read(args, files.map(PathBuf::as_path), &making)?;
+    if outputs.points.is_none() {
+        // Colours that nobody needs are freed.
+        read.pair = options.compared(read.pair);
+    }
+    let truth = args.ground_truth.as_deref().map(|path| read_truth(args, path, &read, &options)).transpose()?;
+    let ReadPair { pair, valid } = read;
     interrupt::listen()?;
     if let (Align::Auto, Some(file)) = (options.align, args.plan.align.file()) {
         options.align = align_camera(iter::once(Ok(pair.clone())), Some((&making.files, file)), &terminal::watch())?;
@@ -175,26 +177,31 @@ impl Job<'_> {
 /// Reads the pair, and rectifies or stretches it if asked for.
 fn read(args: &MatchArgs, files: [&Path; 2], making: &Making) -> Result<ReadPair, Failure> {
     let (megapixels, max_memory) = (args.max_megapixels, args.max_memory.map(|limit| limit.as_u64()));
-    let limits = reading_limits(megapixels, max_memory, 0);
-    let mask = args.valid.as_deref().map(|path| read_mask(path, limits)).transpose()?;
-    let valid = mask.as_ref().map(|mask| mask.values.as_slice());
-    let mut read = match &making.rectifying {
-        Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory)?.into(),
-        None if args.stretch => read_stretched_pair(files, valid, megapixels, max_memory)?,
-        None => ReadPair::from(read_pair(files, megapixels, max_memory)?),
+    let mask_beside = |held: u64| {
+        let read = |path| read_beside(held, megapixels, max_memory, |limit| read_mask(path, limit));
+        args.valid.as_deref().map(|path| Ok::<_, Error>((path, read(path)?))).transpose()
     };
-    if let Some((mask, path)) = mask.zip(args.valid.as_deref()) {
-        check_size(path, mask.size, &read.pair)?;
-        // Stretching has put both together.
-        read.valid.get_or_insert(mask.values);
+    let check = |pair: &StereoPair, (path, mask): &(&Path, Mask)| check_size(path, mask.size, pair);
+    if args.stretch {
+        let mask = mask_beside(0)?;
+        let valid = mask.as_ref().map(|(_, mask)| mask.values.as_slice());
+        let read = read_stretched_pair(files, valid, megapixels, max_memory)?;
+        mask.iter().try_for_each(|mask| check(&read.pair, mask))?;
+        return Ok(read);
     }
-    Ok(read)
+    let pair = match &making.rectifying {
+        Some(rectifying) => read_raw_pair(files, rectifying, megapixels, max_memory)?,
+        None => read_pair(files, megapixels, max_memory)?,
+    };
+    let mask = mask_beside(pair.bytes())?;
+    mask.iter().try_for_each(|mask| check(&pair, mask))?;
+    Ok(ReadPair { pair, valid: mask.map(|(_, mask)| mask.values) })
 }
 
 /// Writes a map to standard output.
 fn pipe(making: &Making, map: &DisparityMap) -> Result<(), Failure> {
     let bytes = making.raster(map).floats(MapFormat::Pfm).unwrap_or_else(|| Ok(Vec::new()));
-    Ok(std::io::stdout().write_all(&bytes.map_err(Failure::other)?)?)
+    terminal::emit(bytes.map_err(Failure::other)?)
 }
 
 /// The files that the outputs are made from.
@@ -202,14 +209,15 @@ fn sources(args: &MatchArgs) -> impl Iterator<Item = &Path> {
     [&args.left, &args.right, &args.valid].into_iter().flatten().chain(args.outputs.calibration()).map(PathBuf::as_path)
 }
 
-/// Bytes per pixel of the left image's truth, beside further truth that is read.
-const TRUTH: u64 = 4;
-
-fn read_truth(args: &MatchArgs, path: &Path, pair: &StereoPair, options: &Options) -> Result<GroundTruth, Failure> {
-    let size = pair.size();
-    let held = pair.bytes() + TRUTH * size.pixels() as u64;
-    let limits = reading_limits(args.max_megapixels, options.max_memory, held);
-    let truth = evaluate::read_truth(path, &args.truth, limits)?;
+fn read_truth(
+    args: &MatchArgs,
+    path: &Path,
+    ReadPair { pair, valid }: &ReadPair,
+    options: &Options,
+) -> Result<GroundTruth, Failure> {
+    let held = pair.bytes() + valid.as_ref().map_or(0, |valid| valid.len() as u64);
+    let read = |limit| evaluate::read_truth(path, &args.truth, limit);
+    let truth = read_beside(held, args.max_megapixels, options.max_memory, read)?;
     check_size(path, truth.disparities().size(), pair)?;
     Ok(truth)
 }

@@ -2,7 +2,6 @@
 
 use std::{
     fmt,
-    io::{Write as _, stdout},
     time::{Duration, Instant},
 };
 
@@ -19,13 +18,12 @@ pub(super) fn match_stream(options: StreamOptions, format: FrameFormat) -> Resul
     interrupt::listen()?;
     let watch = terminal::watch();
     let mut stream = Stream::open(options, &watch)?;
-    let (mut output, mut pace) = (stdout().lock(), Pace::default());
+    let mut pace = Pace::default();
     while let Some(pair) = stream.next_pair(&watch)? {
         let arrived = Instant::now();
         let answer = stream.compute(&pair, &watch).map_err(|error| error.of(format!("frame {}", pace.frames + 1)))?;
         let encoded = format.encode(&answer.map, range(&answer), stream.rate(), pace.frames == 0);
-        output.write_all(&encoded.map_err(Failure::other)?)?;
-        output.flush()?;
+        terminal::emit(encoded.map_err(Failure::other)?)?;
         pace.add(arrived);
     }
     note(&pace.to_string());

@@ -6,7 +6,7 @@ use bp_testkit::synthetic;
 
 use harness::scenes::{Manifest, Source};
 
-use crate::{args::ScenesArgs, failure::Failure};
+use crate::{args::ScenesArgs, failure::Failure, notes::printable};
 
 /// Runs the command. Lists the synthetic scenes, or checks every listed file that the data folder holds.
 pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
@@ -26,7 +26,7 @@ pub(crate) fn scenes(args: &ScenesArgs) -> Result<(), Failure> {
         found += 1;
         wrong += u32::from(checked.is_err());
         let state = checked.err().map_or_else(|| "as listed".to_owned(), |failure| failure.to_string());
-        writeln!(out, "{:<60}{state}", entry.path)?;
+        writeln!(out, "{:<60}{}", entry.path, printable(&state))?;
     }
     let listed = manifest.files.len();
     writeln!(out, "{found} of {listed} listed files found, {wrong} wrong")?;

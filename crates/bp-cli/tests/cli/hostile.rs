@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{
     folder::{Folder, MATCH, text},
-    many::{TINY, files, names, place},
+    many::{TINY, files, names},
 };
 
 fn pipe(path: &Path) {
@@ -102,6 +102,33 @@ fn a_record_names_the_bytes_that_were_matched() {
     let record: Value = serde_json::from_slice(&fs::read(folder.path("out/records/a.json")).unwrap()).unwrap();
     let of_bytes: String = Sha256::digest(&image).iter().map(|byte| format!("{byte:02x}")).collect();
     assert_eq!(record["inputs"][0]["sha256"], of_bytes.as_str());
+}
+
+/// A pipe holds 64 KiB, this map takes 80.
+#[test]
+fn one_signal_ends_a_match_whose_standard_output_nobody_reads() {
+    let folder = Folder::new();
+    for name in ["l.png", "r.png"] {
+        image::GrayImage::from_fn(160, 128, |x, y| image::Luma([(x * y % 251) as u8])).save(folder.path(name)).unwrap();
+    }
+    for arguments in ["match l.png r.png", "match --video frames.y4m"] {
+        let grey = vec![7; 2 * 160 * 128];
+        let frame = [b"YUV4MPEG2 W320 H128 F30:1 Cmono\nFRAME\n".as_slice(), &grey].concat();
+        fs::write(folder.path("frames.y4m"), frame).unwrap();
+        let mut command = folder.command(&format!("{arguments} --labels 8 --output -"));
+        command.stderr(Stdio::null()).stdout(Stdio::piped());
+        assert_eq!(code_after("-INT", command.spawn().unwrap()), Some(130), "{arguments}");
+    }
+}
+
+#[test]
+fn a_small_map_that_standard_output_does_not_take_is_an_error() {
+    let folder = Folder::new();
+    for name in ["l.png", "r.png"] {
+        image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(folder.path(name)).unwrap();
+    }
+    let full = Stdio::from(fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    folder.command_fails(folder.command("match l.png r.png --labels 4 --output -").stdout(full), 1, &["No space left"]);
 }
 
 #[test]
@@ -233,16 +260,6 @@ fn a_name_with_a_nul_is_refused_wherever_it_stands() {
     assert!(!text(&output.stderr).contains('\0'), "{:?}", text(&output.stderr));
 }
 
-/// Files there come and go, links lead to no path, and some may not be read.
-#[cfg(target_os = "linux")]
-#[test]
-fn folders_of_the_system_are_searched_to_their_end() {
-    let folder = Folder::new();
-    for place in ["/proc/self/fd", "/proc/self/fdinfo", "/proc/self/ns", "/proc/self/map_files", "/proc/self/net"] {
-        folder.fails(&format!("match --pairs {place} --output out"), 3, &[place, "no pair found"]);
-    }
-}
-
 #[test]
 fn a_replaced_output_keeps_its_permissions_and_owner() {
     let folder = Folder::new();
@@ -280,6 +297,18 @@ fn names_that_terminals_obey_are_printed_as_escapes() {
     }
 }
 
+/// Of the arguments, too, which a shell may have found as names of files.
+#[test]
+fn terminals_find_nothing_to_obey_in_errors_of_arguments() {
+    let folder = Folder::new();
+    for arguments in ["match --\u{1b}]0;title\u{7}", "match a.png b.png --labels \u{9b}2J", "\u{1b}[2J"] {
+        let output = folder.command(arguments).env("CLICOLOR_FORCE", "1").output().unwrap();
+        let told = text(&output.stderr);
+        assert!(!told.contains(['\u{1b}', '\u{7}', '\u{9b}']) && told.contains("error"), "{told:?}");
+        assert_eq!(output.status.code(), Some(2));
+    }
+}
+
 #[test]
 fn the_number_of_threads_is_bounded_in_the_environment_too() {
     let folder = Folder::new();
@@ -292,31 +321,35 @@ fn the_number_of_threads_is_bounded_in_the_environment_too() {
     }
 }
 
+/// The memory that is planned depends on the number of threads if there are several bands.
 #[test]
 fn sidecars_are_the_same_on_any_number_of_threads() {
     let folder = Folder::new();
-    let sidecar = |threads: u32| {
-        assert!(folder.run(&format!("{MATCH} m.pfm --threads {threads}")).status.success());
-        fs::read_to_string(folder.path("m.pfm.json")).unwrap()
+    image::GrayImage::from_fn(40, 130, |x, y| image::Luma([(x * y % 251) as u8]))
+        .save(folder.path("high.png"))
+        .unwrap();
+    let run = |threads: u32| {
+        let report = folder.json(&format!("match high.png high.png --labels 12 -o m.pfm --threads {threads} --json"));
+        (report["settings"]["planned_bytes"].as_u64().unwrap(), fs::read_to_string(folder.path("m.pfm.json")).unwrap())
     };
-    assert_eq!(sidecar(1), sidecar(3));
+    let [(least, one), (most, three)] = [1, 3].map(run);
+    assert!(least < most, "{least} {most}");
+    assert_eq!(one, three);
 }
 
-/// One link leads up, one to a folder that is searched anyway, one to itself.
+/// A pipe could be empty for ever, and a program that handles signals would not end.
 #[test]
-fn links_in_a_searched_folder_are_followed_and_those_that_lead_nowhere_are_told() {
+fn data_of_experiments_are_regular_files() {
     let folder = Folder::new();
-    place(&folder, &["in/a/view1.png", "in/a/view5.png"]);
-    symlink(folder.path("in"), folder.path("in/a/up")).unwrap();
-    symlink(folder.path("in/a"), folder.path("in/b")).unwrap();
-    let run = || folder.run(&format!("match --pairs in --output out {TINY}"));
-    let output = run();
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert_eq!(names(&folder.path("out")), ["a/view1", "b/view1"]);
-    symlink("itself", folder.path("in/itself")).unwrap();
-    let output = run();
-    assert_eq!(output.status.code(), Some(3), "what cannot be searched may hold pairs: {}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("1 folders could not be read"), "{}", text(&output.stderr));
+    for scene in ["Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books"] {
+        fs::create_dir_all(folder.path("d/middlebury2006").join(scene)).unwrap();
+    }
+    pipe(&folder.path("d/middlebury2006/Baby1/view1.png"));
+    for command in ["reproduce --results r", "scenes"] {
+        let output = folder.run(&format!("{command} --data d"));
+        let told = text(&output.stderr) + &text(&output.stdout);
+        assert!(output.status.code() == Some(3) && told.contains("not a regular file"), "{command}: {told}");
+    }
 }
 
 /// A device without end, a pipe with something else than an image, and a file that is too long to be one.

@@ -15,6 +15,7 @@ mod recorded;
 mod rectify;
 mod resumed;
 mod running;
+mod searched;
 mod shortage;
 mod speed;
 mod stream;

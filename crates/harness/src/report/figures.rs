@@ -11,13 +11,9 @@ use super::{
     results::Results,
     tables::{BP, CFBP, CFCSBP, CTBP, CTCSBP, Named, ours::CENSUS},
 };
-use bp_io::{Colours, encode_picture};
+use bp_io::{Colours, Limits, encode_picture, read_map};
 
-use crate::{
-    escape::printable,
-    failure::Failure,
-    files::{PixelLimit, read_map},
-};
+use crate::{escape::printable, failure::Failure};
 
 /// Space around and between maps, and for text and the colour bar, in pixels of the drawing.
 const GAP: usize = 14;
@@ -37,8 +33,7 @@ fn figure(folder: &Path, results: &Results<'_>, number: &str, plan: &Named) -> R
     let maps = results.scenes().map(|(index, scene)| {
         // All backends give the same labels, so one map per scene is enough.
         let measured = results.rows().filter(|row| row.index == index).find_map(|row| row.measured(plan.plan));
-        let limit = PixelLimit::megapixels(PixelLimit::MEGAPIXELS);
-        let map = measured.map(|measured| read_map(&folder.join(&measured.map), None, limit));
+        let map = measured.map(|measured| read_map(&folder.join(&measured.map), None, Limits::default()));
         Ok((scene.name.as_str(), map.transpose()?.map(halved)))
     });
     let maps = maps.collect::<Result<Vec<_>, Failure>>()?;

@@ -3,15 +3,9 @@
 use std::path::Path;
 
 use bp_core::{Algorithm, Driver, Energy, Model, Observer, Plan, Profile, Schedule, Size, StereoPair, cheapest_labels};
-use bp_io::StoredGrey;
+use bp_io::{Limits, StoredGrey, parse_stored_grey};
 
-use crate::{
-    backends,
-    failure::Failure,
-    files::{PixelLimit, read_stored_grey},
-    record::Labelling,
-    scenes::Manifest,
-};
+use crate::{backends, failure::Failure, record::Labelling, scenes::Manifest};
 
 /// The scenes, their labels, and the methods whose labellings the data folder holds.
 const SCENES: [&str; 3] = ["tsukuba", "venus", "teddy"];
@@ -51,16 +45,18 @@ pub(super) fn compare(folder: &Path, observer: &mut Observer<'_>) -> Result<Vec<
 
 fn load_pair(folder: &Path, scene: &str) -> Result<StereoPair, Failure> {
     let manifest = Manifest::read()?;
-    let image = |name: &str| manifest.checked(folder, &folder.join(format!("middlebury2001-2003/{scene}/{name}")));
+    let image = |name: &str| {
+        let path = folder.join(format!("middlebury2001-2003/{scene}/{name}"));
+        Ok::<_, Failure>(manifest.checked(folder, &path)?.0)
+    };
     Ok(StereoPair::new(image("imL.png")?, image("imR.png")?)?)
 }
 
 /// Reads labels, which are stored as 17 times their value.
 fn load_labels(folder: &Path, scene: &str, method: &str, size: Size) -> Result<Vec<u16>, Failure> {
     let path = folder.join(format!("mrf-benchmark/{scene}/{scene}-{method}.png"));
-    Manifest::read()?.checked(folder, &path)?;
-    let StoredGrey { size: found, values, .. } =
-        read_stored_grey(&path, PixelLimit::megapixels(PixelLimit::MEGAPIXELS))?;
+    let (_, contents) = Manifest::read()?.checked(folder, &path)?;
+    let StoredGrey { size: found, values, .. } = parse_stored_grey(&path, &contents.bytes, Limits::default())?;
     if found != size || values.iter().any(|value| value % 17 != 0) {
         return Err(Failure::reading(&path, &"not a label map of this scene"));
     }

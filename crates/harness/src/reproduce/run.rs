@@ -3,7 +3,7 @@
 use std::{cell::RefCell, path::Path};
 
 use bp_core::{Device, DisparityMap, Energy, Error, PartDriver, Plan};
-use bp_io::{Files, Raster};
+use bp_io::Raster;
 use bp_stereo::{Event, Watch};
 use sha2::{Digest, Sha256};
 
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    files::hex,
+    files::{below, hex},
     measure::{Arranged, Asked, Contestant, Entrant, Meter, Rules, Runner, SLOW_ROUNDS, take_turns},
     record::{self, Cell, Measurement, Outcome, Sample, Settings},
     scenes::{Scene, Source},
@@ -243,7 +243,7 @@ fn first_measurement(
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);
-    Raster::disparities(&disparities).write(&Files::default(), &folder.join(&map))?;
+    Raster::disparities(&disparities).write(&below(folder), &folder.join(&map))?;
     Ok(Measurement {
         samples: Vec::new(),
         allocated_bytes: solved.allocated_bytes,

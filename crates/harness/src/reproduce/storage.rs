@@ -11,7 +11,7 @@ use bp_stereo::Watch;
 
 use crate::{
     failure::Failure,
-    files::{create_folder, write_json},
+    files::{below, create_folder},
     machine,
     record::{MAPS_FOLDER, Machine, Program, RECORD_FILE, Record, Run, SCHEMA_VERSION, load},
     report::PAGE_FILE,
@@ -76,7 +76,9 @@ pub fn begin(results: &Path, program: Program, machine: Machine, run: Run) -> Re
 /// The lock of a run's folder; `None` if another process holds it.
 fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     let path = folder.join(LOCK_FILE);
-    let file = File::create(&path).map_err(|error| Failure::writing(&path, &error))?;
+    below(folder).check_own(&path)?;
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|error| Failure::writing(&path, &error))?;
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
         Err(TryLockError::WouldBlock) => Ok(None),
@@ -132,6 +134,6 @@ impl Storage {
     pub fn save(&mut self) -> Result<(), Failure> {
         self.record.updated = Timestamp::now().to_string();
         let path = self.folder.join(RECORD_FILE);
-        write_json(&path, &self.record)
+        Ok(below(&self.folder).json(&path, &self.record)?)
     }
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    files::{check_new, check_writable, create_folder, json_text, write_new, write_text, write_whole},
+    files::{below, check_new, create_folder, json_text, write_new},
     record::{RECORD_FILE, SPEED_FILE, load_speed, speed::Speed},
 };
 
@@ -33,7 +33,7 @@ impl Files {
     /// Creates the folder, and fails if it is not writable. Called before the measurement starts.
     pub fn check(&self) -> Result<(), Failure> {
         create_folder(&self.folder)?;
-        check_writable(&self.folder.join(SPEED_FILE))
+        Ok(below(&self.folder).check_writable(&self.folder.join(SPEED_FILE))?)
     }
 
     /// Writes everything. Returns a sentence that names the files.
@@ -57,14 +57,15 @@ pub fn renew(path: &Path) -> Result<PathBuf, Failure> {
 }
 
 fn write_page(folder: &Path, speed: &Speed) -> Result<PathBuf, Failure> {
+    let files = below(folder);
     for chart in charts(speed) {
         let path = |ending: &str| folder.join(format!("{}.{ending}", chart.name));
         let svg = chart.plot.svg().map_err(|error| Failure::writing(&path("svg"), &error))?;
         let picture = png(&svg).map_err(|error| Failure::writing(&path("png"), &error))?;
-        write_whole(&path("png"), |file| file.write_all(&picture))?;
-        write_text(&path("svg"), &svg)?;
+        files.whole(&path("png"), |file| file.write_all(&picture))?;
+        files.text(&path("svg"), &svg)?;
     }
     let path = folder.join("speed.md");
-    write_text(&path, &page(speed))?;
+    files.text(&path, &page(speed))?;
     Ok(path)
 }
