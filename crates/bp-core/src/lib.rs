@@ -89,4 +89,4 @@ pub use size::Size;
 pub use smoothness::{EdgeLevels, Smoothness};
 pub use stage::Stage;
 pub use stop::{IsStopped, never};
-pub use tiles::{HALO, Needed, Span, Tile, Tiled, Tiling};
+pub use tiles::{Around, HALO, Needed, Span, Tile, Tiled, Tiling, border};

@@ -1,13 +1,16 @@
 //! Matches pairs of any size in limited memory, one tile at a time.
 
+mod around;
 mod join;
 mod tile;
 mod tiling;
 
 use std::{ops::ControlFlow, sync::Mutex, time::Instant};
 
+pub use around::{Around, HALO};
+pub use join::border;
 pub use tile::{Span, Tile};
-pub use tiling::{HALO, Needed, Tiling};
+pub use tiling::{Needed, Tiling};
 
 use join::Joint;
 

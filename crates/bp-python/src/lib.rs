@@ -5,6 +5,7 @@
 
 mod arrays;
 mod attended;
+mod blocks;
 mod calibration;
 mod errors;
 mod files;
@@ -23,6 +24,7 @@ mod _bpstereo {
     #[pymodule_export]
     use super::{
         arrays::_read_at,
+        blocks::{_around, _border},
         calibration::Calibration,
         devices,
         errors::{BackendUnavailable, DeviceError, PairWarning},

@@ -1,7 +1,7 @@
 //! Makes the plan of a pair from options.
 
 use bp_core::{
-    Alignment, MAX_LABELS, Model, Plan, Size, StereoPair, Tiling,
+    Alignment, Around, Image, MAX_LABELS, Model, Plan, Size, StereoPair, Tiling,
     survey::{DisparityRange, Survey},
 };
 
@@ -55,6 +55,20 @@ pub(crate) fn quarter_of_width(options: &Options, size: Size) -> DisparityRange 
     let usual_width = (size.pixels() * 4).div_ceil(3).isqrt().min(size.width);
     let labels = usual_width.div_ceil(4).next_multiple_of(16).min(MAX_LABELS);
     DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels }
+}
+
+/// What the blocks of a larger image need around them; `None` if the algorithm's messages reach all of an image.
+pub(crate) fn around(options: &Options) -> Result<Option<Around>, Error> {
+    /// A size on which every plan can run.
+    const SIDE: usize = 256;
+    let Labels::Count(labels) = options.labels else {
+        return Err(Error::Options(
+            "`labels` must be a number: each block by itself would find other labels".to_owned(),
+        ));
+    };
+    let blank = Image::from_grey(SIDE, SIDE, vec![0; SIDE * SIDE])?;
+    let range = DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels };
+    Ok(Around::of(&plan(options, &StereoPair::new(blank.clone(), blank)?, range)?))
 }
 
 /// Describes a tiled plan.

@@ -168,6 +168,29 @@ impl<First: Fn(usize, usize) -> u16, Second: Fn(usize, usize) -> u16> Overlap<Fi
     }
 }
 
+/// Where the second of two maps should begin, for each place along their border: the way through the places across that both have, along
+/// which they agree best. `first` and `second` return their disparities in pixels at a place across and along; those that are not
+/// finite are unknown. At least the first place of each line stays the first map's, and the last the second's.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn border(
+    across: usize,
+    along: usize,
+    first: impl Fn(usize, usize) -> f32,
+    second: impl Fn(usize, usize) -> f32,
+) -> Result<Vec<usize>, Error> {
+    let first = |across: usize, along: usize| label(first(across, along));
+    let second = |across: usize, along: usize| label(second(across, along));
+    Overlap { across: 0..across, along: 0..along, first, second }.border()
+}
+
+/// A whole number for a disparity; 0 stands for an unknown one, far from all others.
+fn label(disparity: f32) -> u16 {
+    const ZERO: f32 = 32_768.0;
+    if disparity.is_finite() { (ZERO + disparity.clamp(-30_000.0, 30_000.0)).round() as u16 } else { 0 }
+}
+
 fn weigh(one: u16, other: u16) -> u64 {
     WEIGHT * u64::from(one.abs_diff(other)).min(MOST)
 }

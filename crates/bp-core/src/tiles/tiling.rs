@@ -1,18 +1,11 @@
 //! How a plan is cut into tiles. This is decided before anything runs.
 
-use super::join;
-use super::tile::{Halo, Span, Tile, spans};
-use crate::{BAND_ROWS, Error, Patch, Plan, Schedule, Size};
-
-/// Tiles begin at multiples of this many columns and rows, so that on up to five grids their nodes have the same children
-/// and the same colour as in the whole image.
-const ALIGN: usize = 32;
-
-/// The columns that a tile matches on each side of those that it keeps, and its rows above and below.
-pub const HALO: usize = 96;
-
-/// The same for rows under [`Schedule::Sweep`], where less reaches a row from far above or below.
-const SWEPT_ROWS_HALO: usize = 64;
+use super::{
+    around::{Around, HALO, align, reach},
+    join,
+    tile::{Halo, Span, Tile, spans},
+};
+use crate::{Error, Plan, Size};
 
 /// Writing so many bytes for the first time takes about as long as matching a pixel of an ordinary pair, because the system has to
 /// find and clear the memory.
@@ -23,7 +16,7 @@ const BYTES_PER_PIXEL: f64 = 128.0;
 const MOST_MATCHED: usize = 256;
 
 /// A plan, and the tiles that it runs on. One tile gives the image's answer to the bit. Several give nearly the same one, which is
-/// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`] bands also begin at the first row of
+/// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`](crate::Schedule::Sweep) bands also begin at the first row of
 /// each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
@@ -56,25 +49,18 @@ impl Tiling {
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
     /// around them. All their pixels have the same costs as in the whole image. If labels match to the left, a tile extends further left by
-    /// the largest disparity, or, if that is far, its right image alone does; likewise the tile on the right. Under [`Schedule::Sweep`] no halo has more
-    /// than 64 rows. Under [`Schedule::Outward`] the image is one tile.
+    /// the largest disparity, or, if that is far, its right image alone does; likewise the tile on the right. Under [`Schedule::Sweep`](crate::Schedule::Sweep) no halo has more
+    /// than 64 rows. Under [`Schedule::Outward`](crate::Schedule::Outward) the image is one tile.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
-        if let Schedule::Outward { .. } = plan.settings().schedule {
-            // Its messages reach every node from the start node, however far away.
-            return Self::whole(plan);
-        }
-        let Size { width, height } = plan.image_size();
-        let (model, align) = (plan.model(), align(&plan));
-        let [left, right] =
-            [model.disparity(model.labels() as u16 - 1), -model.min_disparity()].map(|reach| reach.max(0) as usize);
+        let [left, right] = reach(&plan);
         let (matched, reach) = if left > MOST_MATCHED { (0, left) } else { (left, 0) };
-        let [before, after] = [halo + matched, halo + right].map(|columns| columns.next_multiple_of(align.width));
-        let swept = plan.settings().schedule == Schedule::Sweep;
-        let beyond = if swept { halo.min(SWEPT_ROWS_HALO) } else { halo }.next_multiple_of(align.height);
-        let columns = spans(width, kept.width.next_multiple_of(align.width), align.width, Halo { before, after });
-        let around = Halo { before: beyond, after: beyond };
-        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, around);
+        let Some(around) = Around::with(&plan, halo, [matched, right]) else { return Self::whole(plan) };
+        let (Size { width, height }, align) = (plan.image_size(), around.align);
+        let beside = Halo { before: around.left, after: around.right };
+        let beyond = Halo { before: around.rows, after: around.rows };
+        let columns = spans(width, kept.width.next_multiple_of(align.width), align.width, beside);
+        let rows = spans(height, kept.height.next_multiple_of(align.height), align.height, beyond);
         Self { plan, columns, rows, halo, reach, likely: None }
     }
 
@@ -224,13 +210,6 @@ fn distinct<Kind: PartialEq>(spans: &[Span], kind: impl Fn(&Span) -> Kind) -> im
     spans.iter().enumerate().filter(move |&(index, _)| first(index)).map(|(_, span)| span)
 }
 
-/// Tiles begin at multiples of this many columns and rows. With label sets, they begin where patches and bands of grid 1 do, so
-/// that these are those of the whole image.
-fn align(plan: &Plan) -> Size {
-    let (width, height) = if plan.has_label_sets(1) { (2 * Patch::COLUMNS, 2 * BAND_ROWS) } else { (ALIGN, ALIGN) };
-    Size { width, height }
-}
-
 /// Tiles of a height are tried in so many widths, each half as wide as the one before.
 const NARROWER: usize = 5;
 
@@ -271,7 +250,7 @@ fn evenly(units: usize, fits: impl Fn(usize) -> bool) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Algorithm, Cut, Image, Model, Profile, StereoPair};
+    use crate::{Algorithm, Cut, Image, Model, Profile, Schedule, StereoPair, tiles::around::ALIGN};
 
     fn plan((width, height): (usize, usize), labels: usize, algorithm: Algorithm) -> Plan {
         let size = Size { width, height };

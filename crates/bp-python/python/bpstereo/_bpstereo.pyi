@@ -15,6 +15,8 @@ __all__ = [
     "PairWarning",
     "Rectifier",
     "__version__",
+    "_around",
+    "_border",
     "_read_at",
     "devices",
     "match",
@@ -27,6 +29,8 @@ __all__ = [
 
 __version__: str
 
+def _around(**options: Unpack[Options]) -> tuple[list[int], int, list[int], int]: ...
+def _border(first: NDArray[numpy.float32], second: NDArray[numpy.float32]) -> NDArray[numpy.uintp]: ...
 def _read_at(image: _Image) -> int: ...
 
 class BackendUnavailable(RuntimeError): ...

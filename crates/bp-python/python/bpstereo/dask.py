@@ -1,26 +1,25 @@
 """Pairs larger than memory, and clusters: dask arrays in, a dask array out.
 
-Each block is matched with a halo around it, as the library does with its tiles. A block extends further left by the
-largest disparity. The answer is close to that of the whole image but not the same; the project's page on big images says
-how close.
+Each block is matched with a halo around it, and joined with its neighbours along a border where their maps agree, as the
+library does with its tiles. A block extends further left by the largest disparity. The answer is close to that of the whole
+image but not the same; the project's page on big images says how close.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import dask.array
 import numpy
 from dask.array import overlap
 
-from ._bpstereo import Matcher
+from ._bpstereo import Matcher, _around, _border
 
-#: Columns and rows of the halo, those of the library's tiles.
-HALO_COLUMNS, HALO_ROWS = 96, 64
 
-#: Blocks that begin at multiples of these have the patches of label sets where the whole image has them.
-PATCH_COLUMNS, PATCH_ROWS = 128, 64
+_Map = numpy.ndarray[Any, Any]
+
+#: What `map_blocks` is told of maps.
+_MAP: dict[str, Any] = {"dtype": numpy.float32, "meta": numpy.empty((0, 0), numpy.float32)}
 
 
 def match(
@@ -28,9 +27,9 @@ def match(
 ) -> dask.array.Array:
     """The disparity map of a rectified pair: a lazy float32 array [height][width] in pixels, NaN where it is unknown.
 
-    Both images are [height][width] or [height][width][3] of uint8 or uint16. The answer's blocks are multiples of 128
-    columns and 64 rows near the size of theirs. The options are those of `Matcher`, except that `align` is "off": each
-    block by itself would measure another alignment.
+    Both images are [height][width] or [height][width][3] of uint8 or uint16. The answer's blocks begin where tiles may, at
+    multiples of up to 128 columns and 64 rows, and are near the size of theirs. The options are those of `Matcher`, except
+    that `align` is "off": each block by itself would measure another alignment.
 
     >>> import dask.array
     >>> chunked = [dask.array.from_array(image, chunks=(64, 128)) for image in (left, right)]
@@ -38,11 +37,12 @@ def match(
     >>> float(numpy.nanmedian(disparity[:, 16:]).round())
     3.0
     """
-    images, options, depth = _extended(left, right, labels, min_disparity, options)
-    kind: dict[str, Any] = {"dtype": numpy.float32, "meta": numpy.empty((0, 0), numpy.float32)}
+    images, options, depth, shared = _extended(left, right, labels, min_disparity, options)
     dropped = {"drop_axis": 2} if left.ndim == 3 else {}
-    matched = dask.array.map_blocks(_matched, *images, options=options, **kind, **dropped)
-    return overlap.trim_overlap(matched, depth=depth, boundary="none")
+    maps = dask.array.map_blocks(_matched, *images, options=options, **_MAP, **dropped)
+    for axis in (1, 0):
+        maps = _joined(maps, axis, depth[axis], shared)
+    return maps
 
 
 def peak_bytes(
@@ -58,47 +58,37 @@ def peak_bytes(
     >>> 50_000_000 < bpstereo.dask.peak_bytes(image, image, labels=64) < 500_000_000
     True
     """
-    images, options, _ = _extended(left, right, labels, min_disparity, options)
+    images, options, _, _ = _extended(left, right, labels, min_disparity, options)
     largest = tuple(max(sizes) for sizes in images[0].chunks)
     blank = [numpy.zeros(largest, image.dtype) for image in images]
-    # Beside the library, the worker holds the two blocks and the map.
-    arrays = sum(image.nbytes for image in blank) + 4 * largest[0] * largest[1]
+    # Beside the library, the worker holds the two blocks and the map, and copies the map where it is joined.
+    arrays = sum(image.nbytes for image in blank) + 2 * 4 * largest[0] * largest[1]
     return arrays + Matcher(**({"threads": 1} | options)).peak_bytes(*blank)
 
 
 def _extended(
     left: dask.array.Array, right: dask.array.Array, labels: int, min_disparity: int, options: dict[str, Any]
-) -> tuple[list[dask.array.Array], dict[str, Any], dict[int, Any]]:
-    """The images in blocks with halos, the options of each match, and the halos. Wrong options are told now, not by a worker."""
+) -> tuple[list[dask.array.Array], dict[str, Any], dict[int, Any], int]:
+    """The images in blocks with halos, the options of each match, the halos, and how much of them blocks may share out.
+
+    Wrong options are told now, not by a worker.
+    """
     if left.shape != right.shape:
         raise ValueError(f"the images differ in shape: {left.shape} and {right.shape}")
     if left.dtype.kind != "u" or right.dtype.kind != "u":
         raise TypeError("uint8 or uint16 is needed: each block of floats by itself would find another scale")
-    if isinstance(labels, bool) or not isinstance(labels, (int, numpy.integer)):
-        raise ValueError("`labels` must be a number: each block by itself would find other labels")
     if options.get("stretch"):
         raise ValueError("`stretch`: each block by itself would find another scale")
-    options = {"align": "off"} | options | {"labels": int(labels), "min_disparity": int(min_disparity)}
+    options = {"align": "off"} | options | {"labels": labels, "min_disparity": min_disparity}
     Matcher(**options)
-    before, after = halo(labels, min_disparity)
-    chunks = _chunks(left.chunks[0], PATCH_ROWS, HALO_ROWS), _chunks(left.chunks[1], PATCH_COLUMNS, max(before, after))
+    columns, rows, (across, down), shared = _around(**options)
+    chunks = _chunks(left.chunks[0], down, rows), _chunks(left.chunks[1], across, max(columns))
     # An axis with one block needs no halo.
-    depth = {0: (HALO_ROWS, HALO_ROWS) if len(chunks[0]) > 1 else 0, 1: (before, after) if len(chunks[1]) > 1 else 0}
+    depth = {0: (rows, rows) if len(chunks[0]) > 1 else 0, 1: tuple(columns) if len(chunks[1]) > 1 else 0}
     whole = chunks + ((left.shape[2],) if left.ndim == 3 else ())
     images = [image.rechunk(whole) for image in (left, right)]
-    return [overlap.overlap(image, depth=depth, boundary="none", allow_rechunk=False) for image in images], options, depth
-
-
-def halo(labels: int, min_disparity: int = 0) -> tuple[int, int]:
-    """The columns that a block needs on its left and right: those of the halo, and those that its disparities reach.
-
-    >>> bpstereo.dask.halo(128)
-    (256, 128)
-    """
-    last = min_disparity + labels - 1
-    reach = max(0, last), max(0, -min_disparity)
-    before, after = (PATCH_COLUMNS * math.ceil((HALO_COLUMNS + columns) / PATCH_COLUMNS) for columns in reach)
-    return before, after
+    images = [overlap.overlap(image, depth=depth, boundary="none", allow_rechunk=False) for image in images]
+    return images, options, depth, shared
 
 
 def _chunks(sizes: tuple[int, ...], step: int, least: int) -> tuple[int, ...]:
@@ -118,3 +108,49 @@ def _matched(left: numpy.ndarray[Any, Any], right: numpy.ndarray[Any, Any], opti
     if left.size == 0:
         return numpy.empty(left.shape[:2], numpy.float32)
     return Matcher(**({"threads": 1} | options)).compute(left, right)
+
+
+def _joined(maps: dask.array.Array, axis: int, depth: Any, shared: int) -> dask.array.Array:
+    """Maps of blocks with halos along an axis, without them: where two meet, each keeps one side of a border."""
+    count = maps.numblocks[axis]
+    if count == 1:
+        return maps
+    before, after = depth
+    kept = tuple(size - before * (i > 0) - after * (i < count - 1) for i, size in enumerate(maps.chunks[axis]))
+    shared = min(shared, *(size // 2 for size in kept))
+
+    def strips(blocks: dask.array.Array, middle: int) -> dask.array.Array:
+        """Of each block, what lies on both sides of the end of what it keeps."""
+        chunks = tuple((2 * shared,) * (count - 1) if i == axis else sizes for i, sizes in enumerate(blocks.chunks))
+        return dask.array.map_blocks(_strip, blocks, axis=axis, start=middle - shared, stop=middle + shared, chunks=chunks, **_MAP)
+
+    def of(blocks: slice) -> dask.array.Array:
+        return maps.blocks[(slice(None),) * axis + (blocks,)]
+
+    shape = list(maps.shape)
+    shape[axis] = 0
+    none = dask.array.zeros(shape, chunks=tuple((0,) if i == axis else sizes for i, sizes in enumerate(maps.chunks)), dtype=numpy.float32)
+    previous = dask.array.concatenate([none, strips(of(slice(None, -1)), -after)], axis, allow_unknown_chunksizes=True)
+    following = dask.array.concatenate([strips(of(slice(1, None)), before), none], axis, allow_unknown_chunksizes=True)
+    chunks = tuple(kept if i == axis else sizes for i, sizes in enumerate(maps.chunks))
+    return dask.array.map_blocks(_kept, maps, previous, following, axis=axis, depth=depth, chunks=chunks, **_MAP)
+
+
+def _strip(block: _Map, axis: int, start: int, stop: int) -> _Map:
+    return block[(slice(None),) * axis + (slice(start, stop),)]
+
+
+def _kept(own: _Map, previous: _Map, following: _Map, axis: int, depth: tuple[int, int]) -> _Map:
+    """What a block keeps, up to its borders with the blocks before and behind it, and what those keep beyond them."""
+    own, previous, following = (numpy.moveaxis(map, axis, 1) for map in (own, previous, following))
+    shared = max(previous.shape[1], following.shape[1]) // 2
+    start = depth[0] if previous.size else 0
+    stop = own.shape[1] - (depth[1] if following.size else 0)
+    kept, place = own[:, start:stop].copy(), numpy.arange(shared)
+    if previous.size:
+        border = _border(previous, own[:, start - shared : start + shared])[:, None]
+        kept[:, :shared] = numpy.where(place + shared < border, previous[:, shared:], kept[:, :shared])
+    if following.size:
+        border = _border(own[:, stop - shared : stop + shared], following)[:, None]
+        kept[:, -shared:] = numpy.where(place < border, kept[:, -shared:], following[:, :shared])
+    return numpy.ascontiguousarray(numpy.moveaxis(kept, 1, axis))
