@@ -57,7 +57,7 @@ def test_other_threads_run_meanwhile():
     matcher = bpstereo.Matcher(algorithm={"name": "bp", "loops": loops}, labels=64, threads=1)
     pair = shifted(200, 250, 4)
     while_idle = ticks_a_second(lambda: time.sleep(0.3))
-    # The matcher lets them run at each of its looks at signals, every 50 ms, even if it holds Python's lock in between.
+    # If the match held Python's lock, they would get a turn every 50 ms at best, when it looks at signals.
     assert ticks_a_second(lambda: matcher.compute(*pair)) > while_idle / 8
     assert matcher.times["total"] > 0.3, "the match was too short to tell"
 
