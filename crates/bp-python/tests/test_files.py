@@ -56,6 +56,24 @@ def test_depth_and_points_are_those_of_the_program(program, tmp_path):
     assert (bpstereo.read_image(tmp_path / "ours.png") == bpstereo.read_image(tmp_path / "map.png")).all()
 
 
+def test_depth_and_points_of_middleburys_calibrations_are_those_of_opencv(tmp_path):
+    """The two cameras' principal points differ: doffs."""
+    cv2 = pytest.importorskip("cv2")
+    focal, column, row, doffs, baseline = 994.978, 311.193, 254.877, 31.086, 193.001
+    (tmp_path / "calib.txt").write_text(
+        f"cam0=[{focal} 0 {column}; 0 {focal} {row}; 0 0 1]\ncam1=[{focal} 0 {column + doffs}; 0 {focal} {row}; 0 0 1]\n"
+        f"doffs={doffs}\nbaseline={baseline}\nwidth=741\nheight=497\nndisp=70\nisint=0\nvmin=5\nvmax=60\n")
+    calibration = bpstereo.Calibration.read(tmp_path / "calib.txt")
+    disparity = numpy.random.default_rng(4).uniform(5, 60, (497, 741)).astype(numpy.float32)
+    # The depth is f b / (d + doffs).
+    q = numpy.array([[1, 0, 0, -column], [0, 1, 0, -row], [0, 0, 0, focal], [0, 0, 1 / baseline, doffs / baseline]])
+    expected = cv2.reprojectImageTo3D(disparity, q)
+    assert numpy.allclose(calibration.depth(disparity), focal * baseline / (disparity + doffs), rtol=1e-5)
+    assert numpy.allclose(calibration.points(disparity), expected, rtol=1e-4, atol=1e-2)
+    disparity[0, 0], disparity[0, 1] = numpy.nan, -doffs
+    assert numpy.isnan(calibration.points(disparity)[0, :2]).all() and numpy.isfinite(calibration.points(disparity)[0, 2]).all()
+
+
 def test_calibrations_are_checked():
     calibration = bpstereo.Calibration(500, 60, doffs=2, principal_point=(10, 20))
     assert (calibration.focal, calibration.baseline, calibration.doffs) == (500, 60, 2)

@@ -1,4 +1,5 @@
 """Arrays in, arrays out: the program's answer, whatever the arrays look like."""
+import os
 import subprocess
 import threading
 import warnings
@@ -271,12 +272,37 @@ def test_problems_of_a_pair_are_warnings(pair):
     assert any("same image" in text for text in matcher.warnings)
 
 
-def test_warm_starts_continue(pair):
-    matcher = bpstereo.Matcher(labels=16, algorithm={"name": "cfbp", "loops": {"half_steps": 2}}, energy=True)
+def test_warm_starts_are_those_of_the_program(program, tmp_path):
+    scene = shifted(48, 64, 3)
+    rng = numpy.random.default_rng(6)
+    # Noise of each frame's own: a warm start remembers that of the frames before.
+    frames = [[numpy.clip(image + rng.normal(0, 60, image.shape), 0, 255).astype(numpy.uint8) for image in scene] for _ in range(3)]
+    for index, pair in enumerate(frames):
+        for side, image in zip(["left", "right"], pair):
+            (tmp_path / f"{side}{index}.pgm").write_bytes(b"P5\n64 48\n255\n" + image.tobytes())
+    command = [program, "match", "--video", "left%d.pgm", "right%d.pgm", "-o", "maps", "--format", "npy", "--unknown", "nan", "--quiet",
+               "--labels", "16", "--align", "off", "--algorithm", "cfbp", "--half-steps", "2"]
+    options = {"labels": 16, "align": "off", "algorithm": {"name": "cfbp", "loops": {"half_steps": 2}}}
+    matcher, cold = bpstereo.Matcher(**options), bpstereo.Matcher(**options)
+    subprocess.run([*map(str, command), "--warm-start"], cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
+    for index, pair in enumerate(frames):
+        found = matcher.compute(*pair, warm=index > 0)
+        assert found.tobytes() == numpy.load(tmp_path / "maps" / f"{index}.npy").tobytes()
+        assert numpy.array_equal(found, cold.compute(*pair), equal_nan=True) == (index == 0)
+
+
+def test_warm_starts_need_an_algorithm_that_keeps_messages(pair):
+    matcher = bpstereo.Matcher(labels=16)
     matcher.compute(*pair)
-    cold = matcher.energy["total"]
-    matcher.compute(*pair, warm=True)
-    assert matcher.energy["total"] <= cold
+    with pytest.raises(ValueError, match="warm"):
+        matcher.compute(*pair, warm=True)
+
+
+def test_gpus_are_among_the_devices_where_they_are_required():
+    """Otherwise the tests above would be without their cases for GPUs."""
+    if os.environ.get("BP_REQUIRE_GPU") != "1":
+        pytest.skip("BP_REQUIRE_GPU=1 is not set")
+    assert "vulkan" in [device["backend"] for device in bpstereo.devices()]
 
 
 def test_tiles_fit_into_little_memory():

@@ -141,11 +141,6 @@ def test_a_variable_that_is_no_number_is_named(scene):
     assert done.returncode == 1 and "MEDIAN=much" in done.stderr
 
 
-def test_the_examples_of_its_functions_run():
-    import doctest
-    assert doctest.testmod(mgm, extraglobs={"options": mgm.options}).failed == 0
-
-
 def test_the_package_installs_the_command():
     text = (pathlib.Path(__file__).parents[1] / "pyproject.toml").read_text()
     assert 'bp-mgm = "bpstereo.mgm:main"' in text and bpstereo.mgm.main is mgm.main

@@ -1,6 +1,8 @@
 """The package itself: its stubs, its examples, and the instructions that it chooses."""
 import doctest
+import importlib
 import inspect
+import pkgutil
 import platform
 import subprocess
 import sys
@@ -28,6 +30,14 @@ def test_everything_has_a_docstring_whose_examples_run(name, value, doctest_name
     assert text and len(text) > 20, name
     test = doctest.DocTestParser().get_doctest(text, dict(doctest_namespace), name, name, 0)
     assert not doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test).failed
+
+
+@pytest.mark.parametrize("name", [module.name for module in pkgutil.iter_modules(bpstereo.__path__) if module.name != "_bpstereo"])
+def test_the_examples_of_every_module_run(name, doctest_namespace):
+    # Some need packages that are not there.
+    module = pytest.importorskip(f"bpstereo.{name}", exc_type=ImportError)
+    done = doctest.testmod(module, extraglobs=dict(doctest_namespace), optionflags=doctest.ELLIPSIS)
+    assert not done.failed and (done.attempted > 0) == (">>>" in inspect.getsource(module))
 
 
 def test_the_stubs_agree_with_the_module(tmp_path):
@@ -82,10 +92,32 @@ def test_the_tour_makes_its_page(tmp_path):
     assert len(shown) == 3 and "labels from" in page and (tmp_path / "cloud.ply").stat().st_size > 10_000
 
 
-def test_the_viewers_recording_is_written(tmp_path):
+def test_the_viewers_recording_has_the_images_the_map_and_the_points(tmp_path):
     pytest.importorskip("rerun")
+    chunk = pytest.importorskip("rerun.chunk")
     sample = ROOT / "bench-data" / "sample"
     script = ROOT / "crates" / "bp-python" / "examples" / "rerun_viewer.py"
-    images = [sample / name for name in ("left.png", "right.png", "calib.txt")]
-    subprocess.run([sys.executable, script, *images, tmp_path / "pair.rrd"], check=True)
-    assert (tmp_path / "pair.rrd").stat().st_size > 100_000
+    files = [sample / name for name in ("left.png", "right.png", "calib.txt")]
+    subprocess.run([sys.executable, script, *files, tmp_path / "pair.rrd"], check=True)
+    recorded = {}
+    for part in chunk.RrdReader(tmp_path / "pair.rrd").stream():
+        columns = part.to_record_batch()
+        recorded[part.entity_path] = {name: columns[name].flatten() for name in columns.schema.names if ":" in name}
+    left, right = map(bpstereo.read_image, files[:2])
+    for side, image in (("left", left), ("right", right)):
+        assert numpy.array_equal(buffer(recorded[f"/pair/{side}"], "Image", numpy.uint8).reshape(image.shape), image)
+    calibration, disparity = bpstereo.Calibration.read(files[2]), bpstereo.match(left, right, quality="best")
+    depth, points = calibration.depth(disparity), calibration.points(disparity)
+    assert numpy.array_equal(buffer(recorded["/map"], "DepthImage", numpy.float32), numpy.nan_to_num(depth).ravel())
+    assert recorded["/map"]["DepthImage:meter"].to_pylist() == [1000]
+    known = numpy.isfinite(points).all(axis=2)
+    shown = recorded["/world/points"]
+    # Rerun has metres, and colours as 0xRRGGBBAA.
+    assert numpy.allclose(shown["Points3D:positions"].flatten().to_numpy().reshape(-1, 3), points[known] / 1000)
+    colours = shown["Points3D:colors"].to_numpy()
+    assert numpy.array_equal(numpy.stack([colours >> 24, colours >> 16 & 255, colours >> 8 & 255], axis=1), left[known])
+
+
+def buffer(recorded, kind, dtype):
+    """The values of an image in a recording."""
+    return recorded[f"{kind}:buffer"].flatten().to_numpy().view(dtype)

@@ -80,6 +80,40 @@ def test_a_grid_says_what_each_pixel_may_have(tmp_path):
     assert right[right != -9999].max() <= -7 and abs(numpy.median(right[right != -9999]) + 7) < 0.1
 
 
+def with_gaps(folder, contrast=7):
+    """A pair with missing values in both images, and a mask for each."""
+    left, right = (image.astype(numpy.float32) * contrast + 300 for image in shifted(60, 100, 5))
+    left[:4], left[30:33, 50:60], right[50:55, 60:80], right[:, 95:] = -9999, -9999, -9999, -9999
+    masks = numpy.zeros((2, 60, 100), numpy.uint8)
+    masks[0, 20:30, 40:60] = masks[1, 40:48, 20:40] = 1
+    inputs = {
+        side: {"img": save(folder / f"{side}.tif", image), "nodata": -9999, "mask": save(folder / f"{side}-mask.tif", mask)}
+        for side, image, mask in (("left", left, masks[0]), ("right", right, masks[1]))
+    }
+    inputs["left"]["disp"] = [-12, 0]
+    return inputs
+
+
+def test_the_invalid_pixels_and_why_they_are_is_as_with_pandoras_own_method(tmp_path):
+    inputs, told = with_gaps(tmp_path), []
+    for method in ("wta", "bpstereo"):
+        disparity = PIPELINE["disparity"] | {"disparity_method": method}
+        found = answer(tmp_path, inputs, PIPELINE | {"disparity": disparity})
+        with rasterio.open(tmp_path / "out" / "left_validity_mask.tif") as file:
+            told.append((found == -9999, file.read(1)))
+    (theirs, their_reasons), (ours, our_reasons) = told
+    assert 0.2 < theirs.mean() < 0.3 and len(numpy.unique(their_reasons)) > 10
+    assert numpy.array_equal(ours, theirs) and numpy.array_equal(our_reasons, their_reasons)
+
+
+def test_missing_values_do_not_change_the_scale_of_the_others(tmp_path):
+    """Those of the scene differ by 5 at most; the missing ones are 10,000 less."""
+    found = answer(tmp_path, with_gaps(tmp_path, contrast=0.02), PIPELINE)
+    known = found != -9999
+    # Pixels whose counterpart is hidden have another disparity.
+    assert numpy.mean(abs(found[known] + 5) < 0.5) > 0.85
+
+
 def test_cross_checking_uses_it_for_the_right_image_too(tmp_path):
     pipeline = PIPELINE | {"validation": {"validation_method": "cross_checking_accurate"}}
     found = run(tmp_path, pipeline, [-12, 0])

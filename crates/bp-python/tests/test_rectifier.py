@@ -1,5 +1,6 @@
 """Rectification against OpenCV's, on calibrations in every format that is read."""
 import subprocess
+import sys
 
 import numpy
 import pytest
@@ -34,7 +35,8 @@ class Rig:
         if self.kind == "fisheye":
             return rng.uniform(-.02, .02, 4)
         brown = [rng.uniform(-.35, .1), rng.uniform(-.1, .1), *rng.uniform(-.002, .002, 2), rng.uniform(-.02, .02)]
-        return numpy.array(brown[:4] if self.kind == "radtan" else brown + list(rng.uniform(0, .3, 1)) + [0, 0] if self.kind == "rational" else brown)
+        rational = [rng.uniform(0, .3), *rng.uniform(-.05, .05, 2)]
+        return numpy.array({"radtan": brown[:4], "brown": brown, "rational": brown + rational}[self.kind])
 
     def rectified(self):
         """OpenCV's R1, R2, P1, P2 and Q for the view without black pixels."""
@@ -121,15 +123,18 @@ def numbers(values):
     return ", ".join(repr(float(value)) for value in numpy.ravel(values))
 
 
+#: ROS's names of lenses.
+LENSES = {"brown": "plumb_bob", "rational": "rational_polynomial", "fisheye": "equidistant"}
+
+
 def ros_files(folder, rig, rotations, projections):
-    models = {"brown": "plumb_bob", "rational": "rational_polynomial", "fisheye": "equidistant"}
     for index, name in enumerate(("left", "right")):
         projection = projections[index].copy()
         projection[0, 3] /= 1000
         (folder / f"{name}.yaml").write_text(
             f"image_width: {SIZE[0]}\nimage_height: {SIZE[1]}\ncamera_name: {name}\n"
             f"camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{numbers(rig.K[index])}]\n"
-            f"distortion_model: {models[rig.kind]}\n"
+            f"distortion_model: {LENSES[rig.kind]}\n"
             f"distortion_coefficients:\n  rows: 1\n  cols: {rig.D[index].size}\n  data: [{numbers(rig.D[index])}]\n"
             f"rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [{numbers(rotations[index])}]\n"
             f"projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{numbers(projection)}]\n")
@@ -148,10 +153,37 @@ def test_camera_infos_of_ros(tmp_path, kind):
         bpstereo.Calibration.read(files[0])
     with pytest.raises(ValueError, match="640x480"):
         bpstereo.Rectifier(*files, size=(320, 240))
-    # As `ros2 topic echo` prints them.
-    for file in files:
-        file.write_text(2 * f"{file.read_text()}---\n")
-    assert bpstereo.Calibration.read(*files).baseline == calibration.baseline
+
+
+@pytest.mark.parametrize("kind", ["brown", "rational", "fisheye"])
+@pytest.mark.parametrize("flow", [False, True])
+def test_messages_of_ros_as_its_command_prints_them(tmp_path, kind, flow):
+    """`ros2 topic echo /left/camera_info`, also with --flow-style: all messages until Ctrl-C."""
+    yaml = pytest.importorskip("yaml")
+    rig = Rig(3, kind)
+    r1, r2, p1, p2, _ = rig.rectified()
+    files = [tmp_path / "left.yaml", tmp_path / "right.yaml"]
+    for index, file in enumerate(files):
+        # ROS prints with these arguments.
+        printed = [yaml.dump(camera_info(rig, index, (r1, r2), (p1, p2), second), width=sys.maxsize, sort_keys=False,
+                             default_flow_style=flow) for second in range(2)]
+        file.write_text("".join(f"{message}---\n" for message in printed))
+    check(bpstereo.Rectifier(*files, size=SIZE), rig, tolerance=.004)
+    assert bpstereo.Calibration.read(*files).baseline == pytest.approx(numpy.linalg.norm(rig.T))
+
+
+def camera_info(rig, index, rotations, projections, second):
+    """A sensor_msgs/msg/CameraInfo of ROS 2."""
+    metres = projections[index].copy()
+    metres[0, 3] /= 1000
+    matrices = {"d": rig.D[index], "k": rig.K[index], "r": rotations[index], "p": metres}
+    return {
+        "header": {"stamp": {"sec": 1700000000 + second, "nanosec": 33}, "frame_id": f"camera_{index}"},
+        "height": SIZE[1], "width": SIZE[0], "distortion_model": LENSES[rig.kind],
+        **{name: numpy.ravel(values).tolist() for name, values in matrices.items()},
+        "binning_x": 0, "binning_y": 0,
+        "roi": {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False},
+    }
 
 
 @pytest.mark.parametrize("kind", ["radtan", "fisheye"])
@@ -173,16 +205,20 @@ def test_camchains_of_kalibr(tmp_path, kind):
     check(bpstereo.Rectifier(path, size=SIZE), rig)
 
 
-def test_drives_of_kitti(tmp_path):
+@pytest.mark.parametrize(("cameras", "first", "turned"), [
+    # KITTI gives all poses from camera 0, here 90 mm left of camera 2.
+    (("02", "03"), numpy.array([-.09, .002, .001]), rotation(numpy.random.default_rng(9), .02)),
+    (("00", "01"), numpy.zeros(3), numpy.eye(3)),
+], ids=["colour", "grey"])
+def test_drives_of_kitti(tmp_path, cameras, first, turned):
     rig = Rig(5, "brown")
     r1, r2, p1, p2, _ = rig.rectified()
-    # KITTI gives all poses from camera 0, here 90 mm left of camera 2, and its rectified images are smaller.
-    size, first = (600, 440), numpy.array([-.09, .002, .001])
-    turned = rotation(numpy.random.default_rng(9), .02)
+    # Its rectified images are smaller.
+    size = (600, 440)
     poses = [(turned, first), (rig.R @ turned, rig.R @ first + rig.T.ravel() / 1000)]
     lines = ["calib_time: 09-Jan-2012 13:57:47", "corner_dist: 9.950000e-02"]
-    shifts = [-.09, -.09 + p2[0, 3] / p2[0, 0] / 1000]
-    for index, name in enumerate(("02", "03")):
+    shifts = [first[0], first[0] + p2[0, 3] / p2[0, 0] / 1000]
+    for index, name in enumerate(cameras):
         projection = (p1, p2)[index].copy()
         projection[0, 3] = projection[0, 0] * shifts[index]
         parts = {"S": SIZE, "K": rig.K[index], "D": rig.D[index], "R": poses[index][0], "T": poses[index][1], "S_rect": size,
@@ -197,9 +233,11 @@ def test_drives_of_kitti(tmp_path):
         assert farthest((columns, rows), rig.maps(index, (r1, r2), (p1, p2), size)) < .004
     assert bpstereo.Calibration.read(path).baseline == pytest.approx(numpy.linalg.norm(rig.T), rel=1e-6)
     # The lists of projections of KITTI's other data sets.
+    projections = {index: p1 for index in range(int(cameras[0]))}
+    projections |= {int(name): lines_projection(p, shift) for name, p, shift in zip(cameras, (p1, p2), shifts)}
     lists = tmp_path / "calib.txt"
-    lists.write_text("".join(f"P{index}: " + " ".join(f"{value:.9e}" for value in numpy.ravel(values)) + "\n" for index, values in
-                             enumerate([p1, p1, lines_projection(p1, shifts[0]), lines_projection(p2, shifts[1])])))
+    lists.write_text("".join(f"P{index}: " + " ".join(f"{value:.9e}" for value in numpy.ravel(values)) + "\n"
+                             for index, values in projections.items()))
     assert bpstereo.Calibration.read(lists).baseline == pytest.approx(numpy.linalg.norm(rig.T), rel=1e-6)
 
 
@@ -209,6 +247,17 @@ def lines_projection(projection, metres):
     return projection
 
 
+@pytest.mark.parametrize("kind", ["brown", "fisheye"])
+def test_points_are_those_of_opencv(tmp_path, kind):
+    rig = Rig(7, kind)
+    rectifier = bpstereo.Rectifier(opencv_file(tmp_path / "stereo.yml", rig), size=SIZE)
+    rng = numpy.random.default_rng(3)
+    disparity = rng.uniform(1, 60, SIZE[::-1]).astype(numpy.float32)
+    disparity[rng.random(disparity.shape) < .1] = numpy.nan
+    known = numpy.isfinite(disparity)
+    expected = cv2.reprojectImageTo3D(disparity, rectifier.Q)
+    points = rectifier.calibration.points(disparity)
+    assert numpy.allclose(points[known], expected[known], rtol=1e-4, atol=1e-2) and numpy.isnan(points[~known]).all()
 
 
 def test_images_are_those_of_opencv(tmp_path):

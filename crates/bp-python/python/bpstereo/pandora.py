@@ -62,8 +62,8 @@ def _matched(left: xarray.Dataset, right: xarray.Dataset, steps: numpy.ndarray[A
     """Our map with Pandora's sign: there, the right column is the left one plus the disparity."""
     first, last = int(numpy.floor(steps[0])), int(numpy.ceil(steps[-1]))
     defaults: dict[str, Any] = {"align": "off", "stretch": True}
-    matcher = Matcher(**(defaults | options | {"labels": last - first + 1, "min_disparity": -last}))
-    return -matcher.compute(_as_image(left), _as_image(right))
+    meant = defaults | options | {"labels": last - first + 1, "min_disparity": -last}
+    return -Matcher(**meant).compute(*(_as_image(side, is_stretched=meant["stretch"]) for side in (left, right)))
 
 
 def _within(found: Any, steps: numpy.ndarray[Any, Any], allowed: numpy.ndarray[Any, Any]) -> Any:
@@ -79,9 +79,12 @@ def _nearest(found: Any, steps: numpy.ndarray[Any, Any]) -> Any:
     return numpy.where(found - low < high - found, low, high)
 
 
-def _as_image(dataset: xarray.Dataset) -> numpy.ndarray[Any, Any]:
+def _as_image(dataset: xarray.Dataset, is_stretched: bool) -> numpy.ndarray[Any, Any]:
     """The image as float32. Bands come first: red, green and blue, or of fewer bands the first."""
     image = numpy.asarray(dataset["im"].data, numpy.float32)
+    if is_stretched and "msk" in dataset:
+        # Pandora leaves its number for missing values in the image, which is far from all others.
+        image = numpy.where(dataset["msk"].data == dataset.attrs["no_data_mask"], numpy.float32(numpy.nan), image)
     if image.ndim == 2:
         return image
     return numpy.moveaxis(image[:3], 0, 2) if len(image) > 2 else image[0]
