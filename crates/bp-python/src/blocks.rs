@@ -13,7 +13,7 @@ use crate::{errors::raised, options::options};
 pub(crate) fn _around(options: Option<&Bound<'_, PyDict>>) -> PyResult<([usize; 2], usize, [usize; 2], usize)> {
     let around = self::options(options)?.around().map_err(raised)?;
     let Around { left, right, rows, align } = around
-        .ok_or_else(|| PyValueError::new_err("`algorithm`: its messages reach all of an image, so it has no blocks"))?;
+        .ok_or_else(|| PyValueError::new_err("`algorithm`: this one needs the whole image, so there are no blocks"))?;
     Ok(([left, right], rows, [align.width, align.height], Around::SHARED))
 }
 

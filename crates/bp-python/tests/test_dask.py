@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import bpstereo
@@ -45,6 +44,46 @@ def test_blocks_are_near_the_whole_image():
     assert wrong[0] < wrong[1] + 0.005, wrong
 
 
+def test_blocks_are_near_the_librarys_tiles():
+    left, right, _ = scene(400, 900, 40)
+    # A part without texture, where answers differ most.
+    left[100:300, 300:600] = right[100:300, 300:600] = 90
+    matcher = bpstereo.Matcher(labels=48, align="off", max_memory=60 << 20, threads=1)
+    tiles = matcher.compute(left, right)
+    assert matcher.settings["message_updates"] > 0 and matcher.peak_bytes(left, right) <= 60 << 20
+    found = bpstereo.dask.match(*blocks(left, right, chunks=(128, 256)), labels=48).compute()
+    assert (abs(found - tiles) > 1).mean() < 0.01
+
+
+@pytest.mark.parametrize("algorithm, rows", [("sweep", 64), ("cfbp", 96)])
+def test_a_block_has_the_halo_of_a_tile(algorithm, rows):
+    left, right, _ = scene(300, 700, 20)
+    images, _, depth, _ = bpstereo.dask._extended(*blocks(left, right, chunks=(128, 256)), 24, -5, {"algorithm": algorithm})
+    assert images[0].npartitions > 2 and depth[0] == (rows, rows)
+    # 96 columns, and those that disparities from -5 to 18 reach, in multiples of 32.
+    assert depth[1] == (128, 128)
+    whole = bpstereo.match(left, right, labels=24, min_disparity=-5, align="off", algorithm=algorithm)
+    found = bpstereo.dask.match(*blocks(left, right, chunks=(128, 256)), labels=24, min_disparity=-5, algorithm=algorithm)
+    assert (abs(found.compute() - whole) > 1).mean() < 0.002
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_blocks_are_joined_where_they_agree(axis):
+    """Three blocks that keep 40 lines each have halos of 24, and share out 16 on both sides of a border."""
+    rng = numpy.random.default_rng(2)
+    lines, along, count = 3 * 40, 30, 3
+    own = [rng.integers(0, 3, (lines, along)).astype(numpy.float32) + 20 * block for block in range(count)]
+    # Two blocks agree in a few lines of what they share.
+    for at, pair in ((33, (0, 1)), (90, (1, 2))):
+        own[pair[1]][at - 2 : at + 2] = own[pair[0]][at - 2 : at + 2] = 7
+    spans = [slice(max(0, 40 * block - 24), min(lines, 40 * (block + 1) + 24)) for block in range(count)]
+    turned = [numpy.moveaxis(map[span], 0, axis) for map, span in zip(own, spans)]
+    maps = dask_array.concatenate([dask_array.from_array(map, chunks=-1) for map in turned], axis)
+    joined = numpy.moveaxis(bpstereo.dask._joined(maps, axis, (24, 24), 16).compute(), axis, 0)
+    expected = numpy.concatenate([own[0][:33], own[1][33:90], own[2][90:]])
+    assert numpy.array_equal(joined, expected)
+
+
 def test_any_chunks_and_colours_do():
     left, right, _ = scene(150, 500, 20)
     expected = bpstereo.match(left, right, labels=24, min_disparity=-2, align="off")
@@ -73,6 +112,8 @@ def test_what_cannot_work_is_told_at_once():
     for wrong in [{"labels": "auto"}, {"labels": 16, "labls": 3}, {"labels": 16, "median": 4}]:
         with pytest.raises(ValueError):
             bpstereo.dask.match(*images, **wrong)
+    with pytest.raises(ValueError, match="algorithm"):
+        bpstereo.dask.match(*images, labels=16, algorithm="ctbp")
     with pytest.raises(ValueError, match="scale"):
         bpstereo.dask.match(*images, labels=16, stretch=True)
     with pytest.raises(ValueError, match="shape"):
@@ -86,14 +127,38 @@ def test_a_worker_that_dies_loses_nothing():
     expected = lazy.compute(scheduler="synchronous")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
-            victim = next(iter(client.run(os.getpid).values()))
-            killer = threading.Timer(0.5, os.kill, (victim, signal.SIGKILL))
-            killer.start()
-            begin = time.monotonic()
-            found = client.compute(lazy, retries=3).result(timeout=120)
-            assert time.monotonic() - begin > 0.5, "the worker died too late"
-            killer.join()
+            victim, *others = client.run(os.getpid).values()
+            future = client.compute(lazy, retries=3)
+            # It dies as soon as some blocks are matched.
+            while not any(client.who_has().values()):
+                assert not future.done(), "the worker died too late"
+                time.sleep(0.01)
+            os.kill(victim, signal.SIGKILL)
+            found = future.result(timeout=120)
+            assert victim not in client.run(os.getpid).values() and others
     assert numpy.array_equal(found, expected, equal_nan=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system tells the peak memory of a process")
+def test_a_worker_holds_no_more_than_predicted():
+    distributed = pytest.importorskip("distributed")
+    left, right, _ = scene(1100, 2200, 60)
+    images = blocks(left, right, chunks=(512, 1024))
+    predicted = bpstereo.dask.peak_bytes(*images, labels=64)
+
+    def held():
+        with open("/proc/self/status") as status:
+            return 1024 * int(next(line.split()[1] for line in status if line.startswith("VmHWM:")))
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            client.run(lambda: __import__("bpstereo.dask"))
+            before, = client.run(held).values()
+            # Whatever Dask keeps beside the block that is matched: blocks that were read, and maps that wait to be joined.
+            kept = sum(image.nbytes for image in (left, right)) + 3 * 4 * left.size
+            bpstereo.dask.match(*images, labels=64).sum().compute()
+            after, = client.run(held).values()
+    assert after - before <= predicted + kept, (after - before, predicted, kept)
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -252,7 +252,7 @@ impl Options {
     }
 
     /// What blocks of a larger image need around them, to be matched one by one as the library matches tiles; `None` if the
-    /// algorithm's messages reach all of an image. Neighbouring blocks are then joined along a [`bp_core::border`].
+    /// algorithm needs the whole image. Neighbouring blocks are then joined along a [`bp_core::border`].
     ///
     /// # Errors
     /// [`Error::Options`] if [`Options::labels`] is not a number, or options contradict each other.

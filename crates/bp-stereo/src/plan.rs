@@ -57,7 +57,7 @@ pub(crate) fn quarter_of_width(options: &Options, size: Size) -> DisparityRange 
     DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels }
 }
 
-/// What the blocks of a larger image need around them; `None` if the algorithm's messages reach all of an image.
+/// What the blocks of a larger image need around them; `None` if the algorithm needs the whole image.
 pub(crate) fn around(options: &Options) -> Result<Option<Around>, Error> {
     /// A size on which every plan can run.
     const SIDE: usize = 256;
@@ -68,7 +68,9 @@ pub(crate) fn around(options: &Options) -> Result<Option<Around>, Error> {
     };
     let blank = Image::from_grey(SIDE, SIDE, vec![0; SIDE * SIDE])?;
     let range = DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels };
-    Ok(Around::of(&plan(options, &StereoPair::new(blank.clone(), blank)?, range)?))
+    let plan = plan(options, &StereoPair::new(blank.clone(), blank)?, range)?;
+    // A cut goes through the middle of the image, and each block would have its own.
+    Ok(Around::of(&plan).filter(|_| plan.settings().cut.is_none()))
 }
 
 /// Describes a tiled plan.

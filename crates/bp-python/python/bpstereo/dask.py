@@ -127,11 +127,11 @@ def _joined(maps: dask.array.Array, axis: int, depth: Any, shared: int) -> dask.
     def of(blocks: slice) -> dask.array.Array:
         return maps.blocks[(slice(None),) * axis + (blocks,)]
 
-    shape = list(maps.shape)
-    shape[axis] = 0
-    none = dask.array.zeros(shape, chunks=tuple((0,) if i == axis else sizes for i, sizes in enumerate(maps.chunks)), dtype=numpy.float32)
-    previous = dask.array.concatenate([none, strips(of(slice(None, -1)), -after)], axis, allow_unknown_chunksizes=True)
-    following = dask.array.concatenate([strips(of(slice(1, None)), before), none], axis, allow_unknown_chunksizes=True)
+    # The first block has none before it, the last none behind it. Dask would leave out blocks without a pixel.
+    chunks = tuple((1,) if i == axis else sizes for i, sizes in enumerate(maps.chunks))
+    none = dask.array.zeros(tuple(map(sum, chunks)), chunks=chunks, dtype=numpy.float32)
+    previous = dask.array.concatenate([none, strips(of(slice(None, -1)), -after)], axis)
+    following = dask.array.concatenate([strips(of(slice(1, None)), before), none], axis)
     chunks = tuple(kept if i == axis else sizes for i, sizes in enumerate(maps.chunks))
     return dask.array.map_blocks(_kept, maps, previous, following, axis=axis, depth=depth, chunks=chunks, **_MAP)
 
@@ -142,15 +142,17 @@ def _strip(block: _Map, axis: int, start: int, stop: int) -> _Map:
 
 def _kept(own: _Map, previous: _Map, following: _Map, axis: int, depth: tuple[int, int]) -> _Map:
     """What a block keeps, up to its borders with the blocks before and behind it, and what those keep beyond them."""
-    own, previous, following = (numpy.moveaxis(map, axis, 1) for map in (own, previous, following))
+    # A worker receives arrays at any address.
+    own, previous, following = (numpy.moveaxis(numpy.require(map, requirements="A"), axis, 1) for map in (own, previous, following))
+    has_previous, has_following = (map.shape[1] > 1 for map in (previous, following))
     shared = max(previous.shape[1], following.shape[1]) // 2
-    start = depth[0] if previous.size else 0
-    stop = own.shape[1] - (depth[1] if following.size else 0)
+    start = depth[0] if has_previous else 0
+    stop = own.shape[1] - (depth[1] if has_following else 0)
     kept, place = own[:, start:stop].copy(), numpy.arange(shared)
-    if previous.size:
+    if has_previous:
         border = _border(previous, own[:, start - shared : start + shared])[:, None]
         kept[:, :shared] = numpy.where(place + shared < border, previous[:, shared:], kept[:, :shared])
-    if following.size:
+    if has_following:
         border = _border(own[:, stop - shared : stop + shared], following)[:, None]
         kept[:, -shared:] = numpy.where(place < border, kept[:, -shared:], following[:, :shared])
     return numpy.ascontiguousarray(numpy.moveaxis(kept, 1, axis))
