@@ -4,9 +4,13 @@ use std::fs;
 
 use super::folder::{Folder, HEIGHT, MATCH, WIDTH};
 
-/// Cameras with lenses, one turned a little.
-fn calibration(folder: &Folder) {
-    let camera = format!("[50, 0, {}, 0, 50, {}, 0, 0, 1]", WIDTH / 2, HEIGHT / 2);
+/// The centre of the images.
+const CENTRE: [usize; 2] = [WIDTH as usize / 2, HEIGHT as usize / 2];
+
+/// Cameras with lenses and this centre, one turned a little.
+pub(crate) fn calibration(folder: &Folder, [x, y]: [usize; 2]) {
+    let focal = 50 * x / CENTRE[0];
+    let camera = format!("[{focal}, 0, {x}, 0, {focal}, {y}, 0, 0, 1]");
     let matrix = |name: &str, data: &str| {
         format!("{name}: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: {data}\n")
     };
@@ -24,7 +28,7 @@ fn calibration(folder: &Folder) {
 #[test]
 fn one_step_two_steps_and_a_video_give_the_same_maps() {
     let folder = Folder::new();
-    calibration(&folder);
+    calibration(&folder, CENTRE);
     let made = folder.run("rectify left.png right.pgm --calib raw.yml --output made");
     assert_eq!(made.status.code(), Some(0));
     let two = "match made/left.png made/right.png --calib made/calib.txt --labels 12 -o two.npy --depth two.depth.npy";
@@ -52,7 +56,7 @@ fn one_step_two_steps_and_a_video_give_the_same_maps() {
 #[test]
 fn what_cannot_be_rectified_is_refused_in_words() {
     let folder = Folder::new();
-    calibration(&folder);
+    calibration(&folder, CENTRE);
     fs::write(folder.path("calib.txt"), "cam0=[50 0 20; 0 50 12; 0 0 1]\ndoffs=0\nbaseline=60\n").unwrap();
     fs::write(folder.path("odd.yml"), "a: [1, 2]\n").unwrap();
     folder.fails(&format!("{MATCH} a.pfm --rectify"), 2, &["--calib"]);

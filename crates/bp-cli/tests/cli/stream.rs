@@ -9,7 +9,10 @@ use std::{
 use bp_core::Size;
 use bp_testkit::synthetic;
 
-use super::folder::{Folder, text};
+use super::{
+    folder::{Folder, text},
+    rectify::calibration,
+};
 
 /// Frames that hold both views of a scene, and the views themselves as grey images.
 fn views(frames: usize) -> (Folder, Vec<u8>, Size) {
@@ -62,6 +65,35 @@ fn frames_give_the_maps_of_their_images() {
     let top = [upright.as_bytes(), &frames[frames.iter().position(|&byte| byte == b'\n').unwrap()..]].concat();
     let (code, other, told) = piped(&folder, &format!("match --video - --layout top-bottom -o - {options}"), &top);
     assert_eq!((code, other.len()), (Some(0), maps.len()), "{told}");
+}
+
+/// One comes through a pipe, the other is a file.
+#[test]
+fn a_stream_for_each_camera_gives_the_maps_of_frames_with_both() {
+    let (folder, both, size) = views(2);
+    let alone = |name: &str| {
+        let grey = image::open(folder.path(name)).unwrap().into_luma8().into_raw();
+        let header = format!("YUV4MPEG2 W{} H{} F30:1 Cmono\n", size.width, size.height);
+        [header.into_bytes(), [b"FRAME\n".as_slice(), &grey].concat().repeat(2)].concat()
+    };
+    fs::write(folder.path("right.y4m"), alone("r.png")).unwrap();
+    let options = "--labels 24 --align off -o -";
+    let (code, maps, told) = piped(&folder, &format!("match --video - right.y4m {options}"), &alone("l.png"));
+    let (_, expected, _) = piped(&folder, &format!("match --video - {options}"), &both);
+    assert_eq!((code, maps == expected, maps.is_empty()), (Some(0), true, false), "{told}");
+}
+
+#[test]
+fn frames_are_rectified_as_pairs_are() {
+    let (folder, frames, size) = views(2);
+    calibration(&folder, [size.width / 2, size.height / 2]);
+    let options = "--labels 24 --calib raw.yml --rectify";
+    assert!(folder.run(&format!("match l.png r.png {options} -o map.pfm")).status.success());
+    let (code, maps, told) = piped(&folder, &format!("match --video - {options} -o -"), &frames);
+    let map = fs::read(folder.path("map.pfm")).unwrap();
+    assert_eq!((code, maps == map.repeat(2)), (Some(0), true), "{told}");
+    let (_, other, _) = piped(&folder, "match --video - --labels 24 -o -", &frames);
+    assert!(other != maps);
 }
 
 #[test]
