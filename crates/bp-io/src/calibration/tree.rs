@@ -34,9 +34,7 @@ impl<'a> Tree<'a> {
             // OpenCV begins its files with a directive that is not YAML's.
             let body =
                 text.strip_prefix("%YAML").map_or(text, |rest| rest.split_once('\n').map_or("", |(_, body)| body));
-            // `ros2 topic echo` ends every message as YAML ends a document; the first message counts.
-            let documents: Vec<Value> = serde_saphyr::from_multiple(body).map_err(|error| failed(&error))?;
-            documents.into_iter().next().unwrap_or_default()
+            serde_saphyr::from_str(first_document(body)).map_err(|error| failed(&error))?
         };
         if value.is_object() { Ok(Self { path, value }) } else { Err(failed(&"it has no names with values")) }
     }
@@ -160,6 +158,22 @@ fn flat(value: &Value) -> Option<Vec<f64>> {
     }
 }
 
+/// `ros2 topic echo` ends every message as YAML ends a document. The first message counts, and the last one may be cut off.
+fn first_document(text: &str) -> &str {
+    let mut has_begun = false;
+    let mut lengths = text.split_inclusive('\n').scan(0, |end, line| {
+        *end += line.len();
+        Some((*end - line.len(), line))
+    });
+    let end = lengths.find(|(_, line)| {
+        let is_marker = line.starts_with("---") || line.starts_with("...");
+        let has_content = !is_marker && !line.trim().is_empty() && !line.starts_with(['#', '%']);
+        has_begun |= has_content;
+        has_begun && is_marker
+    });
+    end.map_or(text, |(start, _)| &text[..start])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,7 +185,13 @@ mod tests {
     #[test]
     fn the_first_of_several_messages_counts() {
         let message = "width: 640\nk: [1, 2]\n";
-        for text in ["", "---\n", "---\nwidth: 320\n---\n"].map(|after| format!("{message}{after}")) {
+        // Others follow, the last one cut off, or what the program says between them.
+        let others =
+            ["", "---\n", "---\nwidth: 320\n---\n", "---\nk: [3,", "---\nA message was lost!!!\n\ttotal: 1\n---\n"];
+        for text in others
+            .into_iter()
+            .flat_map(|after| ["", "---\n", "\n# left\n---\n"].map(|before| format!("{before}{message}{after}")))
+        {
             let tree = parse(&text).unwrap();
             assert_eq!(
                 (tree.numbers(&["width"]), tree.numbers(&["K"])),
@@ -180,7 +200,7 @@ mod tests {
             );
         }
         assert!(parse("%YAML:1.0\n---\nM1: [1]\n").is_ok());
-        for text in ["", "---\n", "[1, 2]\n", "a: 1\n---\n{"] {
+        for text in ["", "---\n", "[1, 2]\n", "{"] {
             assert!(parse(text).is_err(), "{text}");
         }
     }
