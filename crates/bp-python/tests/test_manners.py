@@ -53,7 +53,7 @@ def ticks_a_second(work):
 
 def test_other_threads_run_meanwhile():
     # No callback, which would let them run.
-    loops = {"on_each_grid": {"loops": 300, "schedule": "sync"}}
+    loops = {"on_each_grid": {"loops": 900, "schedule": "sync"}}
     matcher = bpstereo.Matcher(algorithm={"name": "bp", "loops": loops}, labels=64, threads=1)
     pair = shifted(200, 250, 4)
     while_idle = ticks_a_second(lambda: time.sleep(0.3))
