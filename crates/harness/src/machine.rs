@@ -1,8 +1,9 @@
 //! This machine and this program, as records describe them.
 
-use std::{fs, io};
+use std::io;
 
 use bp_core::DeviceKind;
+use bp_io::Contents;
 use bp_stereo::Memory;
 use bytesize::ByteSize;
 
@@ -58,8 +59,8 @@ pub fn check_memory(kind: DeviceKind, needed: u64, advice: &str) -> Result<(), F
 
 /// The running program.
 pub fn program() -> Result<Program, Failure> {
-    let failed = |error: io::Error| Failure::other(format!("cannot read this program's own file: {error}"));
-    let file = std::env::current_exe().and_then(fs::read).map_err(failed)?;
+    let failed = |error: io::Error| Failure::other(format!("cannot find this program's own file: {error}"));
+    let file = Contents::of(&std::env::current_exe().map_err(failed)?, u64::MAX)?.bytes;
     Ok(Program {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         commit: env!("BP_COMMIT").to_owned(),

@@ -1,14 +1,9 @@
 //! Reads records, which may be untrusted. No other code does. A loaded record fits the types and this program's schema.
 //! Its strings are still whatever its author wrote, and no path in it has been followed.
 
-use std::{
-    borrow::Cow,
-    fmt::Display,
-    fs::{self, File},
-    io::Read,
-    path::Path,
-};
+use std::{borrow::Cow, fmt::Display, fs, path::Path};
 
+use bp_io::Contents;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use super::{
@@ -106,15 +101,12 @@ fn read(path: &Path) -> Result<String, Failure> {
     if !about.is_file() {
         return Err(failed(&format!("not a file; name a {RECORD_FILE} or its folder")));
     }
-    let too_large = || failed(&format!("larger than {} MiB, so it is no record, and is not read", MAX_BYTES >> 20));
     if about.len() > MAX_BYTES {
-        return Err(too_large());
+        return Err(failed(&format!("larger than {} MiB, so it is no record, and is not read", MAX_BYTES >> 20)));
     }
-    let mut text = String::new();
     // The file may have grown since, or the system may not report its size.
-    let limited = File::open(path).map(|file| file.take(MAX_BYTES + 1));
-    let count = limited.and_then(|mut file| file.read_to_string(&mut text)).map_err(|error| failed(&error))?;
-    if count as u64 > MAX_BYTES { Err(too_large()) } else { Ok(text) }
+    let bytes = Contents::of(path, MAX_BYTES)?.bytes;
+    String::from_utf8(bytes).map_err(|_| failed(&"not a text in UTF-8"))
 }
 
 #[cfg(test)]
