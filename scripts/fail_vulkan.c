@@ -1,7 +1,8 @@
 /* A Vulkan layer that makes the n-th call to an instance or a device fail. scripts/fail-each builds it, and makes the loader use it.
  *
  * BP_FAIL="device N RESULT" makes the N-th call that could lack memory return that VkResult. BP_FAIL="lost N RESULT" makes the N-th
- * call return it that could find the device lost, and every later one on that device.
+ * call return it that could find the device lost, and every later one on that device. BP_FAIL_MARK is a file that is created when
+ * the call fails.
  * BP_FAIL_COUNTS is a file that receives the number of calls of both kinds, a line each. */
 #include <stdatomic.h>
 #include <stdio.h>
@@ -47,6 +48,9 @@ static VkResult failure(enum kind kind) {
     if (kind == LOST && atomic_load(&lost)) return failing_with;
     if (kind != failing || call != failing_at) return VK_SUCCESS;
     atomic_store(&lost, kind == LOST);
+    const char *mark = getenv("BP_FAIL_MARK");
+    FILE *file = mark ? fopen(mark, "w") : NULL;
+    if (file) fclose(file);
     return failing_with;
 }
 

@@ -15,6 +15,14 @@ def make_pairs(folder, count, rng, size=(320, 240)):
     return folder
 
 
+def calibration(width, height):
+    """Cameras with lenses, one turned a little, as OpenCV writes them."""
+    matrix = lambda name, data: f"{name}: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [{data}]\n"
+    camera = f"50, 0, {width // 2}, 0, 50, {height // 2}, 0, 0, 1"
+    return "".join(["%YAML:1.0\n---\n", matrix("M1", camera), matrix("M2", camera), "D1: [-0.05, 0.01, 0., 0., 0.]\n",
+                    "D2: [-0.04, 0.01, 0., 0., 0.]\n", matrix("R", "1, -0.02, 0, 0.02, 1, 0, 0, 0, 1"), "T: [-100., 1., 0.5]\n"])
+
+
 # Fields that depend on when and where a record was written.
 OF_THE_MOMENT = ("elapsed_ms", "times", "modified_ns", "changed_ns", "path")
 
