@@ -8,6 +8,7 @@
 use std::{
     alloc::{GlobalAlloc, Layout, System},
     cell::Cell,
+    time::Duration,
 };
 
 /// The system's allocator. It remembers failures, so that an abort for lack of memory is known from others.
@@ -86,26 +87,35 @@ extern "C" fn at_abort(_signal: libc::c_int) {
     unsafe { libc::_exit(crate::failure::OUT_OF_MEMORY.into()) };
 }
 
+/// The most files that are looked at: many more than the program has open.
+const MOST_FILES: libc::rlim_t = 1 << 16;
+
+/// How long a call of the system that opens a file may take.
+const OPENING: Duration = Duration::from_millis(5);
+
 /// Removes the temporary files that the program has open: those that it is writing. Files that it reads are not touched, whatever
-/// their names. Other threads may be about to open more, so from now on the system lets nobody open anything.
+/// their names. Other threads may be about to open more, so from now on the system lets nobody open anything; what is being opened
+/// is waited for.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "only the C library can set limits and tell how a file is open")]
 fn remove_temporaries() {
-    use std::fs;
+    use std::{fs, path::Path, thread};
 
-    let Ok(open) = fs::read_dir("/proc/self/fd") else { return };
-    let none = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: the limit is a valid one.
-    let _ = unsafe { libc::setrlimit(libc::RLIMIT_NOFILE, &raw const none) };
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    let none = limit;
+    // SAFETY: both are valid limits.
+    let _ = unsafe {
+        libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit);
+        libc::setrlimit(libc::RLIMIT_NOFILE, &raw const none)
+    };
+    thread::sleep(OPENING);
     let is_written = |number: libc::c_int| {
         // SAFETY: this only asks, and fails for a number that is not open any more.
         let flags = unsafe { libc::fcntl(number, libc::F_GETFL) };
         flags >= 0 && flags & libc::O_ACCMODE != libc::O_RDONLY
     };
-    for entry in open.flatten() {
-        let (number, path) =
-            (entry.file_name().to_str().and_then(|number| number.parse().ok()), entry.path().read_link());
-        let (Some(number), Ok(path)) = (number, path) else { continue };
+    for number in 0..limit.rlim_cur.min(MOST_FILES) as libc::c_int {
+        let Ok(path) = Path::new(&format!("/proc/self/fd/{number}")).read_link() else { continue };
         let name = path.file_name().unwrap_or_default().as_encoded_bytes();
         if name.starts_with(bp_io::Files::PREFIX.as_bytes()) && is_written(number) {
             let _ = fs::remove_file(path);

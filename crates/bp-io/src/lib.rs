@@ -50,7 +50,7 @@ pub use calibration::{CalibrationFile, Cameras, Geometry};
 pub use caught::is_caught;
 pub use colours::Colours;
 pub use error::Error;
-pub use folders::create_folder;
+pub use folders::{create_folder, is_folder};
 pub use format::{MapFormat, Quantity, check_ending, check_range};
 pub use frames::{FrameFormat, Frames, Layout, PairFrames};
 pub use images::{StoredGrey, hex, parse_image, parse_stored_grey, pixels_sha256, read_image, write_image};

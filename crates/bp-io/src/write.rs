@@ -16,7 +16,7 @@ use tempfile::{NamedTempFile, TempPath};
 use crate::pipe::Pipe;
 use crate::{
     Error,
-    folders::{folder_of, sync_folder_of},
+    folders::{folder_of, is_folder, sync_folder_of},
 };
 
 /// Writes temporary files in the folder of the final file and renames them.
@@ -237,15 +237,18 @@ impl Files {
 
     fn temporary_beside(&self, path: &Path) -> Result<NamedTempFile, Error> {
         let folder = folder_of(path);
-        if !folder.is_dir() {
+        if !is_folder(folder).map_err(|error| Error::writing(path, &error))? {
             return Err(Error::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
         }
         let mut builder = tempfile::Builder::new();
         // Temporary files are private by default. A new output follows the user's umask instead.
         #[cfg(unix)]
         builder.permissions(replaced::at_first(path));
-        // The full message of the error would name the temporary file.
-        let failed = |error: std::io::Error| Error::writing(path, &error.kind());
+        // The message goes on with the name of the temporary file.
+        let failed = |error: std::io::Error| {
+            let text = error.to_string();
+            Error::writing(path, &text.split(" at path ").next().unwrap_or(&text))
+        };
         builder.prefix(&self.temporary).tempfile_in(folder).map_err(failed)
     }
 }

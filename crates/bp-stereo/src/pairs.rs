@@ -13,6 +13,8 @@ use std::{
 
 pub use list::parse;
 
+use bp_io::is_folder;
+
 use crate::{Error, Watch, reading::Room};
 
 /// A pair and its name.
@@ -81,8 +83,10 @@ impl Source {
     pub fn find(&self, output: &Path, max_memory: Option<u64>, watch: &Watch<'_>) -> Result<Found, Error> {
         let room = || Room::new(0, max_memory);
         let found = match self {
-            Self::Path(path) if path.is_dir() => search::search(path, output, watch)?,
-            Self::Path(path) => list::read(path, room(), watch)?,
+            Self::Path(path) => match is_folder(path).map_err(|error| bp_io::Error::reading(path, &error))? {
+                true => search::search(path, output, watch)?,
+                false => list::read(path, room(), watch)?,
+            },
             Self::StandardInput => list::read_input(room(), watch)?,
             Self::Video([left, right]) => video::frames(left, right)?,
             Self::Pairs(pairs, _) => Found { pairs: pairs.clone(), ..Found::default() },

@@ -131,7 +131,7 @@ impl Sum {
         for job in jobs {
             let path = job.record();
             let gone = || Error::System(format!("{} is gone", path.display()));
-            let PairRecord { elapsed_ms, done, .. } = PairRecord::read(&path).ok_or_else(gone)?;
+            let PairRecord { elapsed_ms, done, .. } = PairRecord::known(&path)?.ok_or_else(gone)?;
             add_distinct(&mut sum.settings, Some(description::Settings { rows: None, ..done.settings }));
             add_distinct(&mut sum.tiles, done.tiles);
             add_distinct(&mut sum.devices, Some(done.device));
