@@ -28,7 +28,7 @@ pub(crate) fn decode(path: &Path, bytes: &[u8], limit: Limits) -> Result<Dynamic
         Some(ImageFormat::Png) => png::decode(path, bytes, limit),
         Some(ImageFormat::Jpeg) if !has_jpeg_end(bytes) => Err(failed(&ENDS_EARLY)),
         Some(format) => decode_as(format, path, bytes, limit),
-        None => Err(failed(&"not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM; with `stretch`, NPY)")),
+        None => Err(failed(&UNKNOWN)),
     }
 }
 
@@ -92,6 +92,10 @@ pub(crate) fn check_unscaled(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         Ok(())
     }
 }
+
+/// Why a file is no image.
+pub(crate) const UNKNOWN: &str =
+    "not an image in a known format (PNG, PGM, PPM, TIFF, JPEG, PFM; maps and, with `stretch`, images also NPY)";
 
 /// The formats of images, besides PFM.
 const FORMATS: [ImageFormat; 4] = [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff, ImageFormat::Jpeg];

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use crate::{Error, Limits};
+use crate::{Error, Limits, decode::UNKNOWN};
 
 /// Most bytes of a file that describes one thing: a sidecar, a calibration, an alignment, the record of a pair.
 pub const MOST_DESCRIPTION: u64 = 1 << 20;
@@ -66,10 +66,26 @@ impl Contents {
             bytes if bytes > room => return Err(no_room(bytes)),
             _ => {}
         }
-        let bytes = filled(file, path, metadata.len(), most.min(room))?;
+        // So a device without end is refused at once.
+        let mut first = Vec::new();
+        (&file).take(FIRST).read_to_end(&mut first).map_err(|error| Error::reading(path, &error))?;
+        if !is_known(&first) {
+            return Err(Error::reading(path, &UNKNOWN));
+        }
+        let bytes = filled(first.chain(file), path, metadata.len(), most.min(room))?;
         let bytes = bytes.ok_or_else(|| if room < most { no_room(most) } else { too_long() })?;
         Ok(Self { bytes, metadata })
     }
+}
+
+/// How many bytes tell a format.
+const FIRST: u64 = 8;
+
+/// Whether images or maps may begin with these bytes.
+fn is_known(first: &[u8]) -> bool {
+    let is_portable = matches!(first, [b'P', b'1'..=b'7' | b'f' | b'F', ..]);
+    let begins: [&[u8]; 6] = [b"\x89PNG", b"\xff\xd8", b"II*\0", b"MM\0*", b"II+\0", b"\x93NUMPY"];
+    is_portable || begins.iter().any(|begin| first.starts_with(begin))
 }
 
 fn open(path: &Path) -> Result<(File, Metadata), Error> {

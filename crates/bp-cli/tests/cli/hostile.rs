@@ -61,6 +61,14 @@ fn texts_without_end_are_refused() {
     folder.fails("match --pairs /dev/zero --output out", 3, &["/dev/zero", "more than 64 MiB"]);
     folder.fails("convert left.png --depth d.pfm --calib /dev/zero", 3, &["/dev/zero", "more than 1 MiB"]);
     folder.fails("report /dev/zero", 3, &["/dev/zero"]);
+    let begun = Instant::now();
+    for command in
+        ["match /dev/zero right.png -o m.pfm", "convert /dev/zero --picture p.png", "evaluate /dev/zero /dev/zero"]
+    {
+        folder.fails(command, 3, &["/dev/zero", "not an image"]);
+    }
+    // A gigabyte and a half, as much as the largest image may have, takes seconds to read.
+    assert!(begun.elapsed() < Duration::from_secs(1), "{:?}", begun.elapsed());
     let zero = || Stdio::from(fs::File::open("/dev/zero").unwrap());
     folder.command_fails(folder.command("match --pairs - --output out").stdin(zero()), 3, &["standard input"]);
 }

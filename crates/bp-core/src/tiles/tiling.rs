@@ -16,8 +16,8 @@ const BYTES_PER_PIXEL: f64 = 128.0;
 const MOST_MATCHED: usize = 256;
 
 /// A plan, and the tiles that it runs on. One tile gives the image's answer to the bit. Several give nearly the same one, which is
-/// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`](crate::Schedule::Sweep) bands also begin at the first row of
-/// each tile.
+/// as accurate: pixels beyond the halo have no influence, and under [`Schedule::Sweep`](crate::Schedule::Sweep) bands also
+/// begin at the first row of each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
     plan: Plan,
@@ -49,8 +49,8 @@ impl Tiling {
 
     /// Tiles that keep `kept` columns and rows, both rounded up to multiples of 32 (with label sets, of 128 and 64), with at least `halo` columns and rows
     /// around them. All their pixels have the same costs as in the whole image. If labels match to the left, a tile extends further left by
-    /// the largest disparity, or, if that is far, its right image alone does; likewise the tile on the right. Under [`Schedule::Sweep`](crate::Schedule::Sweep) no halo has more
-    /// than 64 rows. Under [`Schedule::Outward`](crate::Schedule::Outward) the image is one tile.
+    /// the largest disparity, or, if that is far, its right image alone does; likewise the tile on the right. [`Around`] says what
+    /// halos have under each schedule. Under some the image is one tile.
     #[must_use]
     pub fn cut(plan: Plan, kept: Size, halo: usize) -> Self {
         let [left, right] = reach(&plan);
