@@ -1,6 +1,7 @@
 //! What `bpstereo.dask` needs to match blocks as the library matches tiles.
 
 use bp_core::{Around, border};
+use bp_stereo::around;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 
@@ -11,7 +12,7 @@ use crate::{errors::raised, options::options};
 #[pyfunction]
 #[pyo3(signature = (**options))]
 pub(crate) fn _around(options: Option<&Bound<'_, PyDict>>) -> PyResult<([usize; 2], usize, [usize; 2], usize)> {
-    let around = self::options(options)?.around().map_err(raised)?;
+    let around = around(&self::options(options)?).map_err(raised)?;
     let Around { left, right, rows, align } = around
         .ok_or_else(|| PyValueError::new_err("`algorithm`: this one needs the whole image, so there are no blocks"))?;
     Ok(([left, right], rows, [align.width, align.height], Around::SHARED))

@@ -57,6 +57,7 @@ pub use matcher::{Matcher, Planned, Start};
 pub use memory::Beside;
 pub use options::{Align, Labels, Options, Quality};
 pub use outputs::{Content, Making, Outputs};
+pub use plan::around;
 pub use reading::{
     ReadPair, check_stretching, read_beside, read_pair, read_raw_pair, read_stretched_pair, reading_limits,
     stretching_bytes,

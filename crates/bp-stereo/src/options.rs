@@ -1,12 +1,12 @@
 //! The options of a match.
 
 use bp_core::{
-    Alignment, Around, Profile, StereoPair,
+    Alignment, Profile, StereoPair,
     finish::{Finish, MEDIANS},
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{Algorithm, Error, devices, plan};
+use crate::{Algorithm, Error, devices};
 
 /// How pairs are matched, and on which device. The default is our own algorithm on the fast backend.
 ///
@@ -249,16 +249,6 @@ impl Options {
     pub fn compared(&self, pair: StereoPair) -> StereoPair {
         let profile = self.profile_for(&pair);
         pair.compared_by(profile)
-    }
-
-    /// What blocks of a larger image need around them, to be matched one by one as the library matches tiles; `None` if the
-    /// algorithm needs the whole image. Neighbouring blocks are then joined along a [`bp_core::border`].
-    ///
-    /// # Errors
-    /// [`Error::Options`] if [`Options::labels`] is not a number, or options contradict each other.
-    pub fn around(&self) -> Result<Option<Around>, Error> {
-        self.check()?;
-        plan::around(self)
     }
 
     /// The profile for a pair: colours count only if the left image has some.

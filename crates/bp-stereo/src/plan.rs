@@ -57,10 +57,15 @@ pub(crate) fn quarter_of_width(options: &Options, size: Size) -> DisparityRange 
     DisparityRange { min_disparity: options.min_disparity.unwrap_or(0), labels }
 }
 
-/// What the blocks of a larger image need around them; `None` if the algorithm needs the whole image.
-pub(crate) fn around(options: &Options) -> Result<Option<Around>, Error> {
+/// What blocks of a larger image need around them, to be matched one by one as the library matches tiles; `None` if the
+/// algorithm needs the whole image. Neighbouring blocks are then joined along a [`bp_core::border`].
+///
+/// # Errors
+/// [`Error::Options`] if [`Options::labels`] is not a number, or options contradict each other.
+pub fn around(options: &Options) -> Result<Option<Around>, Error> {
     /// A size on which every plan can run.
     const SIDE: usize = 256;
+    options.check()?;
     let Labels::Count(labels) = options.labels else {
         return Err(Error::Options(
             "`labels` must be a number: each block by itself would find other labels".to_owned(),
