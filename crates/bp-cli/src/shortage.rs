@@ -8,7 +8,6 @@
 use std::{
     alloc::{GlobalAlloc, Layout, System},
     cell::Cell,
-    time::Duration,
 };
 
 /// The system's allocator. It remembers failures, so that an abort for lack of memory is known from others.
@@ -87,20 +86,18 @@ extern "C" fn at_abort(_signal: libc::c_int) {
     unsafe { libc::_exit(crate::failure::OUT_OF_MEMORY.into()) };
 }
 
-/// The most files that are looked at: many more than the program has open.
-const MOST_FILES: libc::rlim_t = 1 << 16;
-
-/// How long a call of the system that opens a file may take.
-const OPENING: Duration = Duration::from_millis(5);
-
 /// Removes the temporary files that the program has open: those that it is writing. Files that it reads are not touched, whatever
 /// their names. Other threads may be about to open more, so from now on the system lets nobody open anything; what is being opened
 /// is waited for.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "only the C library can set limits and tell how a file is open")]
 fn remove_temporaries() {
-    use std::{fs, path::Path, thread};
+    use std::{fs, path::Path, thread, time::Duration};
 
+    /// The most files that are looked at: many more than the program has open.
+    const MOST_FILES: libc::rlim_t = 1 << 16;
+    /// How long a call of the system that opens a file may take.
+    const OPENING: Duration = Duration::from_millis(5);
     let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
     let none = limit;
     // SAFETY: both are valid limits.
