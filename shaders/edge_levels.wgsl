@@ -1,5 +1,5 @@
-// Finds the levels of edges, for kernels that update messages and for select_labels, by how much the grey values of their nodes differ. The
-// kernel's `greys` holds the grey values of the whole grid: [colour][row][word], one byte per node.
+// Finds the levels of edges by how much the grey values of their nodes differ. The kernel's `greys` holds the grey values of the whole
+// grid: [colour][row][word], one byte per node.
 
 // Whether the model has more than one level.
 override LEVELS: bool = false;
@@ -7,7 +7,7 @@ override LEVELS: bool = false;
 // The grey values of the left, right, upper and lower neighbours, indexed like their messages. Missing neighbours have
 // arbitrary values.
 fn neighbour_greys(nodes: Nodes) -> vec4<u32> {
-    let other = 1 - parameters.colour;
+    let other = 1 - nodes.colour;
     let aligned = greys[grid_index(other, nodes.y, nodes.word)];
     var left = aligned;
     var right = aligned;
@@ -39,7 +39,7 @@ fn edge_levels(nodes: Nodes) -> Levels {
     if !LEVELS {
         return Levels();
     }
-    let own = vec4(greys[grid_index(parameters.colour, nodes.y, nodes.word)]);
+    let own = vec4(greys[grid_index(nodes.colour, nodes.y, nodes.word)]);
     let others = neighbour_greys(nodes);
     let smaller = minimum(own, others);
     let difference = (own ^ others ^ smaller) - smaller;

@@ -11,7 +11,7 @@ struct Receivers {
     exist: u32,
 }
 
-fn receivers(nodes: Nodes) -> Receivers {
+fn receiving(nodes: Nodes) -> Receivers {
     var x = vec4<i32>(columns(nodes));
     var y = i32(nodes.y);
     let width = vec4(i32(parameters.width));
@@ -52,7 +52,7 @@ fn extend_messages(@builtin(global_invocation_id) id: vec3<u32>) {
     if !nodes.exist {
         return;
     }
-    let to = receivers(nodes);
+    let to = receiving(nodes);
     let first = plane_index(nodes.row, nodes.word);
     let step = splat(parameters.steps[0]);
     var offer = vec4(0xffffffffu);

@@ -43,15 +43,3 @@ fn from_above(index: u32) -> vec4<u32> {
 fn from_below(index: u32) -> vec4<u32> {
     return sent_up[index + parameters.quads * parameters.words];
 }
-
-// A mask of the nodes that have a neighbour to send to, for each side. Nodes beyond the right border need no mask: they
-// cost nothing and receive zeros, so they send zeros.
-fn receivers(nodes: Nodes) -> vec4<u32> {
-    let x = columns(nodes);
-    let left = (x != vec4(0u)) & (x != vec4(parameters.cut_x));
-    let right = (x + 1 < vec4(parameters.width)) & (x + 1 != vec4(parameters.cut_x));
-    let up = nodes.y != 0 && nodes.y != parameters.cut_y;
-    let down = nodes.y + 1 != parameters.height && nodes.y + 1 != parameters.cut_y;
-    let all = vec2(0xffffffffu);
-    return vec4(bytes_where(left), bytes_where(right), select(vec2(0u), all, vec2(up, down)));
-}

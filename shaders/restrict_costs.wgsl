@@ -19,23 +19,25 @@ fn unclipped(index: u32, label: u32) -> vec4<u32> {
     return vec4(sums[2 * at], sums[2 * at + 1]);
 }
 
-@compute @workgroup_size(64)
-fn restrict_costs(@builtin(global_invocation_id) id: vec3<u32>) {
-    let nodes = nodes(id.x);
-    if !nodes.exist {
-        return;
-    }
+@compute @workgroup_size(GROUP_WORDS, SLICES)
+fn restrict_costs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let nodes = nodes_of(group, local);
+    let quads = quads_of(local.y);
     let inside = bytes_where(columns(nodes) < vec4(parameters.width));
     let first = plane_index(nodes.row, nodes.word);
     // A word covers eight columns, so its nodes share a patch.
     let first_word = (window(nodes.y) * patches() + 8 * nodes.word / PATCH_COLUMNS) * set_words();
     var least = vec4(0xffffffffu);
-    for (var label = 0u; label < parameters.labels; label++) {
+    for (var label = 4 * quads.x; label < min(4 * quads.y, parameters.labels); label++) {
         if ((sets[first_word + label / 32] >> (label % 32)) & 1) == 1 {
             least = min(least, unclipped(first + (label / 4) * parameters.words, label % 4));
         }
     }
-    for (var quad = 0u; quad < parameters.quads; quad++) {
+    least = least_of_slices(local, least);
+    if !nodes.exist {
+        return;
+    }
+    for (var quad = quads.x; quad < quads.y; quad++) {
         let index = first + quad * parameters.words;
         var costs = vec4(0xffffffffu);
         for (var i = 0u; i < 4; i++) {

@@ -5,9 +5,6 @@
 // Grey values; see edge_levels.wgsl.
 @group(0) @binding(7) var<storage, read> greys: array<u32>;
 
-// Enough for 1024 labels and the padding of the last quad.
-const LABEL_BITS: u32 = 11;
-
 override SWEEP: bool = false;
 
 // Data cost plus the messages that count, for a quad of labels.
@@ -34,24 +31,10 @@ fn decided(colour: u32, y: u32, word: u32, shift: i32) -> vec4<u32> {
     return found;
 }
 
-// Neighbours on one side with decided labels: the labels, which neighbours exist, and slope and truncation of the edges.
-struct Beside {
-    labels: vec4<u32>,
-    exist: vec4<bool>,
-    slopes: vec4<u32>,
-    truncations: vec4<u32>,
-}
-
 struct Decided {
     left: Beside,
     right: Beside,
     up: Beside,
-}
-
-// The smoothness cost of a label next to these neighbours.
-fn smoothness(label: u32, beside: Beside) -> vec4<u32> {
-    let apart = max(vec4(label), beside.labels) - min(vec4(label), beside.labels);
-    return select(vec4(0u), min(beside.slopes * apart, beside.truncations), beside.exist);
 }
 
 fn decided_neighbours(nodes: Nodes) -> Decided {

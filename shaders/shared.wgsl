@@ -22,11 +22,15 @@ struct Parameters {
     quads: u32,
     // The strip: the row of the grid that is its row 0.
     first_row: u32,
-    // The dispatch: the colour of its nodes, and its rows of the strip (row, row + row_step, ...) and their number.
+    // The dispatch: the colour of its nodes, and its rows of the strip (row, row + row_step, ...) and their number. Under the schedule
+    // `sweep`, bands take the place of rows, and `span` is the number of rows of each, apart from those beyond the strip.
     colour: u32,
     row: u32,
     row_step: u32,
     rows: u32,
+    span: u32,
+    // The rows of the strip.
+    strip_rows: u32,
     // The model: slope and truncation of the smoothness cost and the smaller of the two, for each level of edges, the greatest
     // grey difference of each level, the value at which data costs are clipped, and the disparity of label 0.
     slopes: array<u32, 4>,
@@ -44,9 +48,14 @@ struct Parameters {
     sends: u32,
     // select_labels under the schedule `sweep`: 1 if the rows above have labels.
     labels_above: u32,
-    // Kernels of label sets: 1 if the sets are those of seams, 0 if they are those of bands.
+    // Kernels of label sets, and decide_rows: 1 if the sets or labels are those of seams, 0 if they are those of bands.
     seams: u32,
-    // update_messages_of_slice: how many labels an offer may pass before it costs as much as the truncation.
+    // pass_rows and decide_rows: the first segment.
+    first_segment: u32,
+    // pass_rows: 1 if the pass is backward, and 1 if its last row sends ahead too.
+    backward: u32,
+    across: u32,
+    // envelope.wgsl: how many labels an offer may pass before it costs as much as the truncation.
     reach: u32,
     // refine and extend_messages: the side that the messages are sent to, with the same numbering.
     side: u32,
@@ -79,8 +88,9 @@ struct Nodes {
     // The row in the strip and in the grid.
     row: u32,
     y: u32,
-    // The word in the row, and the parity of its columns.
+    // The word in the row, the colour and the parity of the columns.
     word: u32,
+    colour: u32,
     parity: u32,
     // Whether this invocation has any nodes.
     exist: bool,
@@ -93,9 +103,16 @@ fn nodes(invocation: u32) -> Nodes {
 
 // The nodes of a word in row `line` of the dispatch.
 fn nodes_at(line: u32, word: u32) -> Nodes {
-    let row = parameters.row + line * parameters.row_step;
+    var row = parameters.row + line * parameters.row_step;
+    if parameters.span > 1 {
+        row = parameters.row + line / parameters.span * parameters.row_step + line % parameters.span;
+    }
+    return nodes_of_row(row, word, parameters.colour, line < parameters.rows && row < parameters.strip_rows);
+}
+
+fn nodes_of_row(row: u32, word: u32, colour: u32, exist: bool) -> Nodes {
     let y = parameters.first_row + row;
-    return Nodes(row, y, word, (y + parameters.colour) & 1, line < parameters.rows);
+    return Nodes(row, y, word, colour, (y + colour) & 1, exist);
 }
 
 // The columns of the four nodes.
@@ -117,6 +134,22 @@ fn grid_index(colour: u32, y: u32, word: u32) -> u32 {
 fn bytes_where(condition: vec4<bool>) -> u32 {
     let bytes = select(vec4(0u), vec4(0xffu, 0xff00u, 0xff0000u, 0xff000000u), condition);
     return bytes.x | bytes.y | bytes.z | bytes.w;
+}
+
+// A mask of the nodes that have a neighbour to send to on this side. Nodes beyond the right border need no mask: they cost nothing and
+// receive zeros, so they send zeros.
+fn receivers_at(nodes: Nodes, side: u32) -> u32 {
+    let x = columns(nodes) + select(0u, 1u, side == RIGHT);
+    let y = nodes.y + select(0u, 1u, side == DOWN);
+    if side == LEFT || side == RIGHT {
+        return bytes_where((x != vec4(0u)) & (x < vec4(parameters.width)) & (x != vec4(parameters.cut_x)));
+    }
+    return select(0u, 0xffffffffu, y != 0 && y < parameters.height && y != parameters.cut_y);
+}
+
+// The same for every side.
+fn receivers(nodes: Nodes) -> vec4<u32> {
+    return vec4(receivers_at(nodes, LEFT), receivers_at(nodes, RIGHT), receivers_at(nodes, UP), receivers_at(nodes, DOWN));
 }
 
 // The same byte four times.

@@ -20,8 +20,8 @@ fn quads_of(slice: u32) -> vec2<u32> {
     return min(vec2(slice, slice + 1) * quads, vec2(parameters.quads));
 }
 
-// [word][side][node]
-var<workgroup> leasts: array<array<array<atomic<u32>, 4>, 4>, GROUP_WORDS>;
+// [side][node][word], so that neighbouring invocations use different banks of memory. (naga 30 cannot compute an array's length.)
+var<workgroup> leasts: array<array<atomic<u32>, 16>, GROUP_WORDS>;
 
 // The least value over all slices, for each node of a word and, in update_messages_of_slice, for each side. All invocations of a
 // workgroup must call it.
@@ -29,21 +29,22 @@ fn least_of_slices(local: vec3<u32>, own: vec4<u32>) -> vec4<u32> {
     if SLICES == 1 {
         return own;
     }
+    let places = (4 * local.z + vec4(0u, 1u, 2u, 3u)) * GROUP_WORDS + local.x;
     if local.y == 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicStore(&leasts[local.x][local.z][i], own[i]);
+            atomicStore(&leasts[places[i] / 16][places[i] % 16], own[i]);
         }
     }
     workgroupBarrier();
     if local.y > 0 {
         for (var i = 0u; i < 4; i++) {
-            atomicMin(&leasts[local.x][local.z][i], own[i]);
+            atomicMin(&leasts[places[i] / 16][places[i] % 16], own[i]);
         }
     }
     workgroupBarrier();
     var least: vec4<u32>;
     for (var i = 0u; i < 4; i++) {
-        least[i] = atomicLoad(&leasts[local.x][local.z][i]);
+        least[i] = atomicLoad(&leasts[places[i] / 16][places[i] % 16]);
     }
     return least;
 }

@@ -15,6 +15,8 @@ wgsl! {
     FEATURES = "features.wgsl";
     /// Computes the grey values of the left image.
     GREYS = "greys.wgsl";
+    /// Finds the costs of the edges of a grid.
+    EDGE_COSTS = "edge_costs.wgsl";
     /// Computes the data costs of the image.
     MATCH_COST = "match_cost.wgsl";
     /// Computes the grey values of a coarser grid.
@@ -27,6 +29,10 @@ wgsl! {
     UPDATE_MESSAGES = "update_messages.wgsl";
     /// Updates messages, a slice of labels an invocation.
     UPDATE_MESSAGES_OF_SLICE = "update_messages_of_slice.wgsl";
+    /// Passes messages through rows of bands.
+    PASS_ROWS = "pass_rows.wgsl";
+    /// Decides the labels of rows of bands.
+    DECIDE_ROWS = "decide_rows.wgsl";
     /// Selects labels.
     SELECT_LABELS = "select_labels.wgsl";
     /// Finds the label sets of a grid.
@@ -51,6 +57,12 @@ wgsl! {
     COSTS = "costs.wgsl";
     /// Reads data costs and messages.
     MESSAGES = "messages.wgsl";
+    /// Computes the message of a slice of labels.
+    ENVELOPE = "envelope.wgsl";
+    /// Finds the smoothness costs beside decided labels.
+    DECISIONS = "decisions.wgsl";
+    /// The segments of bands.
+    SEGMENTS = "segments.wgsl";
     /// The layout of label sets.
     SETS = "sets.wgsl";
     /// Finds the levels of edges.

@@ -6,6 +6,7 @@ mod kernels;
 mod label_sets;
 mod parts;
 mod recorder;
+mod segments;
 mod sweep;
 
 use bp_core::{Error, Plan, Schedule};
@@ -57,7 +58,7 @@ fn compose(plan: &Plan, limits: &Limits) -> Result<Program, Error> {
     check_schedule(plan, limits)?;
     check_sums(plan, limits)?;
     let grids = layout::grids(plan, limits)?;
-    let buffers = Buffers::new(plan, &grids);
+    let buffers = Buffers::new(plan, &grids, limits);
     check_limits(plan, &buffers.list, limits)?;
     let composer = Composer {
         plan,

@@ -5,7 +5,7 @@
 
 use std::{env, thread, time::Duration};
 
-use bp_core::{Algorithm, Device, Driver, Error, Model, Node, Plan, Profile, Schedule, Settings};
+use bp_core::{Algorithm, Device, Driver, Error, Model, Node, Plan, Profile, Schedule, Settings, StereoPair};
 use bp_testkit::{Case, Difference, compare, compare_at_random, conform_every, noise_pair};
 
 use crate::{Limits, Shape};
@@ -84,6 +84,37 @@ pub fn conforms_cut_up(
     let refused = compare_at_random(reference, &devices, (1000..1100).step_by(n))?;
     assert!(refused <= 5, "{refused} plans refused");
     Ok(())
+}
+
+/// Sweeps over images so wide that a band has several segments, and so high that several segments pass on messages across seams: with
+/// label sets and without, with edges of one level and of several.
+///
+/// # Errors
+/// The first difference from the reference.
+///
+/// # Panics
+/// If the device refuses a plan.
+pub fn conforms_in_segments(
+    reference: &dyn Device,
+    open: impl Fn(&dyn Fn(&mut Limits)) -> Option<Box<dyn Device>>,
+) -> Result<(), Difference> {
+    let Some(device) = open(&|_| ()) else { return Ok(()) };
+    segmented_cases().iter().try_for_each(|case| compare(reference, device.as_ref(), case))
+}
+
+fn segmented_cases() -> Vec<Case> {
+    let sizes = [(96, 70), (97, 33), (231, 67)].map(|(width, height)| noise_pair(width, height, 3));
+    let model = |profile| Model::new(profile, 35).expect("few labels");
+    let models = [model(Profile::Census16), model(Profile::Census16).with_edges_halved_above(20), model(Profile::Mrf)];
+    let cases = sizes.into_iter().flat_map(|pair| models.map(|model| (pair.clone(), model)));
+    let plans =
+        cases.flat_map(|(pair, model)| [(false, 1), (true, 1), (true, 2)].map(|rest| (pair.clone(), model, rest)));
+    let case = |(pair, model, (label_sets, loops)): (StereoPair, Model, (bool, u32))| {
+        let settings = Algorithm::Sweep.settings(pair.size(), loops, 1, Schedule::Sweep);
+        let plan = Plan::new(pair.size(), model, Settings { label_sets, ..settings }).expect("a sweep");
+        Case { pair, plan }
+    };
+    plans.map(case).collect()
 }
 
 fn banded_cases() -> Vec<Case> {

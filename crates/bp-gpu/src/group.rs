@@ -2,7 +2,7 @@
 
 use bp_core::Plan;
 
-use crate::{Kernel, Limits, Shape, WORKGROUP};
+use crate::{Kernel, Limits, Shape, WORKGROUP, segment};
 
 /// The quads of labels that an invocation of `update_messages_of_slice` keeps in registers. Its WGSL file has the same number.
 const SLICE_QUADS: usize = 4;
@@ -12,6 +12,15 @@ const GROUP_WORDS: u32 = 8;
 
 /// The same for `update_messages_of_slice`. An H100 takes a tenth more time with 8 words, and a sixth more with 2.
 const UPDATED_WORDS: u32 = 4;
+
+/// The same for `pass_rows`, where fewer run at a time: they should take less long.
+pub(crate) const PASSED_QUADS: usize = 2;
+
+/// The most invocations of a workgroup of `pass_rows` and `decide_rows`: each keeps about a hundred values in registers.
+const SEGMENT_INVOCATIONS: u32 = 512;
+
+/// The most words, with a side each, that a workgroup of `pass_rows` computes at a time.
+const PASSED_WORDS: u32 = 64;
 
 /// The invocations of a workgroup that a device must allow for the shape [`Shape::Slices`]: enough for 1024 labels. All GPUs of
 /// desktops allow more.
@@ -39,6 +48,15 @@ impl Group {
             // Every slice needs an invocation for each of four sides, since the slices of a message work together.
             let words = UPDATED_WORDS.min(limits.invocations / (4 * slices)).max(1);
             return Self { words, slices, in_a_row: true };
+        }
+        let most = SEGMENT_INVOCATIONS.min(limits.invocations);
+        if kernel == Kernel::PassRows {
+            let slices = plan.model().labels().div_ceil(4 * PASSED_QUADS) as u32;
+            return Self { words: (most / slices).clamp(1, PASSED_WORDS), slices, in_a_row: true };
+        }
+        if kernel == Kernel::DecideRows {
+            let words = segment::MOST_WORDS as u32;
+            return Self { words, slices: (2 * slices).min(most / words).max(1), in_a_row: true };
         }
         // Without a least value to find, single quads keep the most reads under way.
         let quads = plan.model().labels().div_ceil(4) as u32;

@@ -23,6 +23,9 @@ pub enum Kernel {
     Features,
     /// Grey values of the left image, if the model has edges of several levels; part of the stage `match_cost`.
     Greys,
+    /// Steps and truncations of the edges of a grid, if the model has edges of several levels; part of the stages `match_cost` and
+    /// `coarsen`.
+    EdgeCosts,
     /// Data costs of the image.
     MatchCost,
     /// Grey values of a coarser grid, if the model has edges of several levels; part of the stage `coarsen`.
@@ -35,8 +38,12 @@ pub enum Kernel {
     UpdateMessages,
     /// Message passing, a slice of labels an invocation; part of the stage `update_messages`.
     UpdateMessagesOfSlice,
+    /// Message passing through rows of bands, a segment a workgroup; part of the stages `refine` and `update_messages`.
+    PassRows,
     /// Labels.
     SelectLabels,
+    /// Labels of rows of bands, a segment a workgroup; part of the stages `refine`, `update_messages` and `select_labels`.
+    DecideRows,
     /// The label sets of a grid.
     LabelSets,
     /// The data costs of label sets.
@@ -49,16 +56,19 @@ pub enum Kernel {
 
 impl Kernel {
     /// All kernels.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 16] = [
         Self::Features,
         Self::Greys,
+        Self::EdgeCosts,
         Self::MatchCost,
         Self::CoarsenGreys,
         Self::Coarsen,
         Self::Refine,
         Self::UpdateMessages,
         Self::UpdateMessagesOfSlice,
+        Self::PassRows,
         Self::SelectLabels,
+        Self::DecideRows,
         Self::LabelSets,
         Self::RestrictCosts,
         Self::ExtendMessages,
@@ -71,13 +81,16 @@ impl Kernel {
         match self {
             Self::Features => "features",
             Self::Greys => "greys",
+            Self::EdgeCosts => "edge_costs",
             Self::MatchCost => "match_cost",
             Self::CoarsenGreys => "coarsen_greys",
             Self::Coarsen => "coarsen",
             Self::Refine => "refine",
             Self::UpdateMessages => "update_messages",
             Self::UpdateMessagesOfSlice => "update_messages_of_slice",
+            Self::PassRows => "pass_rows",
             Self::SelectLabels => "select_labels",
+            Self::DecideRows => "decide_rows",
             Self::LabelSets => "label_sets",
             Self::RestrictCosts => "restrict_costs",
             Self::ExtendMessages => "extend_messages",
@@ -91,13 +104,16 @@ impl Kernel {
         let own = match self {
             Self::Features => bp_shaders::FEATURES,
             Self::Greys => bp_shaders::GREYS,
+            Self::EdgeCosts => bp_shaders::EDGE_COSTS,
             Self::MatchCost => bp_shaders::MATCH_COST,
             Self::CoarsenGreys => bp_shaders::COARSEN_GREYS,
             Self::Coarsen => bp_shaders::COARSEN,
             Self::Refine => bp_shaders::REFINE,
             Self::UpdateMessages => bp_shaders::UPDATE_MESSAGES,
             Self::UpdateMessagesOfSlice => bp_shaders::UPDATE_MESSAGES_OF_SLICE,
+            Self::PassRows => bp_shaders::PASS_ROWS,
             Self::SelectLabels => bp_shaders::SELECT_LABELS,
+            Self::DecideRows => bp_shaders::DECIDE_ROWS,
             Self::LabelSets => bp_shaders::LABEL_SETS,
             Self::RestrictCosts => bp_shaders::RESTRICT_COSTS,
             Self::ExtendMessages => bp_shaders::EXTEND_MESSAGES,
@@ -107,12 +123,19 @@ impl Kernel {
             Self::Features | Self::Greys => &[bp_shaders::IMAGE],
             Self::MatchCost | Self::Coarsen => &[bp_shaders::SLICES, bp_shaders::COSTS],
             Self::UpdateMessages => &[bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS],
-            Self::UpdateMessagesOfSlice | Self::SelectLabels => {
-                &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS]
+            Self::EdgeCosts => &[bp_shaders::EDGE_LEVELS],
+            Self::UpdateMessagesOfSlice => &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::ENVELOPE],
+            Self::PassRows => &[bp_shaders::SLICES, bp_shaders::ENVELOPE, bp_shaders::SEGMENTS],
+            Self::SelectLabels => {
+                &[bp_shaders::SLICES, bp_shaders::MESSAGES, bp_shaders::EDGE_LEVELS, bp_shaders::DECISIONS]
+            }
+            Self::DecideRows => {
+                &[bp_shaders::SLICES, bp_shaders::EDGE_LEVELS, bp_shaders::DECISIONS, bp_shaders::SEGMENTS]
             }
             Self::CoarsenGreys | Self::Copy => &[],
             Self::Refine => &[bp_shaders::SLICES],
-            Self::LabelSets | Self::RestrictCosts | Self::ExtendMessages => &[bp_shaders::SETS],
+            Self::RestrictCosts => &[bp_shaders::SLICES, bp_shaders::SETS],
+            Self::LabelSets | Self::ExtendMessages => &[bp_shaders::SETS],
         };
         [bp_shaders::SHARED, &of_several.concat(), own].concat()
     }
@@ -123,14 +146,16 @@ impl Kernel {
     pub fn bindings(self) -> &'static [Access] {
         match self {
             Self::Features | Self::Greys | Self::CoarsenGreys => &[Read, Write],
-            Self::LabelSets | Self::ExtendMessages | Self::Copy => &[Write, Read],
+            Self::EdgeCosts | Self::LabelSets | Self::ExtendMessages | Self::Copy => &[Write, Read],
             Self::MatchCost => &[Write, Write, Read, Read, Read],
             Self::Coarsen => &[Write, Write, Read, Read, Read, Read],
             Self::Refine | Self::RestrictCosts => &[Write, Read, Read],
             Self::UpdateMessages | Self::UpdateMessagesOfSlice => {
                 &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Read]
             }
+            Self::PassRows => &[Read, Read, Read, Read, Read, Write, Write, Write, Write, Write, Read],
             Self::SelectLabels => &[Read, Read, Read, Read, Read, Write, Read],
+            Self::DecideRows => &[Read, Read, Read, Read, Read, Read, Write, Write, Read],
         }
     }
 
@@ -139,16 +164,29 @@ impl Kernel {
     #[must_use]
     pub fn is_sliced(self) -> bool {
         match self {
-            Self::MatchCost | Self::Coarsen | Self::Refine | Self::UpdateMessagesOfSlice | Self::SelectLabels => true,
+            Self::MatchCost
+            | Self::Coarsen
+            | Self::Refine
+            | Self::UpdateMessagesOfSlice
+            | Self::PassRows
+            | Self::SelectLabels
+            | Self::DecideRows
+            | Self::RestrictCosts => true,
             Self::Features
             | Self::Greys
             | Self::CoarsenGreys
+            | Self::EdgeCosts
             | Self::UpdateMessages
             | Self::LabelSets
-            | Self::RestrictCosts
             | Self::ExtendMessages
             | Self::Copy => false,
         }
+    }
+
+    /// Whether each of its workgroups has a segment of a band, whose rows it goes through one after another.
+    #[must_use]
+    pub fn has_segments(self) -> bool {
+        matches!(self, Self::PassRows | Self::DecideRows)
     }
 
     /// The most storage buffers that a kernel binds, including the parameters.

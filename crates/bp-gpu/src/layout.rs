@@ -11,7 +11,7 @@ pub(crate) const WORD_NODES: usize = 4;
 /// The number of labels that share a vector.
 const QUAD_LABELS: usize = 4;
 /// The bytes of a vector: four labels at four nodes.
-const VECTOR_BYTES: u64 = 16;
+pub(crate) const VECTOR_BYTES: u64 = 16;
 
 /// Rows of a grid that have their own buffers, so that no buffer is larger than a device allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +62,11 @@ impl Grid {
     /// The bytes of all grey values: one for each node of both colours of a row, rounded up to whole words.
     pub(crate) fn grey_bytes(&self) -> u64 {
         2 * (self.words * WORD_NODES) as u64 * self.size.height as u64
+    }
+
+    /// The bytes of the costs of all edges: a step and a truncation for each of four sides of the same nodes.
+    pub(crate) fn edge_bytes(&self) -> u64 {
+        8 * self.grey_bytes()
     }
 
     /// The most rows of a strip whose largest buffer fits.

@@ -18,6 +18,7 @@ pub mod missing;
 mod parameters;
 mod program;
 mod queue;
+mod segment;
 mod shape;
 mod solver;
 

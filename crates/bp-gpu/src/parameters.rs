@@ -40,8 +40,12 @@ parameters! {
     row: u32,
     /// Distance between its rows.
     row_step: u32,
-    /// Number of its rows.
+    /// Number of its rows, or of bands in `pass_rows` and `decide_rows`.
     rows: u32,
+    /// Of how many rows each is the first.
+    span: u32,
+    /// Rows of the strip.
+    strip_rows: u32,
     /// Slope of the smoothness cost by level of edges.
     slopes: [u32; EdgeLevels::COUNT],
     /// Truncation of the smoothness cost by level.
@@ -64,8 +68,14 @@ parameters! {
     sends: u32,
     /// 1 if the rows above have labels, under the schedule `sweep`.
     labels_above: u32,
-    /// 1 if label sets are those of seams, 0 if they are those of bands.
+    /// 1 if label sets or labels are those of seams, 0 if they are those of bands.
     seams: u32,
+    /// The first segment of the dispatch.
+    first_segment: u32,
+    /// 1 if a pass goes up.
+    backward: u32,
+    /// 1 if the last row of a pass sends ahead too.
+    across: u32,
     /// How many labels an offer may pass before it costs as much as the truncation.
     reach: u32,
     /// The one side whose messages are refined or extended.

@@ -29,7 +29,25 @@ fn translate_text(text: &str, kernel: Kernel, constants: &[(&str, u32)]) -> Resu
     let entry_point = (ShaderStage::Compute, kernel.name());
     let (module, info) = process_overrides(&module, &info, Some(entry_point), &constants).map_err(describe)?;
     let entry_point = spv::PipelineOptions { shader_stage: entry_point.0, entry_point: entry_point.1.to_owned() };
-    spv::write_vec(&module, &info, &options(), Some(&entry_point)).map_err(describe)
+    let mut words = spv::write_vec(&module, &info, &options(), Some(&entry_point)).map_err(describe)?;
+    narrow_barriers(&mut words);
+    Ok(words)
+}
+
+/// Makes barriers order the memory that the invocations of a workgroup see, as WGSL asks. naga lets those of storage buffers order
+/// that of the whole device, for which GPUs empty caches.
+fn narrow_barriers(words: &mut [u32]) {
+    const HEADER: usize = 5;
+    const CONTROL_BARRIER: u32 = 224;
+    let mut at = HEADER;
+    while at < words.len() {
+        let (length, code) = ((words[at] >> 16) as usize, words[at] & 0xffff);
+        if code == CONTROL_BARRIER {
+            // The scope of memory becomes that of execution.
+            words[at + 2] = words[at + 1];
+        }
+        at += length.max(1);
+    }
 }
 
 fn describe(error: impl fmt::Display) -> String {
@@ -107,6 +125,15 @@ mod tests {
     fn a_kernel_becomes_spirv_1_3() {
         let words = translate_text(TEXT, Kernel::Refine, &[("N", 3)]).unwrap();
         assert_eq!(words[..2], [0x0723_0203, 0x0001_0300]);
+    }
+
+    /// Of a barrier of storage buffers and one of workgroup memory.
+    #[test]
+    fn barriers_order_the_memory_of_a_workgroup_and_no_more() {
+        let text = TEXT.replace("values[id.x] += N;", "values[id.x] += N; storageBarrier(); workgroupBarrier();");
+        let words = translate_text(&text, Kernel::Refine, &[("N", 3)]).unwrap();
+        let barriers: Vec<_> = words.windows(3).filter(|found| found[0] == 4 << 16 | 224).collect();
+        assert!(barriers.len() == 2 && barriers.iter().all(|found| found[1] == found[2]), "{barriers:?}");
     }
 
     #[test]

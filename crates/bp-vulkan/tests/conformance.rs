@@ -4,7 +4,9 @@ use bp_core::{Backend, Device, Error};
 use bp_cpu_scalar::Scalar;
 use bp_gpu::{
     Limits,
-    conformance::{conforms, conforms_cut_up, opened, refuses, reshape, runs_plans_at_once, tells_times},
+    conformance::{
+        conforms, conforms_cut_up, conforms_in_segments, opened, refuses, reshape, runs_plans_at_once, tells_times,
+    },
 };
 use bp_testkit::Difference;
 use bp_vulkan::Vulkan;
@@ -30,6 +32,12 @@ fn the_other_shape_conforms() -> Result<(), Difference> {
 #[test]
 fn the_other_shape_conforms_cut_up() -> Result<(), Difference> {
     conforms_cut_up(16, &Scalar, open_reshaped)
+}
+
+#[test]
+fn sweeps_of_several_segments_conform() -> Result<(), Difference> {
+    conforms_in_segments(&Scalar, open)?;
+    conforms_in_segments(&Scalar, open_reshaped)
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! The buffers of a program.
 
-use bp_core::{BAND_ROWS, Patch, Plan, Schedule, Size};
+use bp_core::{BAND_ROWS, Patch, Plan, Schedule, Seam, Size};
 
 use crate::{
-    Buffer, Memory,
+    Buffer, Limits, Memory, Shape,
     answer::{SEED_BYTES, image_bytes, label_bytes},
     layout::Grid,
+    segment,
 };
 
 /// Sizes are rounded up to a multiple of this, the largest alignment of any device, so that buffers leave no gaps.
@@ -33,17 +34,22 @@ pub(crate) struct Buffers {
     pub(crate) labels: Vec<usize>,
     /// The label sets of a grid, if any has some.
     pub(crate) label_sets: Option<usize>,
+    /// What the workgroups of `pass_rows` sent, and the labels decided for seams, if the plan sweeps in the shape of slices.
+    pub(crate) own: Option<usize>,
+    pub(crate) seam_labels: Option<usize>,
     /// Bound in place of sums that are not kept: one buffer to read, one to write.
     pub(crate) unused: usize,
     pub(crate) unused_written: usize,
     /// Grey values of the whole grid, `[grid]`, if the model has edges of several levels.
     pub(crate) greys: Option<Vec<usize>>,
+    /// Costs of the edges of the whole grid, `[grid]`, likewise in the shape of slices.
+    pub(crate) edges: Option<Vec<usize>>,
     /// `[grid][strip]`.
     pub(crate) strips: Vec<Vec<StripBuffers>>,
 }
 
 impl Buffers {
-    pub(crate) fn new(plan: &Plan, grids: &[Grid]) -> Self {
+    pub(crate) fn new(plan: &Plan, grids: &[Grid], limits: &Limits) -> Self {
         let (size, pair_size) = (plan.image_size(), plan.pair_size());
         let mut list = Vec::new();
         let mut add = |name, bytes: u64, memory| {
@@ -56,6 +62,7 @@ impl Buffers {
         add("download", label_bytes(size), Memory::Download);
         let mut device = |name, bytes| add(name, bytes, Memory::Device);
         let features = 4 * pair_size.pixels() as u64;
+        let in_segments = plan.settings().schedule == Schedule::Sweep && limits.shape == Shape::Slices;
         Self {
             images: [(); 2].map(|()| device("images", image_bytes(pair_size))),
             features: [(); 2].map(|()| device("features", features)),
@@ -65,14 +72,28 @@ impl Buffers {
                 .map(|grid| device("labels", label_bytes(plan.size(grid))))
                 .collect(),
             label_sets: plan.has_label_sets(0).then(|| device("label sets", label_set_bytes(plan))),
+            own: in_segments.then(|| {
+                let most = limits.binding_bytes.min(limits.buffer_bytes);
+                let bytes = grids.iter().map(|grid| segment::all_own_bytes(grid, most)).max().unwrap_or(0);
+                device("messages of segments", bytes)
+            }),
+            seam_labels: in_segments.then(|| device("labels of seams", seam_label_bytes(&grids[0]))),
             unused: device("unused", 16),
             unused_written: device("unused", 16),
             greys: (!plan.model().edges().is_uniform())
                 .then(|| grids.iter().map(|grid| device("grey values", grid.grey_bytes())).collect()),
+            edges: (!plan.model().edges().is_uniform() && limits.shape == Shape::Slices)
+                .then(|| grids.iter().map(|grid| device("costs of edges", grid.edge_bytes())).collect()),
             strips: grids.iter().map(|grid| strips(plan, grid, &mut device)).collect(),
             list,
         }
     }
+}
+
+/// The bytes of the labels of a row above every seam.
+fn seam_label_bytes(grid: &Grid) -> u64 {
+    let seams = Seam::all(grid.size.height).len().max(1);
+    label_bytes(Size { height: seams, ..grid.size })
 }
 
 /// The 32-bit words of a label set.

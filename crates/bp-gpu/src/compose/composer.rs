@@ -20,12 +20,20 @@ pub(super) struct Nodes {
     pub(super) colour: usize,
 }
 
-/// The rows of a strip that a dispatch computes.
+/// The rows of a strip that a dispatch computes: `span` rows from each of `count` rows on, apart from those beyond the strip.
 #[derive(Clone, Copy)]
 pub(super) struct Rows {
     pub(super) first: usize,
     pub(super) step: usize,
     pub(super) count: usize,
+    pub(super) span: usize,
+}
+
+impl Rows {
+    /// The first rows of a strip.
+    pub(super) fn first(count: usize) -> Self {
+        Self { first: 0, step: 1, count, span: 1 }
+    }
 }
 
 /// How many labels an offer may pass before it costs as much as the truncation, on edges of any level.
@@ -77,12 +85,16 @@ impl Composer<'_> {
         }
         let pipeline = self.pipelines.insert_full(pipeline).0;
         let bind_group = self.bind_groups.insert_full(BindGroup { kernel, buffers }).0;
+        let Rows { first, step, count, span } = work.rows;
         let most = self.rows_per_dispatch(&work, group);
-        for done in (0..work.rows.count).step_by(most) {
-            let rows = most.min(work.rows.count - done);
-            let row = work.rows.first + done * work.rows.step;
-            let row_step = work.rows.step as u32;
-            let block = Parameters { row: row as u32, row_step, rows: rows as u32, ..work.parameters };
+        // Where no dispatch can have the rows of a band together, it has single ones.
+        let (spans, span) = if span > most { (span, 1) } else { (1, span) };
+        let steps = (0..spans).flat_map(|i| (0..count).step_by(most / span).map(move |done| (i, done)));
+        for (i, done) in steps {
+            let rows = span * (most / span).min(count - done);
+            let row = first + i + done * step;
+            let (row_step, span) = (step as u32, span as u32);
+            let block = Parameters { row: row as u32, row_step, rows: rows as u32, span, ..work.parameters };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
             let workgroups = group.number(rows, work.row_items) as u32;
             let command = Command::Dispatch { pipeline, bind_group, parameters, workgroups };
@@ -114,6 +126,7 @@ impl Composer<'_> {
             labels: model.labels() as u32,
             quads: grid.quads as u32,
             first_row: grid.strips[nodes.strip].first as u32,
+            strip_rows: grid.strips[nodes.strip].rows as u32,
             colour: nodes.colour as u32,
             slopes: model.edges().smoothness().map(|level| level.slope.into()),
             truncations: model.edges().smoothness().map(|level| level.truncation.into()),
@@ -132,8 +145,7 @@ impl Composer<'_> {
 
     /// All rows of a strip.
     pub(super) fn all_rows(&self, nodes: Nodes) -> Work {
-        let count = self.grids[nodes.grid].strips[nodes.strip].rows;
-        self.work(nodes, Rows { first: 0, step: 1, count })
+        self.work(nodes, Rows::first(self.grids[nodes.grid].strips[nodes.strip].rows))
     }
 
     /// The nodes of every strip and colour of a grid.

@@ -1,6 +1,6 @@
 //! The buffers and constants of the kernels that read messages: `update_messages` and `select_labels`.
 
-use bp_core::Schedule;
+use bp_core::{Schedule, Side};
 
 use super::{
     composer::{Composer, Nodes, Work},
@@ -14,35 +14,44 @@ impl Composer<'_> {
         self.buffers.greys.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |greys| greys[nodes.grid])
     }
 
+    /// The same for the costs of its edges.
+    pub(super) fn edges_read(&self, nodes: Nodes) -> usize {
+        self.buffers.edges.as_ref().map_or(self.strip(nodes).cost[nodes.colour], |edges| edges[nodes.grid])
+    }
+
     /// The constant that tells kernels to find the levels of edges.
-    fn finds_levels(&self) -> (&'static str, u32) {
+    pub(super) fn finds_levels(&self) -> (&'static str, u32) {
         ("LEVELS", self.buffers.greys.is_some().into())
     }
 
-    /// The kernel that sends to this many sides. `selective` says that the parameters name them.
-    pub(super) fn update_pipeline(&self, sides: usize, selective: bool) -> Pipeline {
-        let saturating = ("SATURATING", self.saturates(3, self.plan.model().smoothness().step()));
+    /// The kernel that passes messages. `selective` says that the parameters name the sides.
+    pub(super) fn update_pipeline(&self, selective: bool) -> Pipeline {
+        let constants = vec![self.saturates_sent(), self.finds_levels()];
         match self.limits.shape {
             Shape::Words => {
-                let constants = vec![saturating, self.finds_levels(), ("SELECTIVE", selective.into())];
+                let constants = [constants, vec![("SELECTIVE", selective.into())]].concat();
                 Pipeline { kernel: Kernel::UpdateMessages, constants }
             }
             Shape::Slices => {
-                let (kernel, sides) = (Kernel::UpdateMessagesOfSlice, sides as u32);
+                let kernel = Kernel::UpdateMessagesOfSlice;
                 let Group { words, slices, .. } = Group::of(kernel, self.plan, self.limits);
-                let size = [("SIDES", sides), ("INVOCATIONS", words * slices * sides)];
-                Pipeline { kernel, constants: [&[saturating, self.finds_levels()], size.as_slice()].concat() }
+                let invocations = ("INVOCATIONS", words * slices * Side::ALL.len() as u32);
+                Pipeline { kernel, constants: [constants, vec![invocations]].concat() }
             }
         }
     }
 
     /// The buffers of the data costs, of the messages from the other colour, of the messages that these nodes send, and
-    /// of the grey values.
+    /// of the grey values or the costs of edges.
     pub(super) fn messages(&self, nodes: Nodes, read: usize, written: usize) -> Vec<usize> {
         let strip = self.strip(nodes);
         let received = strip.sent[read].map(|side| side[1 - nodes.colour]);
         let sent = strip.sent[written].map(|side| side[nodes.colour]);
-        [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[self.greys_read(nodes)]].concat()
+        let edges = match self.limits.shape {
+            Shape::Words => self.greys_read(nodes),
+            Shape::Slices => self.edges_read(nodes),
+        };
+        [&[strip.cost[nodes.colour]], received.as_slice(), &sent, &[edges]].concat()
     }
 
     /// 1 if a stored data cost plus this many messages plus `more` may exceed 255, otherwise 0.
@@ -53,9 +62,19 @@ impl Composer<'_> {
         (u32::from(clip) + messages * u32::from(truncation) + u32::from(more) > 255).into()
     }
 
+    /// The constant that tells kernels that send whether their sums may exceed 255.
+    pub(super) fn saturates_sent(&self) -> (&'static str, u32) {
+        ("SATURATING", self.saturates(3, self.plan.model().smoothness().step()))
+    }
+
+    /// The same for kernels that decide labels.
+    pub(super) fn saturates_belief(&self) -> (&'static str, u32) {
+        ("SATURATING", self.saturates(4, 0))
+    }
+
     pub(super) fn select(&mut self, part: &mut PartRecorder, nodes: Nodes, work: Work) {
         let sweep = self.plan.settings().schedule == Schedule::Sweep;
-        let constants = vec![("SATURATING", self.saturates(4, 0)), ("SWEEP", sweep.into()), self.finds_levels()];
+        let constants = vec![self.saturates_belief(), ("SWEEP", sweep.into()), self.finds_levels()];
         let pipeline = Pipeline { kernel: Kernel::SelectLabels, constants };
         let set = self.set(self.plan.settings().steps);
         let strip = self.strip(nodes);

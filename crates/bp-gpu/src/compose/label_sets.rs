@@ -1,6 +1,8 @@
 //! Label sets; see [`bp_core::Settings::label_sets`]. Buffers keep all labels. Those that a set lacks are made impossible by
 //! their data costs.
 
+use std::ops::Range;
+
 use bp_core::{BAND_ROWS, Patch, Seam, Side};
 
 use super::{
@@ -18,10 +20,10 @@ impl Composer<'_> {
             return;
         }
         self.find_sets(part, grid, true);
-        let above = (BAND_ROWS - Seam::ROWS_ABOVE..BAND_ROWS).map(|row| (Bands::AboveSeams, row));
-        let below = (0..Seam::ROWS_BELOW).map(|row| (Bands::BelowSeams, row));
-        for (bands, row) in above.chain(below) {
-            for (nodes, rows) in self.of_both_colours(grid, bands, row) {
+        let above = (Bands::AboveSeams, BAND_ROWS - Seam::ROWS_ABOVE..BAND_ROWS);
+        let below = (Bands::BelowSeams, 0..Seam::ROWS_BELOW);
+        for (bands, of_band) in [above, below] {
+            for (nodes, rows) in self.of_both_colours(grid, bands, of_band) {
                 let work = self.work(nodes, rows);
                 self.restrict(part, nodes, work, true);
             }
@@ -47,9 +49,10 @@ impl Composer<'_> {
         if !self.plan.has_label_sets(grid) {
             return;
         }
-        let sides = [(Bands::AboveSeams, BAND_ROWS - 1, Side::Down), (Bands::BelowSeams, 0, Side::Up)];
-        for (bands, row, side) in sides {
-            for (nodes, rows) in self.of_both_colours(grid, bands, row) {
+        let above = (Bands::AboveSeams, BAND_ROWS - 1..BAND_ROWS, Side::Down);
+        let below = (Bands::BelowSeams, 0..1, Side::Up);
+        for (bands, of_band, side) in [above, below] {
+            for (nodes, rows) in self.of_both_colours(grid, bands, of_band) {
                 let work = self.work(nodes, rows);
                 self.extend(part, nodes, work, side, true);
             }
@@ -74,8 +77,8 @@ impl Composer<'_> {
         part.push_short(Command::Barrier);
     }
 
-    fn of_both_colours(&self, grid: usize, bands: Bands, row: usize) -> Vec<(Nodes, Rows)> {
-        let of_colour = |colour| self.band_rows(BandRow { grid, bands, colour, row });
+    fn of_both_colours(&self, grid: usize, bands: Bands, rows: Range<usize>) -> Vec<(Nodes, Rows)> {
+        let of_colour = |colour| self.rows_of_bands(BandRow { grid, bands, colour, row: rows.start }, rows.len());
         [0, 1].into_iter().flat_map(of_colour).collect()
     }
 
@@ -84,11 +87,10 @@ impl Composer<'_> {
         let Some(sets) = self.buffers.label_sets else { return };
         let size = self.grids[grid].size;
         let count = if seams { Seam::all(size.height).len() } else { size.height.div_ceil(BAND_ROWS) };
-        let nodes = Nodes { grid, strip: 0, colour: 0 };
         let from = self.grids[grid + 1].strips[0];
-        let work = self.reading(self.work(nodes, Rows { first: 0, step: 1, count }), grid + 1, from);
+        let work = self.reading(self.whole_grid(grid, 0), grid + 1, from);
         let row_items = size.width.div_ceil(Patch::COLUMNS) * label_set_words(self.plan);
-        let mut work = Work { row_items, ..work };
+        let mut work = Work { row_items, rows: Rows::first(count), ..work };
         work.parameters.seams = seams.into();
         let pipeline = Pipeline { kernel: Kernel::LabelSets, constants: Vec::new() };
         self.dispatch(part, pipeline, vec![sets, self.buffers.labels[grid + 1]], work);

@@ -33,14 +33,14 @@ impl Composer<'_> {
         for side in 0..2 {
             let parameters =
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
-            let rows = Rows { first: 0, step: 1, count: size.height };
-            let work = Work { parameters, rows, row_items: size.width };
+            let work = Work { parameters, rows: Rows::first(size.height), row_items: size.width };
             let constants = vec![profile, ("APRON", APRON as u32)];
             let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
         }
         self.greys(part);
         part.push_short(Command::Barrier);
+        self.edge_costs(part, 0);
         for nodes in self.nodes(0) {
             let constants = vec![
                 profile,
@@ -67,6 +67,15 @@ impl Composer<'_> {
         }
     }
 
+    /// The costs of the edges of a grid, if they differ and kernels read them. The grid's grey values must be known.
+    fn edge_costs(&mut self, part: &mut PartRecorder, grid: usize) {
+        let (Some(greys), Some(edges)) = (&self.buffers.greys, &self.buffers.edges) else { return };
+        let pipeline = Pipeline { kernel: Kernel::EdgeCosts, constants: vec![self.finds_levels()] };
+        for colour in 0..2 {
+            self.dispatch(part, pipeline.clone(), vec![edges[grid], greys[grid]], self.whole_grid(grid, colour));
+        }
+    }
+
     /// The grey values of a coarser grid.
     fn coarsen_greys(&mut self, part: &mut PartRecorder, grid: usize) {
         let Some(greys) = &self.buffers.greys else { return };
@@ -76,12 +85,16 @@ impl Composer<'_> {
             let work = self.reading(self.whole_grid(grid, colour), grid - 1, from);
             self.dispatch(part, pipeline.clone(), vec![greys[grid - 1], greys[grid]], work);
         }
+        part.push_short(Command::Barrier);
+        self.edge_costs(part, grid);
     }
 
     /// The nodes of one colour in all rows of a grid, for buffers that are not cut into strips.
-    fn whole_grid(&self, grid: usize, colour: usize) -> Work {
-        let count = self.grids[grid].size.height;
-        self.work(Nodes { grid, strip: 0, colour }, Rows { first: 0, step: 1, count })
+    pub(super) fn whole_grid(&self, grid: usize, colour: usize) -> Work {
+        let height = self.grids[grid].size.height;
+        let mut work = self.work(Nodes { grid, strip: 0, colour }, Rows::first(height));
+        work.parameters.strip_rows = height as u32;
+        work
     }
 
     /// The buffers that store the data costs of these nodes.
@@ -100,7 +113,7 @@ impl Composer<'_> {
         for (read, &from) in fine.strips.iter().enumerate() {
             let strip = coarse.strip_of(from.first / 2);
             let first = from.first / 2 - coarse.strips[strip].first;
-            let rows = Rows { first, step: 1, count: from.rows.div_ceil(2) };
+            let rows = Rows { first, ..Rows::first(from.rows.div_ceil(2)) };
             for nodes in [0, 1].map(|colour| Nodes { grid, strip, colour }) {
                 let work = self.reading(self.work(nodes, rows), grid - 1, from);
                 let children = &self.buffers.strips[grid - 1][read];
@@ -127,8 +140,7 @@ impl Composer<'_> {
     pub(super) fn refine(&mut self, part: &mut PartRecorder, grid: usize) {
         for (nodes, side) in self.nodes(grid).flat_map(|nodes| Side::ALL.map(|side| (nodes, side))) {
             if self.starts(nodes, side) && grid + 1 < self.plan.grids() {
-                let count = self.grids[grid].strips[nodes.strip].rows;
-                self.refine_rows(part, nodes, side, Rows { first: 0, step: 1, count });
+                self.refine_rows(part, nodes, side, Rows::first(self.grids[grid].strips[nodes.strip].rows));
             } else {
                 let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
                 part.push_short(Command::Clear { buffer: sent });
@@ -197,7 +209,7 @@ impl Composer<'_> {
     }
 
     fn update(&mut self, part: &mut PartRecorder, nodes: Nodes, read: usize, written: usize) {
-        let pipeline = self.update_pipeline(Side::ALL.len(), false);
+        let pipeline = self.update_pipeline(false);
         let bound = self.messages(nodes, read, written);
         self.dispatch(part, pipeline, bound, self.all_rows(nodes));
     }

@@ -59,8 +59,12 @@ impl PartRecorder {
         }
     }
 
-    /// Appends a command that takes little time.
+    /// Appends a command that takes little time. A barrier behind another has no effect.
     pub(crate) fn push_short(&mut self, command: Command) {
+        let last = self.segments.last().and_then(|segment| segment.commands.last());
+        if command == Command::Barrier && last == Some(&command) {
+            return;
+        }
         self.push(command, 0);
     }
 
