@@ -71,6 +71,27 @@ fn one_earlier(aligned: Vectors, behind: Vectors, exists: u32) -> Vectors {
     );
 }
 
+// What the kernel's `sent_right` and `sent_left` brought the nodes of a word from both sides, at the places of a slice's vectors. Everything
+// is read without branches between quads, so that all of it is on its way at the same time.
+
+fn from_left_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
+    let aligned = Vectors(sent_right[at.x], sent_right[at.y], sent_right[at.z], sent_right[at.w]);
+    if nodes.parity == 1 {
+        return aligned;
+    }
+    let before = Vectors(sent_right[at.x - 1], sent_right[at.y - 1], sent_right[at.z - 1], sent_right[at.w - 1]);
+    return one_later(aligned, before, select(0u, 0xffffffffu, nodes.word > 0));
+}
+
+fn from_right_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
+    let aligned = Vectors(sent_left[at.x], sent_left[at.y], sent_left[at.z], sent_left[at.w]);
+    if nodes.parity == 0 {
+        return aligned;
+    }
+    let behind = Vectors(sent_left[at.x + 1], sent_left[at.y + 1], sent_left[at.z + 1], sent_left[at.w + 1]);
+    return one_earlier(aligned, behind, select(0u, 0xffffffffu, nodes.word + 1 < parameters.words));
+}
+
 // The places of the quads of a slice, from that of the quad 0 on. Quads beyond the last one read the last one.
 fn places_of(first: u32, quad: u32, stride: u32) -> vec4<u32> {
     return vec4(first) + min(vec4(quad) + vec4(0u, 1u, 2u, 3u), vec4(parameters.quads - 1)) * stride;

@@ -54,24 +54,6 @@ fn own_at(at: vec4<u32>) -> Vectors {
     return Vectors(own[at.x], own[at.y], own[at.z], own[at.w]);
 }
 
-fn from_left_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
-    let aligned = Vectors(sent_right[at.x], sent_right[at.y], sent_right[at.z], sent_right[at.w]);
-    if nodes.parity == 1 {
-        return aligned;
-    }
-    let before = Vectors(sent_right[at.x - 1], sent_right[at.y - 1], sent_right[at.z - 1], sent_right[at.w - 1]);
-    return one_later(aligned, before, select(0u, 0xffffffffu, nodes.word > 0));
-}
-
-fn from_right_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
-    let aligned = Vectors(sent_left[at.x], sent_left[at.y], sent_left[at.z], sent_left[at.w]);
-    if nodes.parity == 0 {
-        return aligned;
-    }
-    let behind = Vectors(sent_left[at.x + 1], sent_left[at.y + 1], sent_left[at.z + 1], sent_left[at.w + 1]);
-    return one_earlier(aligned, behind, select(0u, 0xffffffffu, nodes.word + 1 < parameters.words));
-}
-
 // What the leading colour sent right and left in this row. Beyond the ends of the segment, it is taken for zeros.
 
 fn own_from_left_of(group: vec3<u32>, places: Places, nodes: Nodes) -> Vectors {

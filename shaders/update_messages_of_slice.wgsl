@@ -8,26 +8,7 @@
 // See edge_costs.wgsl.
 @group(0) @binding(10) var<storage, read> edges: array<vec4<u32>>;
 
-// `at` holds the places of a slice's vectors in a plane. Everything is read without branches between quads, so that all of it is
-// on its way at the same time.
-
-fn from_left_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
-    let aligned = Vectors(sent_right[at.x], sent_right[at.y], sent_right[at.z], sent_right[at.w]);
-    if nodes.parity == 1 {
-        return aligned;
-    }
-    let before = Vectors(sent_right[at.x - 1], sent_right[at.y - 1], sent_right[at.z - 1], sent_right[at.w - 1]);
-    return one_later(aligned, before, select(0u, 0xffffffffu, nodes.word > 0));
-}
-
-fn from_right_of(at: vec4<u32>, nodes: Nodes) -> Vectors {
-    let aligned = Vectors(sent_left[at.x], sent_left[at.y], sent_left[at.z], sent_left[at.w]);
-    if nodes.parity == 0 {
-        return aligned;
-    }
-    let behind = Vectors(sent_left[at.x + 1], sent_left[at.y + 1], sent_left[at.z + 1], sent_left[at.w + 1]);
-    return one_earlier(aligned, behind, select(0u, 0xffffffffu, nodes.word + 1 < parameters.words));
-}
+// `at` holds the places of a slice's vectors in a plane.
 
 fn from_above_of(at: vec4<u32>) -> Vectors {
     let row = parameters.quads * parameters.words;
