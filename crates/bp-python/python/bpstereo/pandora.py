@@ -50,7 +50,7 @@ class BeliefPropagation(disparity.AbstractDisparity):
             raise ValueError("bpstereo needs the images, which this version of Pandora does not pass on")
         steps, allowed = cv.coords["disp"].data, ~numpy.isnan(cv["cost_volume"].data)
         # Masks, intervals, confidences and invalid pixels are Pandora's.
-        answer = self._pandoras_own.to_disp(cv, img_left, img_right)
+        answer: xarray.Dataset = self._pandoras_own.to_disp(cv, img_left, img_right)
         known = allowed.any(axis=2)
         found = _within(_matched(img_left, img_right, steps, self._options), steps, allowed)
         answer["disparity_map"].data[known] = found[known]
