@@ -5,7 +5,12 @@
 // The labels of the coarser grid, in the layout of select_labels.
 @group(0) @binding(2) var<storage, read> labels: array<vec2<u32>>;
 
+const INVOCATIONS: u32 = 64;
+const MOST_LABELS: u32 = 1024;
+
 const REACH: u32 = 1;
+// How many nodes suffice.
+const ENOUGH: u32 = 4;
 // How many coarse nodes are looked at beyond the parents.
 const MARGIN: u32 = 2;
 
@@ -25,80 +30,58 @@ fn rows(window: u32) -> vec2<u32> {
     return min(rows, vec2(parameters.height - 1));
 }
 
-// The bits of the labels within reach of one label that fall into a word.
-fn bits(label: u32, word: u32) -> u32 {
-    let first = 32 * word;
-    let lowest = max(max(label, REACH) - REACH, first);
-    let highest = min(min(label + REACH, parameters.labels - 1), first + 31);
-    var bits = 0u;
-    for (var d = lowest; d <= highest; d++) {
-        bits |= 1u << (d - first);
-    }
-    return bits;
-}
+// How many nodes have a label within reach of each one, and whether any of these has enough.
+var<workgroup> counts: array<atomic<u32>, MOST_LABELS>;
+var<workgroup> some_have_enough: atomic<u32>;
 
-// The coarse nodes around a patch: first and last column and row.
-struct Region {
-    first: vec2<u32>,
-    last: vec2<u32>,
-}
-
-// The labels of a word that are near those of at least one node, and of at least four.
-struct Near {
-    one: u32,
-    four: u32,
-}
-
-fn near(region: Region, word: u32) -> Near {
-    // Not an array: Mesa's CPU driver does not clear it again when the function is called in a loop.
-    var one = 0u;
-    var two = 0u;
-    var three = 0u;
-    var four = 0u;
-    for (var y = region.first.y; y <= region.last.y; y++) {
-        for (var x = region.first.x; x <= region.last.x; x++) {
-            let found = bits(coarse_label(x, y), word);
-            four |= three & found;
-            three |= two & found;
-            two |= one & found;
-            one |= found;
+// Counts the labels of the coarse nodes around a patch, whose first and last column and row are given.
+fn count(first: vec2<u32>, last: vec2<u32>, invocation: u32) {
+    let width = last.x + 1 - first.x;
+    for (var node = invocation; node < width * (last.y + 1 - first.y); node += INVOCATIONS) {
+        let label = coarse_label(first.x + node % width, first.y + node / width);
+        for (var d = max(label, REACH) - REACH; d <= min(label + REACH, parameters.labels - 1); d++) {
+            atomicAdd(&counts[d], 1u);
         }
     }
-    return Near(one, four);
 }
 
-// Whether any word has a label near those of four nodes.
-fn agree(region: Region) -> bool {
-    for (var word = 0u; word < set_words(); word++) {
-        if near(region, word).four != 0 {
-            return true;
-        }
+// The labels of a word that at least so many nodes have within reach.
+fn had_by(fewest: u32, word: u32) -> u32 {
+    var found = 0u;
+    for (var label = 32 * word; label < min(32 * word + 32, parameters.labels); label++) {
+        found |= u32(atomicLoad(&counts[label]) >= fewest) << (label % 32);
     }
-    return false;
+    return found;
 }
 
-// An invocation computes one word of the set of a patch.
+// A workgroup computes the set of a patch.
 @compute @workgroup_size(64)
-fn label_sets(@builtin(global_invocation_id) id: vec3<u32>) {
-    let words = set_words();
-    let row = patches() * words;
-    let line = id.x / row;
-    if line >= parameters.rows {
-        return;
-    }
+fn label_sets(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) invocation: u32) {
+    let line = group.x / patches();
     let window = parameters.row + line;
-    let patch_index = (id.x - line * row) / words;
-    let word = id.x % words;
+    let patch_index = group.x - line * patches();
+    for (var label = invocation; label < parameters.labels; label += INVOCATIONS) {
+        atomicStore(&counts[label], 0u);
+    }
+    if invocation == 0 {
+        atomicStore(&some_have_enough, 0u);
+    }
+    workgroupBarrier();
     let columns = vec2(PATCH_COLUMNS * patch_index, min(PATCH_COLUMNS * (patch_index + 1), parameters.width) - 1);
     let coarse_rows = rows(window) / 2;
     let coarse_columns = columns / 2;
     let first = max(vec2(coarse_columns.x, coarse_rows.x), vec2(MARGIN)) - MARGIN;
     let last = min(vec2(coarse_columns.y, coarse_rows.y) + MARGIN, vec2(parameters.other_width, parameters.other_height) - 1);
-    let region = Region(first, last);
-    let near = near(region, word);
-    var found = near.four;
-    if found == 0 && near.one != 0 && !agree(region) {
-        found = near.one;
+    count(first, last, invocation);
+    workgroupBarrier();
+    for (var label = invocation; label < parameters.labels; label += INVOCATIONS) {
+        if atomicLoad(&counts[label]) >= ENOUGH {
+            atomicStore(&some_have_enough, 1u);
+        }
     }
-    sets[(window * patches() + patch_index) * words + word] = found;
+    workgroupBarrier();
+    let fewest = select(1u, ENOUGH, atomicLoad(&some_have_enough) == 1);
+    for (var word = invocation; word < set_words(); word += INVOCATIONS) {
+        sets[(window * patches() + patch_index) * set_words() + word] = had_by(fewest, word);
+    }
 }

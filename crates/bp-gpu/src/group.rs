@@ -40,6 +40,9 @@ pub(crate) struct Group {
 impl Group {
     /// The workgroups of a kernel.
     pub(crate) fn of(kernel: Kernel, plan: &Plan, limits: &Limits) -> Self {
+        if kernel == Kernel::LabelSets {
+            return Self { words: 1, slices: 1, in_a_row: false };
+        }
         if !kernel.is_sliced() || limits.shape == Shape::Words {
             return Self { words: WORKGROUP, slices: 1, in_a_row: false };
         }

@@ -97,7 +97,7 @@ fn seam_label_bytes(grid: &Grid) -> u64 {
 }
 
 /// The 32-bit words of a label set.
-pub(super) fn label_set_words(plan: &Plan) -> usize {
+fn label_set_words(plan: &Plan) -> usize {
     plan.model().labels().div_ceil(32)
 }
 

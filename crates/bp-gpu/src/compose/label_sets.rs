@@ -6,7 +6,6 @@ use std::ops::Range;
 use bp_core::{BAND_ROWS, Patch, Seam, Side};
 
 use super::{
-    buffers::label_set_words,
     composer::{Composer, Nodes, Rows, Work},
     recorder::PartRecorder,
     sweep::{BandRow, Bands},
@@ -89,7 +88,7 @@ impl Composer<'_> {
         let count = if seams { Seam::all(size.height).len() } else { size.height.div_ceil(BAND_ROWS) };
         let from = self.grids[grid + 1].strips[0];
         let work = self.reading(self.whole_grid(grid, 0), grid + 1, from);
-        let row_items = size.width.div_ceil(Patch::COLUMNS) * label_set_words(self.plan);
+        let row_items = size.width.div_ceil(Patch::COLUMNS);
         let mut work = Work { row_items, rows: Rows::first(count), ..work };
         work.parameters.seams = seams.into();
         let pipeline = Pipeline { kernel: Kernel::LabelSets, constants: Vec::new() };
