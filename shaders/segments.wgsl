@@ -4,8 +4,7 @@
 // What a node computes depends on its neighbours in the row before. So in n rows, what a segment does not know beyond its ends
 // spoils up to n columns at either end. Therefore it computes as many more as that, and keeps the others.
 
-// The words that a segment keeps, and the most that it computes.
-override KEPT_WORDS: u32 = 12;
+// The most words that a segment computes.
 override MOST_WORDS: u32 = 20;
 
 const WORD_COLUMNS: u32 = 8;
@@ -23,10 +22,10 @@ struct Segment {
 
 fn segment_of(group: vec3<u32>) -> Segment {
     let index = parameters.first_segment + group.x;
-    let in_a_row = (parameters.words + KEPT_WORDS - 1) / KEPT_WORDS;
+    let in_a_row = (parameters.words + parameters.kept_words - 1) / parameters.kept_words;
     let band = index / in_a_row;
-    let start = (index - band * in_a_row) * KEPT_WORDS;
-    let end = min(start + KEPT_WORDS, parameters.words);
+    let start = (index - band * in_a_row) * parameters.kept_words;
+    let end = min(start + parameters.kept_words, parameters.words);
     let spoilt = (parameters.span + WORD_COLUMNS - 1) / WORD_COLUMNS;
     let word = max(start, spoilt) - spoilt;
     let row = parameters.row + band * parameters.row_step;

@@ -50,8 +50,9 @@ struct Parameters {
     labels_above: u32,
     // Kernels of label sets, and decide_rows: 1 if the sets or labels are those of seams, 0 if they are those of bands.
     seams: u32,
-    // pass_rows and decide_rows: the first segment.
+    // pass_rows and decide_rows: the first segment, and the words that each keeps.
     first_segment: u32,
+    kept_words: u32,
     // pass_rows: 1 if the pass is backward, and 1 if its last row sends ahead too.
     backward: u32,
     across: u32,

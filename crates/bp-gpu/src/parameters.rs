@@ -72,6 +72,8 @@ parameters! {
     seams: u32,
     /// The first segment of the dispatch.
     first_segment: u32,
+    /// The words that a segment keeps.
+    kept_words: u32,
     /// 1 if a pass goes up.
     backward: u32,
     /// 1 if the last row of a pass sends ahead too.

@@ -89,9 +89,7 @@ impl Composer<'_> {
         let kernel = pipeline.kernel;
         let group = Group::of(kernel, self.plan, self.limits);
         pipeline.constants.extend([("GROUP_WORDS", group.words), ("SLICES", group.slices)]);
-        pipeline
-            .constants
-            .extend([("KEPT_WORDS", segment::KEPT_WORDS as u32), ("MOST_WORDS", segment::MOST_WORDS as u32)]);
+        pipeline.constants.extend([("MOST_WORDS", segment::MOST_WORDS as u32)]);
         if kernel == Kernel::PassRows {
             let size = [("INVOCATIONS", group.words * group.slices), ("SLICE_QUADS", PASSED_QUADS as u32)];
             pipeline.constants.extend(size);
@@ -101,12 +99,21 @@ impl Composer<'_> {
         let entries = segment::MOST_WORDS as u64 * 16 * work.rows.span as u64 * self.plan.model().labels() as u64;
         let by_time = usize::try_from(self.limits.dispatch_entries / entries).unwrap_or(usize::MAX);
         let most = most.min(by_time).min(self.limits.workgroups as usize).max(1);
-        let segments = work.rows.count * segment::in_a_row(work.row_items);
+        let kept = segment::kept_words(work.rows.count, work.row_items);
+        let segments = work.rows.count * work.row_items.div_ceil(kept);
         for first in (0..segments).step_by(most) {
             let count = most.min(segments - first);
             let [row, row_step, rows, span] =
                 [work.rows.first, work.rows.step, work.rows.count, work.rows.span].map(|n| n as u32);
-            let block = Parameters { row, row_step, rows, span, first_segment: first as u32, ..work.parameters };
+            let block = Parameters {
+                row,
+                row_step,
+                rows,
+                span,
+                first_segment: first as u32,
+                kept_words: kept as u32,
+                ..work.parameters
+            };
             let parameters = (self.parameters.insert_full(block).0 * PARAMETERS_ALIGNMENT) as u32;
             part.push(
                 Command::Dispatch { pipeline, bind_group, parameters, workgroups: count as u32 },
