@@ -108,7 +108,9 @@ fn nodes_at(line: u32, word: u32) -> Nodes {
     if parameters.span > 1 {
         row = parameters.row + line / parameters.span * parameters.row_step + line % parameters.span;
     }
-    return nodes_of_row(row, word, parameters.colour, line < parameters.rows && row < parameters.strip_rows);
+    // Invocations that only meet others at barriers read no rows beyond the strip either.
+    let exist = line < parameters.rows && row < parameters.strip_rows;
+    return nodes_of_row(min(row, parameters.strip_rows - 1), word, parameters.colour, exist);
 }
 
 fn nodes_of_row(row: u32, word: u32, colour: u32, exist: bool) -> Nodes {

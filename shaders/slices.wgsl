@@ -10,7 +10,7 @@ fn nodes_of(group: vec3<u32>, local: vec3<u32>) -> Nodes {
     let item = group.x * GROUP_WORDS + local.x;
     let line = item / parameters.words;
     var nodes = nodes_at(min(line, parameters.rows - 1), item - line * parameters.words);
-    nodes.exist = line < parameters.rows;
+    nodes.exist &= line < parameters.rows;
     return nodes;
 }
 

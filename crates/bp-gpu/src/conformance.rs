@@ -86,8 +86,8 @@ pub fn conforms_cut_up(
     Ok(())
 }
 
-/// Sweeps over images so wide that a band has several segments, and so high that several segments pass on messages across seams: with
-/// label sets and without, with edges of one level and of several.
+/// Runs sweeps over images that have several segments in a row and several bands: with label sets and without, with edges of one level
+/// and of several.
 ///
 /// # Errors
 /// The first difference from the reference.

@@ -4,7 +4,7 @@ use bp_core::Plan;
 
 use crate::{Kernel, Limits, Shape, WORKGROUP, segment};
 
-/// The quads of labels that an invocation of `update_messages_of_slice` keeps in registers. Its WGSL file has the same number.
+/// The quads of labels that an invocation of `update_messages_of_slice` keeps in registers: what `envelope.wgsl` assumes.
 const SLICE_QUADS: usize = 4;
 
 /// The words of nodes of a workgroup whose labels are shared out: their vectors fill a cache line of 128 bytes.
@@ -13,7 +13,7 @@ const GROUP_WORDS: u32 = 8;
 /// The same for `update_messages_of_slice`. An H100 takes a tenth more time with 8 words, and a sixth more with 2.
 const UPDATED_WORDS: u32 = 4;
 
-/// The same for `pass_rows`, where fewer run at a time: they should take less long.
+/// The quads of labels of an invocation of `pass_rows`. Few invocations run at a time there, so they should be quick.
 pub(crate) const PASSED_QUADS: usize = 2;
 
 /// The most invocations of a workgroup of `pass_rows` and `decide_rows`: each keeps about a hundred values in registers.

@@ -30,8 +30,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// The first rows of a strip.
-    pub(super) fn first(count: usize) -> Self {
+    /// So many rows from the top of a strip on.
+    pub(super) fn from_top(count: usize) -> Self {
         Self { first: 0, step: 1, count, span: 1 }
     }
 }
@@ -145,7 +145,7 @@ impl Composer<'_> {
 
     /// All rows of a strip.
     pub(super) fn all_rows(&self, nodes: Nodes) -> Work {
-        self.work(nodes, Rows::first(self.grids[nodes.grid].strips[nodes.strip].rows))
+        self.work(nodes, Rows::from_top(self.grids[nodes.grid].strips[nodes.strip].rows))
     }
 
     /// The nodes of every strip and colour of a grid.

@@ -89,7 +89,7 @@ impl Composer<'_> {
         let from = self.grids[grid + 1].strips[0];
         let work = self.reading(self.whole_grid(grid, 0), grid + 1, from);
         let row_items = size.width.div_ceil(Patch::COLUMNS);
-        let mut work = Work { row_items, rows: Rows::first(count), ..work };
+        let mut work = Work { row_items, rows: Rows::from_top(count), ..work };
         work.parameters.seams = seams.into();
         let pipeline = Pipeline { kernel: Kernel::LabelSets, constants: Vec::new() };
         self.dispatch(part, pipeline, vec![sets, self.buffers.labels[grid + 1]], work);

@@ -33,7 +33,7 @@ impl Composer<'_> {
         for side in 0..2 {
             let parameters =
                 Parameters { width: size.width as u32, height: size.height as u32, ..Parameters::default() };
-            let work = Work { parameters, rows: Rows::first(size.height), row_items: size.width };
+            let work = Work { parameters, rows: Rows::from_top(size.height), row_items: size.width };
             let constants = vec![profile, ("APRON", APRON as u32)];
             let pipeline = Pipeline { kernel: Kernel::Features, constants };
             self.dispatch(part, pipeline, vec![buffers.images[side], buffers.features[side]], work);
@@ -92,7 +92,7 @@ impl Composer<'_> {
     /// The nodes of one colour in all rows of a grid, for buffers that are not cut into strips.
     pub(super) fn whole_grid(&self, grid: usize, colour: usize) -> Work {
         let height = self.grids[grid].size.height;
-        let mut work = self.work(Nodes { grid, strip: 0, colour }, Rows::first(height));
+        let mut work = self.work(Nodes { grid, strip: 0, colour }, Rows::from_top(height));
         work.parameters.strip_rows = height as u32;
         work
     }
@@ -113,7 +113,7 @@ impl Composer<'_> {
         for (read, &from) in fine.strips.iter().enumerate() {
             let strip = coarse.strip_of(from.first / 2);
             let first = from.first / 2 - coarse.strips[strip].first;
-            let rows = Rows { first, ..Rows::first(from.rows.div_ceil(2)) };
+            let rows = Rows { first, ..Rows::from_top(from.rows.div_ceil(2)) };
             for nodes in [0, 1].map(|colour| Nodes { grid, strip, colour }) {
                 let work = self.reading(self.work(nodes, rows), grid - 1, from);
                 let children = &self.buffers.strips[grid - 1][read];
@@ -140,7 +140,7 @@ impl Composer<'_> {
     pub(super) fn refine(&mut self, part: &mut PartRecorder, grid: usize) {
         for (nodes, side) in self.nodes(grid).flat_map(|nodes| Side::ALL.map(|side| (nodes, side))) {
             if self.starts(nodes, side) && grid + 1 < self.plan.grids() {
-                self.refine_rows(part, nodes, side, Rows::first(self.grids[grid].strips[nodes.strip].rows));
+                self.refine_rows(part, nodes, side, Rows::from_top(self.grids[grid].strips[nodes.strip].rows));
             } else {
                 let sent = self.strip(nodes).sent[0][side as usize][nodes.colour];
                 part.push_short(Command::Clear { buffer: sent });
