@@ -66,73 +66,38 @@ struct Unstored<'a> {
 impl Unstored<'_> {
     fn rows(&self, coarse: &mut Costs) {
         let (layout, clip) = (self.layout, self.matching.plan.clip(self.grid));
-        let labels = all_labels(layout);
         let Costs { stored, sums } = coarse;
         costs::rows(layout, stored, u16::of(sums), |y, stored, mut keep| {
             self.windows.with(|window| {
                 for block in 0..layout.blocks {
-                    let (children, costs) = window.work.costs.split_at_mut(CHILDREN * labels.len());
-                    self.sum_pairs(block, y, labels, children, costs);
-                    let stored = layout.blocks_of(stored, block);
+                    let halves = self.halves(block, y, &mut window.work.costs);
                     let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
-                    dispatch!(self.matching.level, simd => simd.vectorize(
-                        #[inline(always)]
-                        || costs::store_block(
-                            clip,
-                            #[inline(always)]
-                            |label| sums_of_rows(&children.as_chunks().0[label]),
-                            stored,
-                            keep,
-                        ),
-                    ));
+                    let stored = layout.blocks_of(stored, block);
+                    dispatch!(self.matching.level, simd => store_sums(simd, clip, &halves, stored, keep));
                 }
             });
         });
     }
 
-    /// For a block of nodes in row y, writes the sums of the pairs of children in each row below it, `[label][row][plane]`.
-    fn sum_pairs(&self, block: usize, y: usize, labels: &[u16], children: &mut [Block], costs: &mut [Block]) {
+    /// As [`Grids::halves`], for row y: computes what that finds.
+    fn halves<'a>(&self, block: usize, y: usize, costs: &'a mut [Block]) -> [[&'a [Block]; 4]; 2] {
         let finer = self.matching.plan.size(self.grid - 1);
-        let (even, rest) = costs.split_at_mut(labels.len());
-        let odd = &mut rest[..labels.len()];
-        children.fill(Block::ZERO);
-        for (half, row) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let at = PatchRow { grid: self.grid - 1, patch: 2 * block + half, y: 2 * y + row };
-            if Patch::COLUMNS * at.patch >= finer.width || at.y >= finer.height {
-                continue;
-            }
-            self.matching.unclipped(at, labels, [&mut *even, &mut *odd]);
-            for (label, children) in children.chunks_exact_mut(CHILDREN).enumerate() {
-                deal_pairs(&even[label], &odd[label], half, &mut children[2 * row..2 * row + 2]);
+        let labels = all_labels(self.layout);
+        let mut halves = [[&[][..]; 4]; 2];
+        let patches = halves
+            .iter_mut()
+            .flat_map(|half| half.as_chunks_mut::<2>().0)
+            .zip(costs.chunks_exact_mut(2 * labels.len()));
+        for (index, (planes, costs)) in patches.enumerate() {
+            let at = PatchRow { grid: self.grid - 1, patch: 2 * block + index / 2, y: 2 * y + index % 2 };
+            if Patch::COLUMNS * at.patch < finer.width && at.y < finer.height {
+                let (even, odd) = costs.split_at_mut(labels.len());
+                self.matching.unclipped(at, labels, [&mut *even, &mut *odd]);
+                *planes = [even, odd];
             }
         }
+        halves
     }
-}
-
-/// The blocks that hold the children of a block of nodes of both planes: two rows and two planes.
-const CHILDREN: usize = 4;
-
-/// Sums pairs of columns of a patch, and writes them to the first or second half of a block of each plane.
-fn deal_pairs(even: &Block, odd: &Block, half: usize, to: &mut [Block]) {
-    let (first, second) = to.split_at_mut(1);
-    let range = half * LANES / 2..(half + 1) * LANES / 2;
-    let both = first[0].0[range.clone()].iter_mut().zip(&mut second[0].0[range]);
-    let pairs = even.0.chunks_exact(2).zip(odd.0.chunks_exact(2));
-    for ((first, second), (even, odd)) in both.zip(pairs) {
-        (*first, *second) = (even[0] + odd[0], even[1] + odd[1]);
-    }
-}
-
-/// The sums of the children of a block of nodes in both rows.
-#[inline(always)]
-fn sums_of_rows([even, odd, even_below, odd_below]: &[Block; CHILDREN]) -> [[u16; LANES]; 2] {
-    let mut sums = [[0; LANES]; 2];
-    for (sums, rows) in sums.iter_mut().zip([[even, even_below], [odd, odd_below]]) {
-        for (i, sum) in sums.iter_mut().enumerate() {
-            *sum = u16::from(rows[0].0[i]) + u16::from(rows[1].0[i]);
-        }
-    }
-    sums
 }
 
 struct Grids<'a> {
@@ -150,16 +115,7 @@ impl Grids<'_> {
                 let halves = self.halves(children, block);
                 let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
                 let stored = layout.blocks_of(stored, block);
-                dispatch!(self.level, simd => simd.vectorize(
-                    #[inline(always)]
-                    || costs::store_block(
-                        self.clip,
-                        #[inline(always)]
-                        |label| sums_of_children(simd, &halves, label),
-                        stored,
-                        keep,
-                    ),
-                ));
+                dispatch!(self.level, simd => store_sums(simd, self.clip, &halves, stored, keep));
             }
         });
     }
@@ -233,6 +189,29 @@ fn sum_of_blocks<S: Simd>(simd: S, blocks: [&[Block]; 4], label: usize) -> Bytes
         |labels| labels.get(label).unwrap_or(&Block::ZERO).load(simd),
     );
     a + b + c + d
+}
+
+/// Stores the costs of a block of coarse nodes of both planes, which are sums of those of their children.
+#[inline(always)]
+fn store_sums<S: Simd, F: Sum + Widen<C>, C: Sum>(
+    simd: S,
+    clip: u8,
+    halves: &[[&[Block<F>]; 4]; 2],
+    stored: [&mut [Block]; 2],
+    keep: Option<[&mut [Block<C>]; 2]>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            costs::store_block(
+                clip,
+                #[inline(always)]
+                |label| sums_of_children(simd, halves, label),
+                stored,
+                keep,
+            );
+        },
+    );
 }
 
 /// Sums for a block of coarse nodes of both planes. The children of coarse column X are lane X of both planes, so those of lane

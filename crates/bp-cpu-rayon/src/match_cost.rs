@@ -40,13 +40,13 @@ pub(crate) struct Matching<'a> {
 }
 
 /// Whether the costs of a grid are stored. Under `sweep`, those of grid 0 are computed when needed if they fit 8 bits, and so
-/// are those of grid 1 if it has label sets and the sums of grid 2 fit too, and those of grid 2 if it has label sets, two of its
-/// sums fit 8 bits together, and four 16 bits.
+/// are those of grid 1 if it has label sets and the sums of grid 2 fit too, and those of grid 2 if it has label sets, its own sums fit 8
+/// bits and those of grid 3 fit 16.
 pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
     match grid {
         0 => plan.settings().schedule != Schedule::Sweep || !is_narrow(plan),
         1 => !plan.has_label_sets(1) || plan.sum_bytes(2) > 1,
-        2 => !plan.has_label_sets(2) || 2 * plan.model().max_cost(2) > u8::MAX.into() || plan.sum_bytes(3) != 2,
+        2 => !plan.has_label_sets(2) || plan.sum_bytes(2) > 1 || plan.sum_bytes(3) != 2,
         _ => true,
     }
 }
