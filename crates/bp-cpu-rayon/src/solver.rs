@@ -1,6 +1,6 @@
 //! The buffers of one plan, and the kernels that run on them.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use bp_core::{Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
 use fearless_simd::Level;
@@ -215,13 +215,11 @@ impl Solver for RayonSolver {
         Ok(())
     }
 
+    /// Under `sweep`, [`Self::pass_messages`] has done all.
     fn update_messages(&mut self, grid: usize, steps: Range<u32>) -> Result<(), Error> {
-        if self.plan.settings().schedule == Schedule::Sweep {
-            // All loops of a band run together, at the last step.
-            let is_last = steps.end == self.plan.settings().steps;
-            return if is_last { self.sweep(grid..grid + 1, &mut |_| ControlFlow::Continue(())) } else { Ok(()) };
+        if has_sets(&self.plan) {
+            self.run_steps(grid, steps, self.last(grid));
         }
-        self.run_steps(grid, steps, self.last(grid));
         Ok(())
     }
 
@@ -248,7 +246,10 @@ impl Solver for RayonSolver {
     /// Passes the messages of grid 0 once more, if some of them were not kept.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
-            return self.swept.read_messages(&self.grid(0), side, messages);
+            let mut swept = std::mem::take(&mut self.swept);
+            let result = swept.read_messages(&self.plan, |index| self.grid(index), side, messages);
+            self.swept = swept;
+            return result;
         }
         if self.lacks_messages {
             self.run_steps(0, 0..self.plan.settings().steps, Last::Decides);

@@ -14,7 +14,6 @@ mod decode;
 mod edges;
 mod kept;
 mod lists;
-mod made;
 mod messages;
 mod padded;
 mod pass;
@@ -23,6 +22,7 @@ mod room;
 mod routes;
 mod seams;
 mod send;
+mod slots;
 mod swept;
 mod tasks;
 mod windows;
@@ -64,24 +64,25 @@ pub(crate) struct Band {
 }
 
 impl Band {
-    /// Allocates room for so many rows, patches and entries.
-    fn new(plan: &Plan, grid: usize, rows: usize, patches: usize, entries: usize) -> Result<Self, Error> {
-        let mut band = Self { labels: memory::filled("labels", Self::labels(plan, grid, rows), 0)?, ..Self::default() };
+    /// Allocates room for so many patches and entries.
+    fn new(plan: &Plan, grid: usize, patches: usize, entries: usize) -> Result<Self, Error> {
+        let mut band = Self { labels: memory::filled("labels", Self::labels(plan, grid), 0)?, ..Self::default() };
         if grid > 0 {
             band.lists.fit(patches, entries)?;
-            band.messages.fit(rows, entries)?;
+            band.messages.fit(room::most_rows(plan, grid), entries)?;
         }
         Ok(band)
     }
 
     /// The number of labels.
-    fn labels(plan: &Plan, grid: usize, rows: usize) -> usize {
-        if plan.decides_labels(grid) { rows * plan.size(grid).width } else { 0 }
+    fn labels(plan: &Plan, grid: usize) -> usize {
+        if plan.decides_labels(grid) { room::most_rows(plan, grid) * plan.size(grid).width } else { 0 }
     }
 
     /// The bytes that it needs.
-    fn needed(plan: &Plan, grid: usize, rows: usize, patches: usize, entries: usize) -> u64 {
-        let labels = (Self::labels(plan, grid, rows) * size_of::<u16>()) as u64;
+    fn needed(plan: &Plan, grid: usize, patches: usize, entries: usize) -> u64 {
+        let labels = (Self::labels(plan, grid) * size_of::<u16>()) as u64;
+        let rows = room::most_rows(plan, grid);
         let kept = || lists::bytes(patches, entries).saturating_add(messages::bytes(rows, entries));
         labels.saturating_add(if grid > 0 { kept() } else { 0 })
     }
@@ -116,7 +117,7 @@ pub(crate) struct Sweep<'a> {
 impl Sweep<'_> {
     /// The rows of a band.
     fn band_rows(&self, index: usize) -> Range<usize> {
-        room::band_rows(self.layout.size.height, index)
+        tasks::band_rows(self.layout.size.height, index)
     }
 
     /// Prepares a seam.
@@ -159,7 +160,8 @@ impl Sweep<'_> {
         let entries = work.find_sets(self.plan, self.grid, rows.clone(), coarser)?;
         self.room.take(entries, kept(entries))?;
         lists.fill(self.plan.model().edges(), &work.sets)?;
-        messages.fit(rows.len(), entries)?;
+        // The last band may have fewer rows, and take the memory of one that had more.
+        messages.fit(room::most_rows(self.plan, self.grid), entries)?;
         work.fit(rows.len(), entries)?;
         work.crossings.find(lists, self.plan.model().edges());
         Ok(())
@@ -172,35 +174,29 @@ impl Sweep<'_> {
         self.updates.fetch_add(sum, Ordering::Relaxed);
     }
 
-    /// Sweeps a band. Keeps its messages on grids from 1 on, and decides its labels where they are needed.
-    fn pass_band(&self, index: usize, beside: Beside<'_>, band: &mut Band, window: &mut Window) -> Result<(), Error> {
+    /// Sweeps a band, then calls `then` with it. Keeps its messages on grids from 1 on, and decides its labels where they are needed.
+    fn pass_band(
+        &self,
+        index: usize,
+        beside: Beside<'_>,
+        band: &mut Band,
+        window: &mut Window,
+        then: impl FnOnce(&Pass<'_>),
+    ) -> Result<(), Error> {
         let (held, rows) = (band.bytes(), self.band_rows(index));
         let patches = Patch::all(self.layout.size.width, rows.clone()).len();
-        let kept = |entries| Band::needed(self.plan, self.grid, rows.len(), patches, entries).saturating_sub(held);
+        let kept = |entries| Band::needed(self.plan, self.grid, patches, entries).saturating_sub(held);
         let Window { lists, messages, work } = window;
         let (lists, messages) = if self.grid > 0 { (&mut band.lists, &mut band.messages) } else { (lists, messages) };
         self.fill(rows.clone(), lists, messages, work, kept)?;
         self.sweep(index, beside, (lists, messages, work), |pass| {
             if !band.labels.is_empty() {
                 let above = beside.above.map(|seam| seam.labels_above(self.layout.size.width));
-                pass.decode(pass.rows.clone(), above, &mut band.labels);
+                let labels = &mut band.labels[..rows.len() * self.layout.size.width];
+                pass.decode(rows.clone(), above, labels);
             }
+            then(pass);
         });
-        Ok(())
-    }
-
-    /// Sweeps a band again and copies the messages received from `side`, `[row][width][labels]`.
-    fn read_messages(
-        &self,
-        index: usize,
-        beside: Beside<'_>,
-        window: &mut Window,
-        side: Side,
-        out: &mut [u8],
-    ) -> Result<(), Error> {
-        let Window { lists, messages, work } = window;
-        self.fill(self.band_rows(index), lists, messages, work, |_| 0)?;
-        self.sweep(index, beside, (lists, messages, work), |pass| pass.read_messages(side, out));
         Ok(())
     }
 

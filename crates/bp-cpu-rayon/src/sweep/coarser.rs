@@ -1,44 +1,51 @@
 //! The next coarser grid, as rows that are passed together see it.
 
-use std::ops::Range;
+use std::ops::RangeInclusive;
 
-use bp_core::{BAND_ROWS, EdgeLevels, Error, Patch, Plan};
+use bp_core::{BAND_ROWS, EdgeLevels, Error};
 
-use super::{Band, made::Made};
+use super::{
+    Band,
+    slots::{Reading, Slots},
+};
 use crate::layout::Layout;
 
 /// The bands of the next coarser grid that some rows depend on.
+pub(super) struct CoarseBands<'a> {
+    first: usize,
+    /// Band `first`, and the next one if that is needed.
+    band: Reading<'a, Band>,
+    next: Option<Reading<'a, Band>>,
+}
+
+impl<'a> CoarseBands<'a> {
+    /// Waits for these bands, of which there are one or two.
+    pub(super) fn read(needed: RangeInclusive<usize>, bands: &'a Slots<Band>) -> Result<Self, Error> {
+        let (first, last) = needed.into_inner();
+        debug_assert!(last <= first + 1, "rows that depend on bands {first} to {last}");
+        let next = if last > first { Some(bands.read(last)?) } else { None };
+        Ok(Self { first, band: bands.read(first)?, next })
+    }
+}
+
+/// The next coarser grid.
 #[derive(Clone, Copy)]
 pub(crate) struct Coarser<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) edges: &'a EdgeLevels,
-    /// The index of the first band.
-    first: usize,
-    /// This band, and the next one if that is needed.
-    bands: [&'a Band; 2],
+    bands: &'a CoarseBands<'a>,
 }
 
 impl<'a> Coarser<'a> {
-    /// Waits for the bands that these rows of the finer `grid` depend on: for their label sets, and for first messages, which need
-    /// fewer rows.
-    pub(super) fn wait(
-        plan: &'a Plan,
-        grid: usize,
-        rows: Range<usize>,
-        layout: &'a Layout,
-        bands: &'a [Made<Band>],
-    ) -> Result<Self, Error> {
-        let columns = 0..plan.size(grid).width;
-        let rows = Patch { columns, rows }.region(layout.size).rows;
-        let [first, last] = [rows.start, rows.end - 1].map(|y| y / BAND_ROWS);
-        debug_assert!(last <= first + 1, "{rows:?} lie in more than two bands");
-        Ok(Self { layout, edges: plan.model().edges(), first, bands: [bands[first].wait()?, bands[last].wait()?] })
+    pub(super) fn new(layout: &'a Layout, edges: &'a EdgeLevels, bands: &'a CoarseBands<'a>) -> Self {
+        Self { layout, edges, bands }
     }
 
     /// The band of this index.
     #[inline(always)]
     pub(super) fn band(&self, index: usize) -> &'a Band {
-        self.bands[usize::from(index > self.first)]
+        let CoarseBands { first, band, next } = self.bands;
+        next.as_ref().filter(|_| index > *first).unwrap_or(band)
     }
 
     /// The labels that were decided in row y, `[width]`.

@@ -5,9 +5,9 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule, Seam};
+use bp_core::{BAND_ROWS, Error, Patch, Plan, Schedule};
 
-use super::{Band, seams, windows};
+use super::{Band, seams, tasks, windows};
 
 /// The patches of a row of a grid, and the most entries that they may have.
 pub(super) fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
@@ -15,15 +15,9 @@ pub(super) fn most_entries(plan: &Plan, grid: usize) -> [usize; 2] {
     [patches, patches.saturating_mul(plan.model().labels())]
 }
 
-/// The rows of the bands of a grid.
-pub(super) fn bands(plan: &Plan, grid: usize) -> impl ExactSizeIterator<Item = Range<usize>> + use<> {
-    let height = plan.size(grid).height;
-    (0..height.div_ceil(BAND_ROWS)).map(move |band| band_rows(height, band))
-}
-
-/// The rows of a band of a grid with this many rows.
-pub(super) fn band_rows(height: usize, band: usize) -> Range<usize> {
-    BAND_ROWS * band..height.min(BAND_ROWS * (band + 1))
+/// The most rows that a band of a grid has.
+pub(super) fn most_rows(plan: &Plan, grid: usize) -> usize {
+    BAND_ROWS.min(plan.size(grid).height)
 }
 
 /// The grids that are swept.
@@ -37,15 +31,20 @@ pub(crate) fn bytes(plan: &Plan, labels: usize) -> u64 {
         let [patches, entries] = most_entries(plan, grid);
         if plan.has_label_sets(grid) { patches.saturating_mul(labels) } else { entries }
     };
-    let grids = swept(plan).map(|grid| {
+    if swept(plan).is_empty() {
+        return 0;
+    }
+    let slots = tasks::predicted_slots(plan, rayon::current_num_threads());
+    let grids = slots.into_iter().enumerate().map(|(grid, [bands, seams])| {
         let [patches, _] = most_entries(plan, grid);
-        let bands = bands(plan, grid).map(|rows| Band::needed(plan, grid, rows.len(), patches, entries(grid)));
-        let seams = Seam::all(plan.size(grid).height).map(|_| seams::bytes(plan, grid, patches, entries(grid)));
+        let bands = (0..bands).map(|_| Band::needed(plan, grid, patches, entries(grid)));
+        let seams = (0..seams).map(|_| seams::bytes(plan, grid, patches, entries(grid)));
         bands.chain(seams).fold(0, u64::saturating_add)
     });
     let [patches, _] = most_entries(plan, 0);
     let most = (0..plan.grids()).map(entries).max().unwrap_or(0);
-    grids.fold(windows::bytes(plan, patches, most), u64::saturating_add)
+    let answer = (size_of::<u16>() * plan.image_size().pixels()) as u64;
+    grids.fold(windows::bytes(plan, patches, most) + answer, u64::saturating_add)
 }
 
 /// The bytes that may be allocated in a solve, when label sets are known, by all threads.
