@@ -174,6 +174,7 @@ fn received_in(plan: &Plan) -> [usize; 2] {
 
 impl Solver for RayonSolver {
     fn match_cost(&mut self, pair: &StereoPair, seed: Option<Seed>) -> Result<(), Error> {
+        self.swept.forget();
         self.features.load(self.level, pair);
         self.layouts[0].greys.load(self.level, pair.left(), self.plan.margin());
         self.seed = seed;
@@ -243,7 +244,7 @@ impl Solver for RayonSolver {
         Ok(())
     }
 
-    /// Passes the messages of grid 0 once more, if some of them were not kept.
+    /// Passes the messages of grid 0 once more, if some of them were not kept, and under `sweep` those of all grids.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
             let mut swept = std::mem::take(&mut self.swept);

@@ -5,7 +5,8 @@ use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settin
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{
-    Answer, Case, Difference, compare_at_random, conform, conform_outward, noise_pair, random_case, solve, stepped_pair,
+    Answer, Case, Difference, compare, compare_at_random, conform, conform_outward, noise_pair, random_case, solve,
+    stepped_pair,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{collections::BTreeSet, ops::Range, sync::LazyLock};
@@ -63,6 +64,31 @@ fn a_large_image_is_the_same_on_any_number_of_threads() {
             assert!(solve_on(device, pool, &case) == expected, "{device} {pool} {:?}", case.plan.settings());
         }
     }
+}
+
+/// Bands of a high image take the memory of those above, on all grids but the coarsest. That holds for pair after pair.
+#[test]
+fn a_high_image_equals_the_reference() -> Result<(), Difference> {
+    let (height, labels) = (1090, 40);
+    let pairs = [stepped_pair(40, height, labels), noise_pair(40, height, 5)];
+    let [scalar, rayon] = [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()];
+    for label_sets in [true, false] {
+        let settings = Algorithm::Sweep.settings(pairs[0].size(), 1, 1, Schedule::Sweep);
+        let settings = Settings { label_sets, ..settings };
+        let case = Case::new(pairs[0].clone(), Model::new(Profile::Census, labels).unwrap(), settings).unwrap();
+        let other = Case { pair: pairs[1].clone(), plan: case.plan.clone() };
+        let expected = [&case, &other].map(|case| solve(scalar.as_ref(), case).unwrap().labels);
+        for pool in &*POOLS {
+            pool.install(|| compare(scalar.as_ref(), rayon.as_ref(), &case))?;
+            let mut driver = pool.install(|| Driver::new(rayon.as_ref(), case.plan.clone())).unwrap();
+            for (pair, expected) in pairs.iter().zip(&expected).cycle().take(4) {
+                pool.install(|| driver.solve(pair)).unwrap();
+                assert!(driver.labels() == expected, "label sets: {label_sets}");
+            }
+            assert!(driver.allocated_bytes() <= pool.install(|| rayon.planned_bytes(&case.plan)));
+        }
+    }
+    Ok(())
 }
 
 /// Eight threads sweep a plan that was prepared for one thread, and vice versa.

@@ -84,7 +84,6 @@ impl Swept {
         self.updates.store(0, Ordering::Relaxed);
         let room = Room::new(plan, bytes, self.bytes(), self.windows.most_entries());
         let finest = grids.start;
-        self.is_whole = false;
         let result = self.work(&Run { grids, room, then: &|_, _| {} }, grid, passed);
         self.is_whole = finest == 0 && result.is_ok();
         let [patches, _] = most_entries(plan, 0);
@@ -161,6 +160,11 @@ impl Swept {
         let gaps = gaps(plan.size(*index).width, plan.settings().cut.map(|cut| cut.x));
         let (level, layout) = (*level, &layouts[*index]);
         Sweep { level, plan, grid: *index, layout, costs, coarser, gaps, room, updates: &self.updates }
+    }
+
+    /// Forgets the answer: there is another pair.
+    pub(crate) fn forget(&mut self) {
+        self.is_whole = false;
     }
 
     /// The message entries that the last solve computed.

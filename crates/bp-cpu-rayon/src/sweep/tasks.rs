@@ -89,7 +89,8 @@ pub(super) fn slots(plan: &Plan, threads: usize) -> Vec<[usize; 2]> {
 pub(super) fn predicted_slots(plan: &Plan, threads: usize) -> Vec<[usize; 2]> {
     let mut heights = heights(plan);
     let coarsest = heights.len() - 1;
-    heights[0] = heights[0].min(((2 * threads + 8) * BAND_ROWS) << coarsest);
+    let bands = 3 * threads + 8;
+    heights[0] = heights[0].min(bands.saturating_mul(BAND_ROWS).saturating_mul(1 << coarsest.min(31)));
     (1..=coarsest).for_each(|grid| heights[grid] = heights[grid - 1].div_ceil(2));
     slots_of(&heights, &order(&heights, threads), threads)
 }
@@ -313,12 +314,12 @@ mod tests {
 
     #[test]
     fn a_high_image_needs_no_more_memory_and_predictions_know_that() {
-        for threads in [1, 2, 5] {
-            for height in [31, 100, 700, 3000, 5001, 9000, 20_000, 20_033] {
-                let plan = plan(height, 5);
+        for (threads, grids) in [(1, 5), (2, 5), (5, 5), (12, 5), (8, 6), (16, 3), (32, 4)] {
+            for height in [31, 100, 700, 3000, 5001, 9000, 16_385, 20_033, 24_705, 60_001] {
+                let plan = plan(height, grids);
                 let slots = slots(&plan, threads);
-                assert_eq!(predicted_slots(&plan, threads), slots, "{height} rows, {threads} threads");
-                assert!(slots.iter().flatten().all(|&slots| slots < 20 + 8 * threads), "{slots:?}");
+                assert_eq!(predicted_slots(&plan, threads), slots, "{height} rows, {threads} threads, {grids} grids");
+                assert!(slots.iter().flatten().all(|&slots| slots <= 3 * threads + 8), "{slots:?}");
             }
         }
     }
