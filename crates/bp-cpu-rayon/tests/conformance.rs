@@ -1,7 +1,7 @@
 //! Compares the rayon backend with the reference, on every instruction set of this CPU.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings};
+use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings, Side};
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{
@@ -85,6 +85,9 @@ fn a_high_image_equals_the_reference() -> Result<(), Difference> {
                 pool.install(|| driver.solve(pair)).unwrap();
                 assert!(driver.labels() == expected, "label sets: {label_sets}");
             }
+            let updates = driver.message_updates();
+            pool.install(|| driver.messages(Side::Up)).unwrap();
+            assert_eq!(driver.message_updates(), updates, "reading messages is no solve");
             assert!(driver.allocated_bytes() <= pool.install(|| rayon.planned_bytes(&case.plan)));
         }
     }
