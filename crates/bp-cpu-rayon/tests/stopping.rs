@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use bp_core::{
-    Algorithm, Backend, Driver, Error, Model, Plan, Profile, Progress, Schedule, Settings, Size, StereoPair,
+    Algorithm, Backend, Driver, Error, Model, Plan, Profile, Progress, Schedule, Settings, Side, Size, StereoPair,
 };
 use bp_cpu_rayon::Rayon;
 use bp_testkit::noise_pair;
@@ -45,6 +45,7 @@ fn a_sweep_stops_before_it_has_done_all_bands() {
         let stopped = pool.install(|| driver.solve_observed(&pair, first_band));
         assert_eq!(stopped.err(), Some(Error::Stopped));
         assert!(driver.message_updates() < all / 2, "{threads} threads: {} of {all}", driver.message_updates());
+        assert!(driver.messages(Side::Up).unwrap().iter().all(|&message| message == 0), "there is no answer");
     }
     driver.solve(&pair).unwrap();
     assert_eq!(driver.message_updates(), all);
