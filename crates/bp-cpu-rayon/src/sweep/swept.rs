@@ -58,8 +58,8 @@ impl Swept {
         if room::swept(plan).is_empty() {
             return Ok(Self::default());
         }
-        let threads = rayon::current_num_threads();
-        let (tasks, slots) = (tasks::all(plan, threads), tasks::slots(plan, threads).into_iter().enumerate());
+        let (tasks, slots) = tasks::all(plan, rayon::current_num_threads());
+        let slots = slots.into_iter().enumerate();
         let grids = slots.map(|(grid, slots)| Kept::new(plan, grid, slots)).collect::<Result<_, _>>()?;
         let mut windows = Windows::new(plan);
         let ([patches, _], [_, entries]) = (most_entries(plan, 0), most_entries(plan, plan.finest_with_all_labels()));

@@ -23,7 +23,7 @@ pub(super) struct Task {
     pub(super) part: Part,
     /// Its share of the message entries of its grid: that of a band's rows. Seams have none of their own.
     pub(super) updates: u64,
-    /// How many tasks read it: those of the finer grid read a band, and the bands beside it a seam.
+    /// How many tasks read what it makes. A band is read by tasks of the next finer grid, a seam by the two bands beside it.
     pub(super) readers: usize,
 }
 
@@ -61,8 +61,8 @@ pub(super) fn seams_beside(seams: usize, band: usize) -> [Option<usize>; 2] {
     [band.checked_sub(1), Some(band).filter(|&below| below < seams)]
 }
 
-/// The tasks of all grids, with which so many threads keep busy.
-pub(super) fn all(plan: &Plan, threads: usize) -> Vec<Task> {
+/// The tasks of all grids, which keep so many threads busy, and in how many slots the bands and the seams of every grid fit.
+pub(super) fn all(plan: &Plan, threads: usize) -> (Vec<Task>, Vec<[usize; 2]>) {
     let heights = heights(plan);
     let updates_a_row: Vec<_> =
         heights.iter().enumerate().map(|(grid, &height)| plan.grid_updates(grid) / height as u64).collect();
@@ -75,24 +75,19 @@ pub(super) fn all(plan: &Plan, threads: usize) -> Vec<Task> {
         };
         Task { grid, part, updates, readers: places.at(grid, part).readers }
     };
-    order.iter().map(task).collect()
+    let tasks = order.iter().map(task).collect();
+    (tasks, places.slots(threads))
 }
 
-/// In how many slots the bands and the seams of every grid fit.
-pub(super) fn slots(plan: &Plan, threads: usize) -> Vec<[usize; 2]> {
-    let heights = heights(plan);
-    slots_of(&heights, &order(&heights, threads), threads)
-}
-
-/// The same for predictions, which must not take long for images of millions of rows. There are no more for high images than for
-/// those where the list has begun to repeat itself.
+/// The slots that [`all`] will find, for predictions, which must not take long for images of millions of rows. High images need
+/// no more slots than those where the list has begun to repeat itself.
 pub(super) fn predicted_slots(plan: &Plan, threads: usize) -> Vec<[usize; 2]> {
     let mut heights = heights(plan);
     let coarsest = heights.len() - 1;
     let bands = 3 * threads + 8;
     heights[0] = heights[0].min(bands.saturating_mul(BAND_ROWS).saturating_mul(1 << coarsest.min(31)));
     (1..=coarsest).for_each(|grid| heights[grid] = heights[grid - 1].div_ceil(2));
-    slots_of(&heights, &order(&heights, threads), threads)
+    Places::of(&heights, &order(&heights, threads)).slots(threads)
 }
 
 fn heights(plan: &Plan) -> Vec<usize> {
@@ -184,17 +179,17 @@ impl Places {
             Part::Seam(index) => &mut self.of[grid][1][index],
         }
     }
-}
 
-/// A slot is free `ahead` tasks before the next one to take it.
-fn slots_of(heights: &[usize], order: &[(usize, Part)], ahead: usize) -> Vec<[usize; 2]> {
-    let needed = |places: &Vec<Place>| {
-        let taken = places.iter().enumerate().map(|(index, place)| {
-            places.partition_point(|next| next.made <= place.read + ahead).max(index + 1) - index
-        });
-        taken.max().unwrap_or(0)
-    };
-    Places::of(heights, order).of.iter().map(|of| of.each_ref().map(needed)).collect()
+    /// In how many slots they fit. A slot is free `ahead` tasks before the next one to take it.
+    fn slots(&self, ahead: usize) -> Vec<[usize; 2]> {
+        let needed = |places: &Vec<Place>| {
+            let taken = places.iter().enumerate().map(|(index, place)| {
+                places.partition_point(|next| next.made <= place.read + ahead).max(index + 1) - index
+            });
+            taken.max().unwrap_or(0)
+        };
+        self.of.iter().map(|of| of.each_ref().map(needed)).collect()
+    }
 }
 
 /// Receives how much has been done; stops the work if it breaks.
@@ -282,10 +277,9 @@ mod tests {
             [(97, 2, 1), (97, 1, 2), (1000, 5, 1), (1000, 5, 3), (33, 4, 8), (2049, 6, 2), (5, 3, 1)]
         {
             let plan = plan(height, grids);
-            let (heights, tasks) = (heights(&plan), all(&plan, ahead));
+            let (heights, (tasks, slots)) = (heights(&plan), all(&plan, ahead));
             assert_eq!(tasks.len(), heights.iter().map(|&height| counts(height).iter().sum::<usize>()).sum());
             // The index of what lies in each slot, and how many have not read it.
-            let slots = slots(&plan, ahead);
             let mut held: Vec<_> = slots.iter().map(|slots| slots.map(|slots| vec![(usize::MAX, 0); slots])).collect();
             for task in &tasks {
                 for (grid, part) in needs(&heights, (task.grid, task.part)) {
@@ -317,7 +311,7 @@ mod tests {
         for (threads, grids) in [(1, 5), (2, 5), (5, 5), (12, 5), (8, 6), (16, 3), (32, 4)] {
             for height in [31, 100, 700, 3000, 5001, 9000, 16_385, 20_033, 24_705, 60_001] {
                 let plan = plan(height, grids);
-                let slots = slots(&plan, threads);
+                let (_, slots) = all(&plan, threads);
                 assert_eq!(predicted_slots(&plan, threads), slots, "{height} rows, {threads} threads, {grids} grids");
                 assert!(slots.iter().flatten().all(|&slots| slots <= 3 * threads + 8), "{slots:?}");
             }
@@ -327,7 +321,7 @@ mod tests {
     #[test]
     fn work_ends_at_the_first_error_which_is_kept() {
         let plan = plan(97, 1);
-        let tasks = all(&plan, 1);
+        let (tasks, _) = all(&plan, 1);
         let mut seen = Vec::new();
         let mut passed = |done| {
             seen.push(done);
