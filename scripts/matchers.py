@@ -15,6 +15,15 @@ def sgbm(mode, labels, block):
         mode=getattr(cv2, f"STEREO_SGBM_MODE_{SGBM_MODES[mode]}"))
 
 
+def read_pfm(path):
+    """A PFM map in little-endian floats. OpenCV would multiply by its scale, which Middlebury does not mean as one."""
+    import numpy
+    with path.open("rb") as file:
+        _, size, _ = (file.readline() for _ in range(3))
+        width, height = map(int, size.split())
+        return numpy.fromfile(file, "<f4").reshape(height, width)[::-1]
+
+
 def greys(left, right):
     import cv2
     return [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in (left, right)]

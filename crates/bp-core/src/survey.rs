@@ -4,11 +4,14 @@
 //! Both images are shrunk to at most [`LONGEST_SIDE`] pixels a side. `coarse` then matches them window by window, in
 //! both directions, over all disparities from minus to plus half the width. It keeps matches that agree in both
 //! directions, are clearly better than all alternatives, and do not form specks. From them, `range` derives the range
-//! of disparities and its sign. `rows` matches a few hundred again at full resolution to check that rows correspond.
+//! of disparities and its sign; `ends` looks for the nearest and the farthest surfaces at full resolution. `points` matches a few
+//! hundred places again there, and `rows` checks with them that rows correspond.
 //!
 //! The survey is plain integer arithmetic, so it gives the same result on every machine, backend and number of threads.
 
 mod coarse;
+mod codes;
+mod ends;
 pub(crate) mod points;
 mod range;
 mod rows;
@@ -66,6 +69,18 @@ impl Survey {
     /// # Errors
     /// Only [`Error::OutOfMemory`]: every pair can be surveyed.
     pub fn of(pair: &StereoPair) -> Result<Self, Error> {
+        Self::looking(pair, true)
+    }
+
+    /// Surveys a pair whose labels are known already: looks for the ends of its range in the shrunk images only.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn coarse(pair: &StereoPair) -> Result<Self, Error> {
+        Self::looking(pair, false)
+    }
+
+    fn looking(pair: &StereoPair, closely: bool) -> Result<Self, Error> {
         let factor = shrink::factor(pair.size());
         let small = shrink::shrunk(pair, factor)?;
         let looks = looks(&small)?;
@@ -78,7 +93,7 @@ impl Survey {
         let reach = factor * (most_down + 1) + factor.div_ceil(2);
         let (points, seen) = rayon::join(
             || best.map_or_else(Vec::new, |_| points::find(pair, small.left(), &looks, factor, reach)),
-            || best.and_then(|best| SeenDisparities::of(pair, best, factor)),
+            || best.and_then(|best| SeenDisparities::of(best, factor, closely.then_some((pair, small.left())))),
         );
         Ok(Self {
             identical: pair.left() == pair.right(),

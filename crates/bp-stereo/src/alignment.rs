@@ -20,7 +20,7 @@ pub fn align_camera(
     file: Option<(&Files, &Path)>,
     watch: &Watch<'_>,
 ) -> Result<Align, Error> {
-    let found = pairs.take(PAIRS).flatten().find_map(|pair| Alignment::find(&pair, &Survey::of(&pair).ok()?));
+    let found = pairs.take(PAIRS).flatten().find_map(|pair| Alignment::find(&pair, &Survey::coarse(&pair).ok()?));
     watch.check()?;
     match (found, file) {
         (Some(alignment), Some((files, path))) => files.json(path, &alignment)?,

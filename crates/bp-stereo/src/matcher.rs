@@ -11,7 +11,7 @@ use rayon::ThreadPool;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    Align, Beside, Disparity, Ending, Error, Options, Tiles, Warning, Watch,
+    Align, Beside, Disparity, Ending, Error, Labels, Options, Tiles, Warning, Watch,
     devices::{self, Opened},
     finishing::{Finished, View, finished},
     memory::{self, Fitted, Images},
@@ -156,7 +156,7 @@ impl Matcher {
     pub fn plan(&self, pair: &StereoPair) -> Result<Planned, Error> {
         let (options, size, start) = (&self.options, pair.size(), Instant::now());
         let (survey, alignment) = self.pool.install(|| {
-            let survey = Survey::of(pair)?;
+            let survey = if options.labels == Labels::Auto { Survey::of(pair) } else { Survey::coarse(pair) }?;
             let alignment = plan::alignment(options, pair, &survey)?;
             Ok::<_, Error>((survey, alignment))
         })?;

@@ -31,11 +31,11 @@ fn labels_auto_takes_the_range_that_the_images_need() {
         assert_eq!(auto["settings"]["labels"], report["settings"]["labels"], "the default is auto");
         (report["settings"]["min_disparity"].as_i64().unwrap(), report["settings"]["labels"].as_u64().unwrap())
     };
-    assert_eq!(settings("a.png b.png -o map.pfm"), (7, 8));
-    assert_eq!(settings("b.png a.png -o map.pfm"), (-11, 8));
-    assert_eq!(settings("a.png b.png -o map.pfm --min-disparity 2"), (2, 16));
+    assert_eq!(settings("a.png b.png -o map.pfm"), (8, 3));
+    assert_eq!(settings("b.png a.png -o map.pfm"), (-10, 3));
+    assert_eq!(settings("a.png b.png -o map.pfm --min-disparity 2"), (2, 9));
     // Nothing is negative here, so the margin is not either.
-    assert_eq!(settings("a.png a.png -o map.pfm"), (0, 4));
+    assert_eq!(settings("a.png a.png -o map.pfm"), (0, 2));
     folder.fails("match b.png a.png -o no.png --labels auto", 2, &["exchanged", "use an output that ends in .pfm"]);
     folder.fails("match a.png b.png -o no.png --labels some", 2, &["auto or a number from 1 to 1024"]);
 }

@@ -46,6 +46,12 @@ impl Matches {
         self.map.size().width
     }
 
+    /// The disparity of a pixel, if it has a match.
+    pub(super) fn at(&self, x: usize, y: usize) -> Option<i32> {
+        let disparity = self.map.values()[y * self.width() + x];
+        disparity.is_finite().then_some(disparity as i32)
+    }
+
     /// Every pixel that has a match.
     pub(super) fn found(&self) -> impl Iterator<Item = Found> {
         let width = self.width();

@@ -1,11 +1,12 @@
 //! Matches a few hundred points again at full resolution, also above and below their rows.
 
-use std::ops::Range;
-
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use super::coarse::{Found, Matches};
+use super::{
+    coarse::{Found, Matches},
+    codes::Codes,
+};
 use crate::{Image, StereoPair};
 
 /// One point is chosen from each square of this many small pixels a side.
@@ -56,14 +57,6 @@ pub(super) fn find(pair: &StereoPair, small: &Image, looks: &[Matches], factor: 
     let level = Level::new();
     let of_chunk = |places: &[Place]| dispatch!(level, simd => points(simd, pair, places, factor, reach));
     places.par_chunks(TOGETHER).flat_map_iter(of_chunk).collect()
-}
-
-/// The disparities of coarse matches at full resolution.
-pub(super) fn disparities(pair: &StereoPair, found: &[Found], rows_down: isize, factor: usize) -> Vec<i32> {
-    let places: Vec<Place> = found.iter().map(|&found| Place::of(found, factor)).collect();
-    let reach = factor * (1 + rows_down.unsigned_abs());
-    let points = dispatch!(Level::new(), simd => points(simd, pair, &places, factor, reach));
-    points.iter().map(|point| point.x as i32 - point.column as i32).collect()
 }
 
 /// In each cell of the small image, the match with the most contrast between the rows above and below.
@@ -138,12 +131,12 @@ impl Compared {
         let mut best = (u32::MAX, 0, 0, 0);
         for across in 0..=2 * factor {
             words.clear();
-            words.extend((0..rows).map(|row| strips.word(row, across)));
+            words.extend((0..rows).map(|row| word(strips.row(row, across))));
             differing.clear();
             differing.resize(costs.len(), 0);
             // Rows of windows at once, which takes vectors.
             for row in 0..WINDOW_HEIGHT {
-                let own = window.word(row, 0);
+                let own = word(window.row(row, 0));
                 let others = words[row..].iter().map(|word| u64::from((word ^ own).count_ones()));
                 differing.iter_mut().zip(others).for_each(|(differing, other)| *differing += other);
             }
@@ -158,75 +151,8 @@ impl Compared {
     }
 }
 
-/// Grey values that are read together, and the codes that they make.
-const GREYS: usize = 32;
-const CODES: usize = GREYS - 2;
-
-/// [`GREYS`] values, and two more that mean nothing.
-type Run = [u8; GREYS + 2];
-
-/// The census codes of a rectangle; see [`crate::census::code`].
-#[derive(Default)]
-struct Codes {
-    /// The columns of the rectangle, rounded up to whole runs.
-    columns: usize,
-    /// A run of each row, and of those above and below the rectangle.
-    greys: Vec<Run>,
-    codes: Vec<u8>,
-}
-
-impl Codes {
-    /// Reads the codes at some columns and rows; `None` if they leave the image.
-    #[inline(always)]
-    fn read(&mut self, image: &Image, columns: Range<usize>, rows: Range<usize>) -> Option<()> {
-        let size = image.size();
-        if columns.start == 0 || rows.start == 0 || columns.end >= size.width || rows.end >= size.height {
-            return None;
-        }
-        self.columns = columns.len().next_multiple_of(CODES);
-        self.greys.resize(rows.len() + 2, [0; GREYS + 2]);
-        self.codes.resize(self.columns * rows.len(), 0);
-        for first in (0..self.columns).step_by(CODES) {
-            let start = columns.start - 1 + first;
-            for (row, greys) in (rows.start - 1..).zip(&mut self.greys) {
-                *greys = run_of_greys(&image.greys()[row * size.width + start..]);
-            }
-            let codes = self.codes.chunks_exact_mut(self.columns);
-            for (rows, codes) in self.greys.windows(3).zip(codes) {
-                codes[first..first + CODES].copy_from_slice(&run_of_codes([&rows[0], &rows[1], &rows[2]])[..CODES]);
-            }
-        }
-        Some(())
-    }
-
-    /// The codes of [`WINDOW_WIDTH`] pixels.
-    #[inline(always)]
-    fn word(&self, row: usize, column: usize) -> u64 {
-        let codes = &self.codes[row * self.columns + column..][..WINDOW_WIDTH];
-        codes.try_into().map_or(0, u64::from_le_bytes)
-    }
-}
-
-/// The grey values of some pixels; zeros beyond the last one.
+/// The codes of [`WINDOW_WIDTH`] pixels.
 #[inline(always)]
-fn run_of_greys(values: &[u8]) -> Run {
-    let mut greys = [0; GREYS + 2];
-    // A known number of values takes vectors.
-    match values.first_chunk::<GREYS>() {
-        Some(values) => greys[..GREYS].copy_from_slice(values),
-        None => greys[..values.len()].copy_from_slice(values),
-    }
-    greys
-}
-
-/// The codes of the middle one of three rows, without its ends. The last two mean nothing.
-#[inline(always)]
-fn run_of_codes(rows: [&Run; 3]) -> [u8; GREYS] {
-    let mut codes = [0; GREYS];
-    for (bit, (dx, dy)) in (0..8).zip([(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)]) {
-        for ((code, other), centre) in codes.iter_mut().zip(&rows[dy][dx..dx + GREYS]).zip(&rows[1][1..]) {
-            *code |= u8::from(other > centre) << bit;
-        }
-    }
-    codes
+fn word(codes: &[u8]) -> u64 {
+    codes.first_chunk().copied().map_or(0, u64::from_le_bytes)
 }

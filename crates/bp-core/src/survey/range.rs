@@ -2,27 +2,22 @@
 
 use super::{
     coarse::{Found, Matches},
-    points,
+    ends,
 };
-use crate::{MAX_LABELS, Model, StereoPair};
+use crate::{Image, MAX_LABELS, Model, StereoPair};
 
 /// One in this many matches may lie beyond either end of the range, because some false matches remain.
 const BEYOND: usize = 1000;
 
-/// Matches at either end of the range that are matched again at full resolution.
-const AT_THE_END: usize = 64;
+/// If so many disparities that were found at full resolution lie at an end of the range, or beyond, it ends with them.
+const ENOUGH: usize = 4;
 
-/// One in this many of those may lie beyond the end.
-const STRAYS: usize = 4;
+/// The margin at either end is one part in this many of the range, and 1 px.
+const MARGIN: i32 = 20;
 
-/// The margin added at both ends, in pixels, besides half a shrunk pixel.
-const MARGIN: i32 = 2;
-
-/// Another part of the range is added at its near end: near surfaces are often narrow and easily missed.
-const NEARER: i32 = 6;
-
-/// The number of labels is a multiple of this.
-const LABEL_STEP: usize = 4;
+/// A far disparity counts only if there is another one within one part in this many of the range. Near surfaces are often
+/// narrow, so one place may be all that tells of them; far ones are not.
+const COMPANION: i32 = 16;
 
 /// The range of disparities that coarse matching found, in pixels of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +46,7 @@ impl DisparityRange {
         self.min_disparity + self.labels as i32 - 1
     }
 
-    /// The range from another first disparity to the same last one, with the number of labels rounded up.
+    /// The range from another first disparity to the same last one.
     #[must_use]
     pub fn starting_at(&self, min_disparity: i32) -> Self {
         Self::spanning(min_disparity, self.max_disparity())
@@ -59,39 +54,39 @@ impl DisparityRange {
 
     fn spanning(min_disparity: i32, max_disparity: i32) -> Self {
         let needed = (i64::from(max_disparity) - i64::from(min_disparity) + 1).clamp(1, MAX_LABELS as i64) as usize;
-        Self { min_disparity, labels: needed.next_multiple_of(LABEL_STEP).min(MAX_LABELS) }
+        Self { min_disparity, labels: needed }
     }
 }
 
 impl SeenDisparities {
-    pub(super) fn of(pair: &StereoPair, matches: &Matches, factor: usize) -> Option<Self> {
+    /// The range of coarse matches. With the pair and its shrunk left image, its ends are also looked for at full resolution.
+    pub(super) fn of(matches: &Matches, factor: usize, closely: Option<(&StereoPair, &Image)>) -> Option<Self> {
         let all: Vec<Found> = matches.found().collect();
-        let [least, largest] = ends(all.iter().map(|&(.., disparity)| disparity).collect(), BEYOND)?;
+        let [least, largest] = outermost(&all)?;
         // If the match of a pixel may lie outside the right image, the one inside may be false.
         let is_inside = |x: usize| x as i32 >= largest && (x as i32 - least) < matches.width() as i32;
         let inside: Vec<Found> = all.iter().copied().filter(|&(x, ..)| is_inside(x)).collect();
         let inside = if inside.is_empty() { all } else { inside };
-        let [least, largest] = ends(inside.iter().map(|&(.., disparity)| disparity).collect(), BEYOND)?;
-        let exactly = |is_near: &dyn Fn(i32) -> bool| {
-            let near: Vec<Found> = inside.iter().copied().filter(|&(.., disparity)| is_near(disparity)).collect();
-            let some: Vec<Found> = near.iter().copied().step_by(near.len().div_ceil(AT_THE_END).max(1)).collect();
-            ends(points::disparities(pair, &some, matches.rows_down, factor), STRAYS)
-        };
+        let [least, largest] = outermost(&inside)?;
         let step = factor as i32;
-        Some(Self {
-            least: exactly(&|disparity| disparity <= least).map_or(step * least, |[least, _]| least),
-            largest: exactly(&|disparity| disparity >= largest).map_or(step * largest, |[_, largest]| largest),
-            margin: step / 2 + MARGIN,
-        })
+        let Some((pair, small)) = closely else {
+            let ([least, largest], margin) =
+                (outside([step * least, step * largest], step), margin(step * (largest - least)));
+            return Some(Self { least, largest, margin: margin + step / 2 });
+        };
+        let mut exact = ends::disparities(pair, small, matches, &inside, [least, largest], factor);
+        // Repeated pictures match far away; a pair that shows no negative disparity has none.
+        exact.retain(|&disparity| least < 0 || disparity >= 0);
+        let [least, largest] = joined([step * least, step * largest], step, &exact);
+        Some(Self { least, largest, margin: margin(largest - least) })
     }
 
-    /// Labels that cover this range and a margin. Negative disparities are covered only if some were seen. Rounding up adds
-    /// labels at the near end (large disparities). Labels beyond [`MAX_LABELS`] are dropped at the same end.
+    /// Labels that cover this range and a margin. Negative disparities are covered only if some were seen. Labels beyond
+    /// [`MAX_LABELS`] are dropped at the near end (large disparities).
     #[must_use]
     pub fn range(&self) -> DisparityRange {
         let first = self.least - self.margin;
-        let nearer = (self.largest - self.least) / NEARER;
-        DisparityRange::spanning(if self.least < 0 { first } else { first.max(0) }, self.largest + self.margin + nearer)
+        DisparityRange::spanning(if self.least < 0 { first } else { first.max(0) }, self.largest + self.margin)
     }
 
     /// Whether some disparities lie below the first label of a model, and whether some lie above its last.
@@ -102,10 +97,38 @@ impl SeenDisparities {
     }
 }
 
-/// The least and the largest value, when one in `strays` at either end does not count.
-fn ends(mut values: Vec<i32>, strays: usize) -> Option<[i32; 2]> {
-    let strays = values.len() / strays;
+/// The least and the largest disparity, when one in [`BEYOND`] at either end does not count.
+fn outermost(found: &[Found]) -> Option<[i32; 2]> {
+    let mut values: Vec<i32> = found.iter().map(|&(.., disparity)| disparity).collect();
+    let strays = values.len() / BEYOND;
     let last = values.len().checked_sub(strays + 1)?;
     let least = *values.select_nth_unstable(strays).1;
     Some([least, *values.select_nth_unstable(last).1])
+}
+
+/// The ends of the range in pixels: those of coarse matching, half a shrunk pixel farther out, and what was found at full
+/// resolution, in ascending order. Where that is enough, it alone counts.
+fn joined([least, largest]: [i32; 2], step: i32, exact: &[i32]) -> [i32; 2] {
+    let distance = ((largest - least) / COMPANION).max(2);
+    let far = exact.windows(2).find(|pair| pair[1] - pair[0] <= distance).map(|pair| pair[0]);
+    let near = exact.last().copied();
+    let enough =
+        |is_near: &dyn Fn(i32) -> bool| exact.iter().filter(|&&disparity| is_near(disparity)).count() >= ENOUGH;
+    let (far_enough, near_enough) = (enough(&|d| d <= least + step), enough(&|d| d >= largest - step));
+    // Few pairs have negative disparities, so false matches are likelier.
+    let far_enough = far_enough || least < 0;
+    let outside = outside([least, largest], step);
+    [
+        far.map_or(outside[0], |far| if far_enough { far } else { far.min(outside[0]) }),
+        near.map_or(outside[1], |near| if near_enough { near } else { near.max(outside[1]) }),
+    ]
+}
+
+/// Ends that were found in shrunk images, half a shrunk pixel farther out. What is not negative remains so.
+fn outside([least, largest]: [i32; 2], step: i32) -> [i32; 2] {
+    [(least - step / 2).max(least.min(0)), largest + step / 2]
+}
+
+fn margin(range: i32) -> i32 {
+    1 + range / MARGIN
 }
