@@ -1,8 +1,9 @@
 //! A plan on a runner, prepared and timed.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use bp_core::{Driver, Plan, StereoPair};
+use bp_core::{DeviceKind, Driver, Plan, StereoPair};
+use bp_stereo::Watch;
 
 use super::{Meter, Runner};
 use crate::{
@@ -10,6 +11,9 @@ use crate::{
     machine,
     record::{Sample, milliseconds},
 };
+
+/// How long threads that just woke up may run on one core, before the system spreads them over all.
+const SETTLING: Duration = Duration::from_millis(60);
 
 /// A prepared plan, the device that solves it, and the pair that it is solved for.
 pub struct Solve<'a> {
@@ -41,6 +45,17 @@ impl<'a> Solve<'a> {
         let Self { runner, pair, driver, .. } = self;
         let times = runner.run(|| Ok(driver.solve_observed(pair, &mut |progress| meter.observe(progress.done))?))?;
         Ok(Sample::new(round, &times))
+    }
+
+    /// Solves it without counting until the threads of this machine's processor have settled. Other devices have none, and a solve
+    /// that takes much longer hardly notices.
+    pub fn settle(&mut self, usual_ms: f64) -> Result<(), Failure> {
+        let silent = Meter::new(&Watch::default());
+        let start = Instant::now();
+        while self.runner.info.kind == DeviceKind::Processor && usual_ms < 1000.0 && start.elapsed() < SETTLING {
+            self.sample(0, &silent)?;
+        }
+        Ok(())
     }
 
     /// Message entries of a solve.

@@ -99,7 +99,7 @@ fn contest(
 ) -> Result<Contest, Failure> {
     let answer = RefCell::new(None);
     let entrant = |runner| {
-        let contestant = OnDevice { problem, runner, plan, pair, answer: &answer, ready: None };
+        let contestant = OnDevice { problem, runner, plan, pair, answer: &answer, ready: None, first_ms: 0.0 };
         Entrant::new(contestant.name(), contestant)
     };
     let mut entrants: Vec<_> = Asked::opened(asked).map(entrant).collect();
@@ -136,26 +136,16 @@ struct OnDevice<'a> {
     pair: &'a StereoPair,
     answer: &'a RefCell<Option<Answer>>,
     ready: Option<Solve<'a>>,
+    /// How long the first solve took.
+    first_ms: f64,
 }
 
 impl OnDevice<'_> {
     fn name(&self) -> String {
         format!("{:<12}{:<10}", self.problem.name, self.runner.name)
     }
-}
 
-impl Contestant for OnDevice<'_> {
-    fn warm_up(&mut self, meter: &Meter<'_>) -> Result<Sample, Failure> {
-        let solve = Solve::prepare(self.runner, self.plan.clone(), self.pair)?;
-        let prepare_ms = solve.prepare_ms;
-        self.ready = Some(solve);
-        let first = self.turn(0, meter)?;
-        let times = format!("ready in {prepare_ms:>8.1} ms, first solve {:>10.1} ms", first.total_ms);
-        meter.line(&(self.name() + &times));
-        Ok(first)
-    }
-
-    fn turn(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
+    fn solve(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
         let solve = self.ready.as_mut().ok_or_else(|| Failure::other("it is not ready"))?;
         let sample = solve.sample(round, meter)?;
         let (labels, mut answer) = (solve.driver.labels(), self.answer.borrow_mut());
@@ -165,6 +155,26 @@ impl Contestant for OnDevice<'_> {
             return Err(Failure::other(format!("other labels than {whose} gave")));
         }
         Ok(sample)
+    }
+}
+
+impl Contestant for OnDevice<'_> {
+    fn warm_up(&mut self, meter: &Meter<'_>) -> Result<Sample, Failure> {
+        let solve = Solve::prepare(self.runner, self.plan.clone(), self.pair)?;
+        let prepare_ms = solve.prepare_ms;
+        self.ready = Some(solve);
+        let first = self.solve(0, meter)?;
+        self.first_ms = first.total_ms;
+        let times = format!("ready in {prepare_ms:>8.1} ms, first solve {:>10.1} ms", first.total_ms);
+        meter.line(&(self.name() + &times));
+        Ok(first)
+    }
+
+    fn turn(&mut self, round: u32, meter: &Meter<'_>) -> Result<Sample, Failure> {
+        if let Some(solve) = &mut self.ready {
+            solve.settle(self.first_ms)?;
+        }
+        self.solve(round, meter)
     }
 
     fn keep(&mut self, taken: Result<&Sample, &Failure>) -> Result<(), Failure> {
