@@ -9,6 +9,8 @@ use std::{
     process::Command,
 };
 
+use bp_core::{StereoPair, survey::Survey};
+use bp_io::Limits;
 use serde_json::Value;
 use walkdir::WalkDir;
 
@@ -152,5 +154,44 @@ fn wrong_pairs_are_told_and_no_others() {
         fs::write(at("list"), list).unwrap();
         let told = matched(&at("list"), name).iter().filter(|pair| warnings(pair).contains(words)).count();
         assert_eq!(told, real.len(), "{name}");
+    }
+}
+
+/// Pairs with known disparities: the folder, the files and the scale of the truth.
+fn pairs_with_truth(data: &Path) -> Vec<(PathBuf, [&'static str; 3], Option<f32>)> {
+    let old = |name, scale| {
+        (data.join("middlebury2001-2003").join(name), ["imL.png", "imR.png", "groundtruth.png"], Some(scale))
+    };
+    let mut pairs = vec![old("tsukuba", 16.0), old("venus", 8.0), old("teddy", 4.0), old("cones", 4.0)];
+    let folders = |name: &str| {
+        let found = WalkDir::new(data.join(name)).min_depth(1).max_depth(1).sort_by_file_name().into_iter();
+        found.map(|entry| entry.unwrap().into_path()).filter(|path| path.is_dir())
+    };
+    for (name, scale) in [("middlebury2006", 2.0), ("middlebury2006-thirdsize", 3.0), ("middlebury2006-fullsize", 1.0)]
+    {
+        pairs.extend(folders(name).map(|folder| (folder, ["view1.png", "view5.png", "disp1.png"], Some(scale))));
+    }
+    pairs.extend(folders("middlebury-v3-quarter").map(|folder| (folder, ["im0.png", "im1.png", "disp0GT.pfm"], None)));
+    pairs
+}
+
+/// Tsukuba has 10 disparities, of which the margins alone are two. Some pixels of the truth of Flowerpots, beside the left border,
+/// are much farther away than all others.
+#[test]
+fn automatic_labels_cover_the_truth_of_real_pairs_and_hardly_more() {
+    let Some(data) = data() else { return };
+    let limit = Limits::default();
+    for (folder, [left, right, truth], scale) in pairs_with_truth(&data) {
+        let [left, right] = [left, right].map(|name| bp_io::read_image(&folder.join(name), limit).unwrap());
+        let range = Survey::of(&StereoPair::new(left, right).unwrap()).unwrap().seen.unwrap().range();
+        let truth = bp_io::read_map(&folder.join(truth), scale, limit).unwrap();
+        let mut known: Vec<f32> = truth.values().iter().copied().filter(|value| value.is_finite()).collect();
+        known.sort_unstable_by(f32::total_cmp);
+        let (first, last) = (range.min_disparity as f32 - 0.5, range.max_disparity() as f32 + 0.5);
+        let missed = known.iter().filter(|&&value| value < first || value > last).count() as f64 / known.len() as f64;
+        let needed = (known[known.len() - 1].floor() - known[known.len() / 2000].floor()) as usize + 1;
+        let is = |name: &str| folder.ends_with(name);
+        assert!(missed < if is("Flowerpots") { 0.0021 } else { 0.0002 }, "{folder:?}: {missed} beyond {range:?}");
+        assert!(10 * range.labels <= if is("tsukuba") { 16 } else { 13 } * needed, "{folder:?}: {needed}, {range:?}");
     }
 }
