@@ -113,14 +113,18 @@ fn leaves_before_all_else_that_coarse_matching_takes_for_specks_are_found_at_ful
     assert_eq!(reach(&pair, 50), [false, true]);
     // The margin, but nothing that only looks alike.
     assert!(look(&pair).seen.unwrap().range().max_disparity() <= 53);
+    // Four rows are one of a shrunk image.
+    assert_eq!(reach(&moved(&pair, |x, y| (x, y - 4.0)), 50), [false, true]);
 }
 
 #[test]
 fn a_floor_that_rises_steeply_at_the_border_is_found_in_its_last_row() {
     let floor = |y: usize| (y + 16).saturating_sub(VGA.height);
-    let left = image(VGA, |x, y| noise(x.wrapping_sub(10 + x / 32 + floor(y)), y));
-    let pair = StereoPair::new(left, image(VGA, noise)).unwrap();
-    assert_eq!(reach(&pair, 10 + 19 + 15), [false, true]);
+    for row in [|y: usize| y, |y: usize| VGA.height - 1 - y] {
+        let left = image(VGA, |x, y| noise(x.wrapping_sub(10 + x / 32 + floor(row(y))), y));
+        let pair = StereoPair::new(left, image(VGA, noise)).unwrap();
+        assert_eq!(reach(&pair, 10 + 19 + 13), [false, true]);
+    }
 }
 
 #[test]

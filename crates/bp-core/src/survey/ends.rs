@@ -1,9 +1,9 @@
 //! Looks for the nearest and the farthest surfaces at full resolution, because coarse matching misses small ones.
 //!
-//! Windows of census codes are compared along their rows: at places without a coarse match, at some whose coarse match lies at
-//! an end of the range, and at the upper and lower border, where a floor rises too steeply for windows of several rows. A
-//! disparity counts if two windows of different shapes find it, each clearly better than all others, and back again from the
-//! right image. Hardly one in a hundred is then false.
+//! Windows of census codes are compared along their rows: at places without a coarse match, at some whose coarse match is among
+//! the nearest, and at the upper and lower border, where a floor rises too steeply for windows of several rows. A disparity
+//! counts if two windows of different shapes find it, each clearly better than all others, and back again from the right
+//! image. Hardly one in a hundred is then false.
 
 use std::ops::Range;
 
@@ -14,24 +14,24 @@ use super::{
     coarse::{Found, Matches},
     codes::{Codes, SPARE},
 };
-use crate::{Image, StereoPair};
+use crate::{Image, Size, StereoPair};
 
 /// One place without a coarse match is chosen from each square of this many small pixels a side, if it has at least as many.
 const CELL: usize = 6;
 
-/// The most places at either end of the range.
-const AT_AN_END: usize = 64;
+/// The most places whose coarse match is among the nearest.
+const NEAREST: usize = 64;
 
 /// Places that one thread examines together.
 const TOGETHER: usize = 32;
 
-/// At least so many disparities are compared, because the best of a few says little; so many lie on both sides of a range of one.
-const FEWEST: i32 = 8;
+/// At least so many disparities are compared, because the best of a few says little.
+const FEWEST: usize = 8;
 
 /// Disparities beside the best one that may be as good, because they belong to the same match.
 const BESIDE: usize = 2;
 
-/// The cost of all other disparities is at least 6 / 5 of the least one, and [`CLEARLY`] bits more.
+/// By how many bits a window has to differ more at all other disparities.
 const CLEARLY: u32 = 16;
 
 /// A window: columns before and after its middle, and rows above and below it.
@@ -53,23 +53,29 @@ struct Place {
     windows: [Window; 2],
 }
 
-/// The disparities found at full resolution, in ascending order. `ends` are the least and the largest coarse disparity.
-pub(super) fn disparities(
-    pair: &StereoPair,
-    small: &Image,
-    matches: &Matches,
-    found: &[Found],
-    ends: [i32; 2],
-    factor: usize,
-) -> Vec<i32> {
-    let [least, largest] = ends.map(|end| end * factor as i32);
-    let beyond = ((largest - least) / 2 + factor as i32).max(FEWEST);
+/// What coarse matching found.
+pub(super) struct Coarse<'a> {
+    /// The small left image.
+    pub(super) small: &'a Image,
+    pub(super) matches: &'a Matches,
+    /// Those that count.
+    pub(super) found: &'a [Found],
+    /// The least and the largest disparity.
+    pub(super) ends: [i32; 2],
+    /// By how much images were shrunk.
+    pub(super) factor: usize,
+}
+
+/// The disparities found at full resolution, in ascending order.
+pub(super) fn disparities(pair: &StereoPair, coarse: &Coarse<'_>) -> Vec<i32> {
+    let [least, largest] = coarse.ends.map(|end| end * coarse.factor as i32);
+    let beyond = (largest - least) / 2 + coarse.factor as i32;
     let search = Search {
         pair,
         disparities: i64::from(least - beyond)..i64::from(largest + beyond) + 1,
-        down: matches.rows_down * factor as isize,
+        down: coarse.matches.rows_down * coarse.factor as isize,
     };
-    let places = places(pair, small, matches, found, ends, factor);
+    let places = coarse.places(pair.size());
     let level = Level::new();
     let of_chunk = |places: &[Place]| dispatch!(level, simd => search.verified(simd, places));
     let mut disparities: Vec<i32> = places.par_chunks(TOGETHER).flat_map_iter(of_chunk).collect();
@@ -77,31 +83,21 @@ pub(super) fn disparities(
     disparities
 }
 
-/// The places to examine.
-fn places(
-    pair: &StereoPair,
-    small: &Image,
-    matches: &Matches,
-    found: &[Found],
-    [least, largest]: [i32; 2],
-    factor: usize,
-) -> Vec<Place> {
-    let centre = |i: usize| i * factor + factor / 2;
-    let inside = |(x, y): (usize, usize)| Place { x: centre(x), y: centre(y), windows: INSIDE };
-    let at_end = |is_end: &dyn Fn(i32) -> bool| -> Vec<(usize, usize)> {
-        let all: Vec<_> = found.iter().filter(|&&(.., disparity)| is_end(disparity)).map(|&(x, y, _)| (x, y)).collect();
-        let step = all.len().div_ceil(AT_AN_END).max(1);
-        all.into_iter().step_by(step).collect()
-    };
-    let mut places: Vec<Place> = holes(small, matches).map(inside).collect();
-    places.extend(at_end(&|disparity| disparity <= least).into_iter().map(inside));
-    places.extend(at_end(&|disparity| disparity >= largest).into_iter().map(inside));
-    let (size, last) = (small.size(), pair.size().height.saturating_sub(2));
-    for (row, y) in [(0, 1), (size.height - 1, last)] {
-        let unsure = (0..size.width).filter(|&x| matches.at(x, row).is_none_or(|d| d <= least || d >= largest));
-        places.extend(unsure.map(|x| Place { x: centre(x), y, windows: AT_THE_BORDER }));
+impl Coarse<'_> {
+    /// The places to examine in images of this size.
+    fn places(&self, size: Size) -> Vec<Place> {
+        let Self { small, matches, found, ends: [_, largest], factor } = *self;
+        let centre = |i: usize| i * factor + factor / 2;
+        let inside = |(x, y): (usize, usize)| Place { x: centre(x), y: centre(y), windows: INSIDE };
+        let nearest: Vec<_> = found.iter().filter(|&&(.., disparity)| disparity >= largest).collect();
+        let some = nearest.iter().step_by(nearest.len().div_ceil(NEAREST).max(1));
+        let mut places: Vec<Place> = holes(small, matches).chain(some.map(|&&(x, y, _)| (x, y))).map(inside).collect();
+        // Of a floor that rises too steeply, coarse matches may be anything.
+        for y in [1, size.height.saturating_sub(2)] {
+            places.extend((0..small.size().width).map(|x| Place { x: centre(x), y, windows: AT_THE_BORDER }));
+        }
+        places
     }
-    places
 }
 
 /// In each cell of the small image with enough pixels without a match, the one with the most contrast between the columns beside
@@ -199,8 +195,7 @@ struct Best {
 
 impl Best {
     fn is_distinct(&self) -> bool {
-        let [cost, second] = [self.cost, self.second].map(u32::from);
-        5 * second >= 6 * cost && second >= cost + CLEARLY
+        u32::from(self.second) >= u32::from(self.cost) + CLEARLY
     }
 }
 
@@ -229,7 +224,7 @@ impl Compared {
         let last = width.checked_sub(half_width)?;
         let first = columns.start.max(half_width as i64 + 1) as usize;
         let end = usize::try_from(columns.end).ok()?.min(last);
-        if end < first + FEWEST as usize {
+        if end < first + FEWEST {
             return None;
         }
         self.window.read(own, at.x.checked_sub(half_width)?..at.x + half_width, rows(at.y)?)?;

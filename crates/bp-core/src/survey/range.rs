@@ -2,7 +2,7 @@
 
 use super::{
     coarse::{Found, Matches},
-    ends,
+    ends::{self, Coarse},
 };
 use crate::{Image, MAX_LABELS, Model, StereoPair};
 
@@ -74,7 +74,8 @@ impl SeenDisparities {
                 (outside([step * least, step * largest], step), margin(step * (largest - least)));
             return Some(Self { least, largest, margin: margin + step / 2 });
         };
-        let mut exact = ends::disparities(pair, small, matches, &inside, [least, largest], factor);
+        let mut exact =
+            ends::disparities(pair, &Coarse { small, matches, found: &inside, ends: [least, largest], factor });
         // Repeated pictures match far away; a pair that shows no negative disparity has none.
         exact.retain(|&disparity| least < 0 || disparity >= 0);
         let [least, largest] = joined([step * least, step * largest], step, &exact);
@@ -126,9 +127,32 @@ fn joined([least, largest]: [i32; 2], step: i32, exact: &[i32]) -> [i32; 2] {
 
 /// Ends that were found in shrunk images, half a shrunk pixel farther out. What is not negative remains so.
 fn outside([least, largest]: [i32; 2], step: i32) -> [i32; 2] {
-    [(least - step / 2).max(least.min(0)), largest + step / 2]
+    let farthest = if least < 0 { i32::MIN } else { 0 };
+    [(least - step / 2).max(farthest), largest + step / 2]
 }
 
 fn margin(range: i32) -> i32 {
     1 + range / MARGIN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::joined;
+
+    #[test]
+    fn ends_are_those_found_at_full_resolution_if_these_are_enough() {
+        let joined = |exact: &[i32]| joined([20, 60], 4, exact);
+        assert_eq!(joined(&[]), [18, 62], "half a small pixel farther out");
+        assert_eq!(joined(&[23, 23, 24, 24, 56, 56, 57, 57]), [23, 57]);
+        assert_eq!(joined(&[23, 23, 24, 25, 55, 56, 57, 57]), [18, 62], "too few");
+        assert_eq!(joined(&[12, 14, 40, 71]), [12, 71], "few count if they lie beyond");
+        assert_eq!(joined(&[11, 14, 40, 44]), [18, 62], "a far one needs another one near by");
+    }
+
+    #[test]
+    fn few_pairs_have_negative_disparities() {
+        assert_eq!(joined([0, 40], 4, &[]), [0, 42]);
+        assert_eq!(joined([-20, 40], 4, &[]), [-22, 42]);
+        assert_eq!(joined([-20, 40], 4, &[8, 9, 20]), [8, 42]);
+    }
 }
