@@ -19,12 +19,12 @@ const MARGIN: i32 = 20;
 /// narrow, so one place may be all that tells of them; far ones are not.
 const COMPANION: i32 = 16;
 
-/// The range of disparities that coarse matching found, in pixels of the pair.
+/// The range of disparities that a survey found, in pixels of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SeenDisparities {
-    /// The least disparity, ignoring one match in a thousand.
+    /// The least disparity.
     pub least: i32,
-    /// The largest disparity, ignoring one match in a thousand.
+    /// The largest disparity.
     pub largest: i32,
     /// How far off either may be.
     pub margin: i32,
@@ -70,9 +70,9 @@ impl SeenDisparities {
         let [least, largest] = outermost(&inside)?;
         let step = factor as i32;
         let Some((pair, small)) = closely else {
-            let ([least, largest], margin) =
-                (outside([step * least, step * largest], step), margin(step * (largest - least)));
-            return Some(Self { least, largest, margin: margin + step / 2 });
+            let margin = margin(step * (largest - least)) + step / 2;
+            let [least, largest] = outside([step * least, step * largest], step);
+            return Some(Self { least, largest, margin });
         };
         let mut exact =
             ends::disparities(pair, &Coarse { small, matches, found: &inside, ends: [least, largest], factor });
