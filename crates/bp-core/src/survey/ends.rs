@@ -3,7 +3,7 @@
 //! Windows of census codes are compared along their rows: at places without a coarse match, at some whose coarse match is among
 //! the nearest, and at the upper and lower border, where a floor rises too steeply for windows of several rows. A disparity
 //! counts if two windows of different shapes find it, each clearly better than all others, and back again from the right
-//! image. Hardly one in a hundred is then false.
+//! image. Some are false even so, but hardly any lies outside the true range.
 
 use std::ops::Range;
 
@@ -92,7 +92,7 @@ impl Coarse<'_> {
         let nearest: Vec<_> = found.iter().filter(|&&(.., disparity)| disparity >= largest).collect();
         let some = nearest.iter().step_by(nearest.len().div_ceil(NEAREST).max(1));
         let mut places: Vec<Place> = holes(small, matches).chain(some.map(|&&(x, y, _)| (x, y))).map(inside).collect();
-        // Of a floor that rises too steeply, coarse matches may be anything.
+        // All columns: coarse matches of a steep floor are often false.
         for y in [1, size.height.saturating_sub(2)] {
             places.extend((0..small.size().width).map(|x| Place { x: centre(x), y, windows: AT_THE_BORDER }));
         }
@@ -189,7 +189,7 @@ struct Best {
     column: usize,
     /// Differing bits, at most 255.
     cost: u8,
-    /// The least of those that are not beside it.
+    /// The least cost at columns more than [`BESIDE`] away.
     second: u8,
 }
 

@@ -15,8 +15,8 @@ const ENOUGH: usize = 4;
 /// The margin at either end is one part in this many of the range, and 1 px.
 const MARGIN: i32 = 20;
 
-/// A far disparity counts only if there is another one within one part in this many of the range. Near surfaces are often
-/// narrow, so one place may be all that tells of them; far ones are not.
+/// A far disparity counts only if there is another one within one part in this many of the range. Far
+/// surfaces are wide. Near ones are often narrow, so one place is enough for them.
 const COMPANION: i32 = 16;
 
 /// The range of disparities that a survey found, in pixels of the pair.

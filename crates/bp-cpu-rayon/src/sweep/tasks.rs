@@ -23,7 +23,7 @@ pub(super) struct Task {
     pub(super) part: Part,
     /// Its share of the message entries of its grid: that of a band's rows. Seams have none of their own.
     pub(super) updates: u64,
-    /// How many tasks read what it makes. A band is read by tasks of the next finer grid, a seam by the two bands beside it.
+    /// How many tasks read its result. Tasks of the next finer grid read a band; the two bands beside a seam read the seam.
     pub(super) readers: usize,
 }
 
