@@ -1,8 +1,13 @@
-//! Allocation that returns an error instead of ending the program, and a measurement of the rate of memory copies.
+//! Allocation that returns an error instead of ending the program, buffers in large pages, and a measurement of the rate of memory copies.
+
+mod buffer;
+mod pages;
 
 use std::{hint::black_box, mem::MaybeUninit, time::Instant};
 
 use rayon::prelude::*;
+
+pub use buffer::Buffer;
 
 use crate::{Error, IsStopped, never, stop::go_on};
 
@@ -64,8 +69,7 @@ fn reserve<T>(what: &'static str, values: &mut Vec<T>, len: usize) -> Result<(),
 /// Threads share the writing of this many bytes. In between it may be stopped.
 const MUCH: usize = 32 << 20;
 
-/// Fewer bytes are not worth a large page, which usually has 2 MiB.
-#[cfg(all(target_os = "linux", not(miri)))]
+/// The usual bytes of a large page. Fewer are not worth one.
 const LARGE: usize = 2 << 20;
 
 /// Asks Linux to map memory that was not written yet in large pages. The first write to each page costs a visit to the system;

@@ -1,6 +1,6 @@
 //! The data costs of one grid.
 
-use bp_core::{Error, IsStopped, Plan, memory};
+use bp_core::{Error, IsStopped, Plan, memory::Buffer};
 use fearless_simd::{Bytes as _, Simd, SimdBase, u16x16};
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::{
 /// Data costs `[height][plane][block][label]`, in the forms that messages and the sums of coarser grids need.
 pub(crate) struct Costs {
     /// Normalised by each node's least cost and clipped at [`Plan::clip`], unless sums fit 8 bits without that.
-    pub(crate) stored: Vec<Block>,
+    pub(crate) stored: Buffer<Block>,
     /// Neither normalised nor clipped. Only present if the plan keeps them.
     pub(crate) sums: Sums,
 }
@@ -21,10 +21,10 @@ pub(crate) struct Costs {
 pub(crate) enum Sums {
     /// None are kept, because the stored costs are used instead.
     None,
-    U8(Vec<Block>),
-    U16(Vec<Block<u16>>),
-    U32(Vec<Block<u32>>),
-    U64(Vec<Block<u64>>),
+    U8(Buffer<Block>),
+    U16(Buffer<Block<u16>>),
+    U32(Buffer<Block<u32>>),
+    U64(Buffer<Block<u64>>),
 }
 
 impl Costs {
@@ -33,28 +33,28 @@ impl Costs {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
             _ if !plan.keeps_sums(grid) => Sums::None,
-            1 => Sums::U8(memory::filled_unless(is_stopped, what, len, Block::ZERO)?),
-            2 => Sums::U16(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
-            4 => Sums::U32(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
-            _ => Sums::U64(memory::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
+            1 => Sums::U8(Buffer::filled_unless(is_stopped, what, len, Block::ZERO)?),
+            2 => Sums::U16(Buffer::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
+            4 => Sums::U32(Buffer::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
+            _ => Sums::U64(Buffer::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
         };
-        Ok(Self { stored: memory::filled_unless(is_stopped, "data cost", len, Block::ZERO)?, sums })
+        Ok(Self { stored: Buffer::filled_unless(is_stopped, "data cost", len, Block::ZERO)?, sums })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { stored: Vec::new(), sums: Sums::None }
+        Self { stored: Buffer::default(), sums: Sums::None }
     }
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.stored)
+        self.stored.bytes()
             + match &self.sums {
                 Sums::None => 0,
-                Sums::U8(sums) => memory::bytes(sums),
-                Sums::U16(sums) => memory::bytes(sums),
-                Sums::U32(sums) => memory::bytes(sums),
-                Sums::U64(sums) => memory::bytes(sums),
+                Sums::U8(sums) => sums.bytes(),
+                Sums::U16(sums) => sums.bytes(),
+                Sums::U32(sums) => sums.bytes(),
+                Sums::U64(sums) => sums.bytes(),
             }
     }
 }

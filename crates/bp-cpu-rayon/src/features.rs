@@ -4,7 +4,7 @@ use bp_core::{
     Error, Image, Node, Plan, Profile, Size, StereoPair,
     census::{INNER, Neighbours, OUTER},
     image::APRON,
-    memory,
+    memory::{self, Buffer},
 };
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
@@ -15,14 +15,14 @@ use crate::shape::{MIN_ROWS, WIDEST, deal, every_second};
 pub(crate) struct Features {
     profile: Profile,
     lanes: usize,
-    left: Vec<u8>,
+    left: Buffer<u8>,
     /// Every row of lanes has [`WIDEST`] lanes of padding on both sides.
-    right: Vec<u8>,
+    right: Buffer<u8>,
     /// 255 where the right image has a column, otherwise 0: `[parity][lane]`, with the same padding as `right`.
     inside: [Vec<u8>; 2],
     /// Values of both images and around them (see [`Image::grey_near`]), `[height][plane][width]` with [`APRON`] more rows
     /// and columns on every side. Only profiles that compare neighbours need them; see [`padded_planes`].
-    padded: [Vec<u8>; 2],
+    padded: [Buffer<u8>; 2],
 }
 
 impl Features {
@@ -30,7 +30,7 @@ impl Features {
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
         let (size, profile, lanes) = (plan.pair_size(), plan.model().profile(), lanes(plan));
         let rows = 2 * profile.channels() * size.height;
-        let padded = || memory::filled("neighbours' values", padded_bytes(size, profile), 0);
+        let padded = || Buffer::filled("neighbours' values", padded_bytes(size, profile), 0);
         let inside = |parity: usize| {
             let nodes = (size.width + 1 - parity) / 2;
             let lane = |lane: usize| if (WIDEST..WIDEST + nodes).contains(&lane) { u8::MAX } else { 0 };
@@ -39,8 +39,8 @@ impl Features {
         Ok(Self {
             profile,
             lanes,
-            left: memory::filled("images", rows * lanes, 0)?,
-            right: memory::filled("images", rows * (lanes + 2 * WIDEST), 0)?,
+            left: Buffer::filled("images", rows * lanes, 0)?,
+            right: Buffer::filled("images", rows * (lanes + 2 * WIDEST), 0)?,
             inside: [inside(0), inside(1)],
             padded: [padded()?, padded()?],
         })
@@ -76,7 +76,8 @@ impl Features {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        [&self.left, &self.right].into_iter().chain(&self.inside).chain(&self.padded).map(memory::bytes).sum()
+        let buffers = [&self.left, &self.right].into_iter().chain(&self.padded).map(Buffer::bytes);
+        buffers.chain(self.inside.iter().map(memory::bytes)).sum()
     }
 }
 

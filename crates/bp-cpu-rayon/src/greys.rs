@@ -1,6 +1,6 @@
 //! The grey values of a grid. They determine the levels of edges; see [`bp_core::EdgeLevels`].
 
-use bp_core::{EdgeLevels, Error, Image, Model, Plan, memory};
+use bp_core::{EdgeLevels, Error, Image, Model, Plan, memory::Buffer};
 use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, dispatch, u8x16, u32x4};
 use rayon::prelude::*;
 
@@ -15,13 +15,13 @@ use crate::{
 pub(crate) struct Greys {
     shape: Shape,
     edges: EdgeLevels,
-    values: Vec<u8>,
+    values: Buffer<u8>,
 }
 
 impl Greys {
     /// Allocates room for the grey values of `grid`.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        let values = memory::filled("grey values", bytes(plan, grid) as usize, 0)?;
+        let values = Buffer::filled("grey values", bytes(plan, grid) as usize, 0)?;
         Ok(Self { shape: Shape::new(plan, grid), edges: *plan.model().edges(), values })
     }
 
@@ -87,7 +87,7 @@ impl Greys {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.values)
+        self.values.bytes()
     }
 }
 

@@ -32,7 +32,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use bp_core::{Error, Patch, Plan, Seam, Side, memory};
+use bp_core::{Error, Patch, Plan, Seam, Side, memory::Buffer};
 use fearless_simd::Level;
 
 pub(crate) use costs::CostSource;
@@ -60,13 +60,13 @@ pub(crate) struct Band {
     lists: Lists,
     messages: Messages,
     /// The labels, if any are decided, `[row][width]`.
-    labels: Vec<u16>,
+    labels: Buffer<u16>,
 }
 
 impl Band {
     /// Allocates room for so many patches and entries.
     fn new(plan: &Plan, grid: usize, patches: usize, entries: usize) -> Result<Self, Error> {
-        let mut band = Self { labels: memory::filled("labels", Self::labels(plan, grid), 0)?, ..Self::default() };
+        let mut band = Self { labels: Buffer::filled("labels", Self::labels(plan, grid), 0)?, ..Self::default() };
         if grid > 0 {
             band.lists.fit(patches, entries)?;
             band.messages.fit(room::most_rows(plan, grid), entries)?;
@@ -89,7 +89,7 @@ impl Band {
 
     /// The bytes held.
     fn bytes(&self) -> u64 {
-        self.lists.bytes() + self.messages.bytes() + memory::bytes(&self.labels)
+        self.lists.bytes() + self.messages.bytes() + self.labels.bytes()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, IsStopped, Node, Plan, Side, memory};
+use bp_core::{Error, IsStopped, Node, Plan, Side, memory::Buffer};
 use fearless_simd::{Simd, SimdBase};
 
 use crate::{
@@ -23,19 +23,19 @@ const PLANES: usize = 4;
 /// came the other way, and the other end reads the new one before it answers. Row y of storage holds the edges up from
 /// row y, those inside row y, and a block of every label to work with. A row of zeros follows the last one.
 pub(crate) struct Edges {
-    values: Vec<Block>,
+    values: Buffer<Block>,
 }
 
 impl Edges {
     /// Allocates room for the edges of `grid`, which is also enough for every coarser grid.
     pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         let blocks = volume(&Shape::new(plan, grid));
-        Ok(Self { values: memory::filled_unless(is_stopped, "messages", blocks, Block::ZERO)? })
+        Ok(Self { values: Buffer::filled_unless(is_stopped, "messages", blocks, Block::ZERO)? })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { values: Vec::new() }
+        Self { values: Buffer::default() }
     }
 
     /// The rows of a grid.
@@ -50,7 +50,7 @@ impl Edges {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.values)
+        self.values.bytes()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The labels of a grid, as they are decided.
 
-use bp_core::{Error, Plan, memory};
+use bp_core::{Error, Plan, memory::Buffer};
 use rayon::prelude::*;
 
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
 
 /// Labels by checkerboard colour, `[row][block]`: a block with their low bytes and one with their high bytes.
 pub(crate) struct Labels {
-    by_colour: [Vec<Block>; 2],
+    by_colour: [Buffer<Block>; 2],
 }
 
 /// The blocks of a row of one colour.
@@ -28,18 +28,18 @@ impl Labels {
     /// Allocates room for the labels of grid 0.
     pub(crate) fn new(plan: &Plan) -> Result<Self, Error> {
         let shape = Shape::new(plan, 0);
-        let of_colour = || memory::filled("labels", row(&shape) * shape.size.height, Block::ZERO);
+        let of_colour = || Buffer::filled("labels", row(&shape) * shape.size.height, Block::ZERO);
         Ok(Self { by_colour: [of_colour()?, of_colour()?] })
     }
 
     /// Allocates nothing.
     pub(crate) fn none() -> Self {
-        Self { by_colour: [Vec::new(), Vec::new()] }
+        Self { by_colour: [Buffer::default(), Buffer::default()] }
     }
 
     /// The rows by colour, which threads can split by [`row`].
     pub(crate) fn rows_mut(&mut self) -> [&mut [Block]; 2] {
-        self.by_colour.each_mut().map(Vec::as_mut_slice)
+        self.by_colour.each_mut().map(|labels| &mut **labels)
     }
 
     /// Writes them in order, `[height][width]`.
@@ -58,6 +58,6 @@ impl Labels {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        self.by_colour.iter().map(memory::bytes).sum()
+        self.by_colour.iter().map(Buffer::bytes).sum()
     }
 }

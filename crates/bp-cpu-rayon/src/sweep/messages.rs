@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bp_core::{Error, Side, memory};
+use bp_core::{Error, Side, memory::Buffer};
 
 use super::padded::Padded;
 use crate::block::Block;
@@ -13,12 +13,12 @@ use crate::block::Block;
 #[derive(Default)]
 pub(crate) struct Messages {
     /// Edges inside pairs of columns.
-    pub(crate) same: Vec<Block>,
+    pub(crate) same: Buffer<Block>,
     /// Edges between pairs: lane i lies between lane i of plane 1 and lane i + 1 of plane 0, which may belong to the next
     /// patch. Lane -1 belongs to the patch before.
-    pub(crate) next: Vec<Padded>,
+    pub(crate) next: Buffer<Padded>,
     /// Edges up from the nodes of each row, and those down from the last one, `[row][plane][entry]`.
-    pub(crate) vertical: Vec<Block>,
+    pub(crate) vertical: Buffer<Block>,
 }
 
 /// The bytes of the messages of so many rows with so many entries each.
@@ -32,9 +32,9 @@ impl Messages {
     /// Makes room for the messages of so many rows with so many entries each.
     pub(crate) fn fit(&mut self, rows: usize, entries: usize) -> Result<(), Error> {
         let what = "messages";
-        memory::grow(what, &mut self.same, rows.saturating_mul(entries), Block::ZERO)?;
-        memory::grow(what, &mut self.next, rows.saturating_mul(entries), Padded::ZERO)?;
-        memory::grow(what, &mut self.vertical, (2 * (rows + 1)).saturating_mul(entries), Block::ZERO)
+        self.same.grow(what, rows.saturating_mul(entries), Block::ZERO)?;
+        self.next.grow(what, rows.saturating_mul(entries), Padded::ZERO)?;
+        self.vertical.grow(what, (2 * (rows + 1)).saturating_mul(entries), Block::ZERO)
     }
 
     /// The edges of the nodes of `plane` in a row, for these entries of all. Rows are counted from the first one.
@@ -81,7 +81,7 @@ impl Messages {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.same) + memory::bytes(&self.next) + memory::bytes(&self.vertical)
+        self.same.bytes() + self.next.bytes() + self.vertical.bytes()
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::{array, cmp::Ordering, hint::black_box};
 
-use bp_core::{BAND_ROWS, EdgeLevels, Error, MAX_TRUNCATION, memory};
+use bp_core::{BAND_ROWS, EdgeLevels, Error, MAX_TRUNCATION, memory::Buffer};
 use fearless_simd::{Simd, SimdBase, SimdCombine, SimdInt, u8x16};
 
 use super::{
@@ -34,7 +34,7 @@ const BELOW: usize = 2;
 /// The messages of a few coarse rows, for the lists of finer rows: `[row mod 3][side][entry]`.
 #[derive(Default)]
 pub(crate) struct CoarseRows {
-    values: Vec<Padded>,
+    values: Buffer<Padded>,
     /// To the lists of the coarser patch, and of those to its left and right.
     routes: [Routes; 3],
     /// The coarse rows that are held, and the band that the routes belong to.
@@ -61,7 +61,7 @@ struct Reading<'a> {
 impl CoarseRows {
     /// Makes room for so many entries.
     pub(crate) fn fit(&mut self, entries: usize) -> Result<(), Error> {
-        memory::grow("messages", &mut self.values, (ROWS * SIDES).saturating_mul(entries), Padded::ZERO)?;
+        self.values.grow("messages", (ROWS * SIDES).saturating_mul(entries), Padded::ZERO)?;
         self.routes.iter_mut().try_for_each(|routes| routes.fit(entries))
     }
 
@@ -72,7 +72,7 @@ impl CoarseRows {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        memory::bytes(&self.values) + self.routes.iter().map(Routes::bytes).sum::<u64>()
+        self.values.bytes() + self.routes.iter().map(Routes::bytes).sum::<u64>()
     }
 
     /// Reads the coarse rows that a finer row is interpolated between.

@@ -1,6 +1,6 @@
 //! What was prepared for each seam of a swept grid; see [`bp_core::Seam`].
 
-use bp_core::{Error, Plan, Seam, memory};
+use bp_core::{Error, Plan, Seam, memory::Buffer};
 
 use super::lists::{self, Lists, sources};
 use crate::block::Block;
@@ -11,9 +11,9 @@ pub(crate) struct Prepared {
     /// The labels that the messages have values for.
     pub(crate) lists: Lists,
     /// The messages across it from above, then those from below, both `[plane][entry]`.
-    pub(crate) messages: [Vec<Block>; 2],
+    pub(crate) messages: [Buffer<Block>; 2],
     /// The labels of [`Seam::label_rows`], if the grid decides any.
-    pub(crate) labels: Vec<u16>,
+    pub(crate) labels: Buffer<u16>,
 }
 
 /// The number of labels of a seam.
@@ -31,7 +31,7 @@ pub(crate) fn bytes(plan: &Plan, grid: usize, patches: usize, entries: usize) ->
 impl Prepared {
     /// Makes room for the labels of a seam, which does not depend on its lists.
     pub(crate) fn new(plan: &Plan, grid: usize) -> Result<Self, Error> {
-        Ok(Self { labels: memory::filled("labels", labels(plan, grid), 0)?, ..Self::default() })
+        Ok(Self { labels: Buffer::filled("labels", labels(plan, grid), 0)?, ..Self::default() })
     }
 
     /// Makes room for so many patches and entries.
@@ -42,7 +42,7 @@ impl Prepared {
 
     /// Makes room for messages with so many entries.
     pub(crate) fn fit_messages(&mut self, entries: usize) -> Result<(), Error> {
-        self.messages.iter_mut().try_for_each(|messages| memory::grow("messages", messages, 2 * entries, Block::ZERO))
+        self.messages.iter_mut().try_for_each(|messages| messages.grow("messages", 2 * entries, Block::ZERO))
     }
 
     /// The labels of the row above it, if any are decided.
@@ -70,8 +70,8 @@ impl Prepared {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        let messages: u64 = self.messages.iter().map(memory::bytes).sum();
-        self.lists.bytes() + messages + memory::bytes(&self.labels)
+        let messages: u64 = self.messages.iter().map(Buffer::bytes).sum();
+        self.lists.bytes() + messages + self.labels.bytes()
     }
 }
 

@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use bp_core::{BAND_ROWS, Error, Plan, Seam, Side, memory};
+use bp_core::{BAND_ROWS, Error, Plan, Seam, Side, memory::Buffer};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
@@ -29,7 +29,7 @@ pub(crate) struct Swept {
     grids: Vec<Kept>,
     tasks: Vec<Task>,
     /// The labels of the finest grid that was swept, by band.
-    answer: Vec<Mutex<Vec<u16>>>,
+    answer: Vec<Mutex<Buffer<u16>>>,
     /// Whether that is grid 0.
     is_whole: bool,
     /// The message entries computed so far in a solve.
@@ -66,7 +66,7 @@ impl Swept {
         windows.fit(plan, patches, entries)?;
         let size = plan.image_size();
         let labels =
-            |band| memory::filled("labels", band_rows(size.height, band).len() * size.width, 0).map(Mutex::new);
+            |band| Buffer::filled("labels", band_rows(size.height, band).len() * size.width, 0).map(Mutex::new);
         let answer = (0..size.height.div_ceil(BAND_ROWS)).map(labels).collect::<Result<_, _>>()?;
         Ok(Self { windows, grids, tasks, answer, is_whole: false, updates: AtomicU64::new(0) })
     }
@@ -214,7 +214,7 @@ impl Swept {
 
     /// The bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        let bytes = |labels: &Mutex<Vec<u16>>| memory::bytes(&labels.lock().unwrap_or_else(PoisonError::into_inner));
+        let bytes = |labels: &Mutex<Buffer<u16>>| labels.lock().unwrap_or_else(PoisonError::into_inner).bytes();
         let answer: u64 = self.answer.iter().map(bytes).sum();
         self.windows.bytes() + answer + self.grids.iter().map(Kept::bytes).sum::<u64>()
     }

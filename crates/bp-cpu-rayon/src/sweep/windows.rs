@@ -5,7 +5,10 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use bp_core::{BAND_ROWS, Error, LabelSet, Patch, Plan, Schedule, memory};
+use bp_core::{
+    BAND_ROWS, Error, LabelSet, Patch, Plan, Schedule,
+    memory::{self, Buffer},
+};
 
 use super::{
     Sweep,
@@ -31,7 +34,7 @@ pub(crate) struct Work {
     /// The label sets of the patches.
     pub(crate) sets: Vec<LabelSet>,
     /// Data costs, `[row][plane][entry]`.
-    pub(crate) costs: Vec<Block>,
+    pub(crate) costs: Buffer<Block>,
     pub(crate) coarse_rows: CoarseRows,
     pub(crate) crossings: Crossings,
 }
@@ -64,7 +67,7 @@ impl Work {
 
     /// Makes room for so many rows with so many entries each.
     pub(crate) fn fit(&mut self, rows: usize, entries: usize) -> Result<(), Error> {
-        memory::grow("data cost", &mut self.costs, costs(rows).saturating_mul(entries), Block::ZERO)?;
+        self.costs.grow("data cost", costs(rows).saturating_mul(entries), Block::ZERO)?;
         self.coarse_rows.fit(entries)?;
         self.crossings.fit(entries)
     }
@@ -77,7 +80,7 @@ impl Work {
     }
 
     fn bytes(&self) -> u64 {
-        memory::bytes(&self.sets) + memory::bytes(&self.costs) + self.coarse_rows.bytes() + self.crossings.bytes()
+        memory::bytes(&self.sets) + self.costs.bytes() + self.coarse_rows.bytes() + self.crossings.bytes()
     }
 }
 
