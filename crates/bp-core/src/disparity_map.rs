@@ -79,12 +79,6 @@ impl DisparityMap {
         self
     }
 
-    /// The map with other values, of which those that are not finite are [`DisparityMap::UNKNOWN`].
-    pub(crate) fn with(self, values: Vec<f32>) -> Self {
-        debug_assert_eq!(values.len(), self.size.pixels());
-        Self { values, ..self }
-    }
-
     /// Width and height.
     #[must_use]
     pub fn size(&self) -> Size {

@@ -1,7 +1,7 @@
 //! Sub-pixel refinement.
 
 use super::{means::write_means, offsets::write_offsets};
-use crate::{DisparityMap, Error, IsStopped, StereoPair, memory, metrics::check_size};
+use crate::{DisparityMap, Error, IsStopped, StereoPair, memory::Buffer, metrics::check_size};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
@@ -15,13 +15,15 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
     let width = map.size().width;
-    let mut other = memory::filled_unless(is_stopped, "a map", map.values().len(), 0.0)?;
-    write_means(width, map.values(), &mut other, is_stopped)?;
+    let mut other = Buffer::filled_unless(is_stopped, "a map", map.values().len(), 0.0)?;
     let mut refined = Ok(());
-    let map = map.replaced(|values| refined = write_offsets(pair, &other, least..=largest, values, is_stopped));
-    refined?;
-    write_means(width, map.values(), &mut other, is_stopped)?;
-    Ok(map.with(other))
+    let map = map.replaced(|values| {
+        refined = write_means(width, values, &mut other, is_stopped)
+            .and_then(|()| write_offsets(pair, &other, least..=largest, values, is_stopped))
+            .and_then(|()| write_means(width, values, &mut other, is_stopped));
+        values.copy_from_slice(&other);
+    });
+    refined.map(|()| map)
 }
 
 #[cfg(test)]
