@@ -41,7 +41,8 @@ impl DisparityMap {
         assert_eq!(labels.len(), size.pixels(), "one label a pixel");
         let mut values = Vec::with_capacity(labels.len());
         memory::ask_for_large_pages(values.spare_capacity_mut());
-        values.extend(labels.iter().map(|&label| model.disparity(label) as f32));
+        let labels = labels.par_iter().with_min_len(TOGETHER);
+        labels.map(|&label| model.disparity(label) as f32).collect_into_vec(&mut values);
         Self { size, values }
     }
 
@@ -71,6 +72,15 @@ impl DisparityMap {
         for (value, _) in self.values.iter_mut().zip(valid).filter(|(_, valid)| !**valid) {
             *value = Self::UNKNOWN;
         }
+    }
+
+    /// The map with other values, which are copied by the threads of the current pool. Those that are not finite are
+    /// [`DisparityMap::UNKNOWN`].
+    pub(crate) fn with(self, values: &[f32]) -> Self {
+        self.replaced(|own| {
+            let parts = own.par_chunks_mut(TOGETHER).zip(values.par_chunks(TOGETHER));
+            parts.for_each(|(own, values)| own.copy_from_slice(values));
+        })
     }
 
     /// The map after `change` has edited its values. `change` must set non-finite values to [`DisparityMap::UNKNOWN`].
@@ -115,12 +125,12 @@ impl DisparityMap {
 
     /// [`DisparityMap::range`], found by the threads of the current pool.
     pub(crate) fn range_by_threads(&self) -> Option<(f32, f32)> {
-        known(self.values.par_chunks(RANGED).map(range_of).reduce(|| NOTHING, joined))
+        known(self.values.par_chunks(TOGETHER).map(range_of).reduce(|| NOTHING, joined))
     }
 }
 
-/// How many values one thread finds the range of at a time.
-const RANGED: usize = 1 << 16;
+/// How many values one thread works on at a time.
+const TOGETHER: usize = 1 << 15;
 
 /// The range of no values.
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);

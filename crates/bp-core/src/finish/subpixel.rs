@@ -21,9 +21,8 @@ pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>)
         refined = write_means(width, values, &mut other, is_stopped)
             .and_then(|()| write_offsets(pair, &other, least..=largest, values, is_stopped))
             .and_then(|()| write_means(width, values, &mut other, is_stopped));
-        values.copy_from_slice(&other);
     });
-    refined.map(|()| map)
+    refined.map(|()| map.with(&other))
 }
 
 #[cfg(test)]

@@ -56,6 +56,15 @@ impl<T: Copy + Send + Sync> Buffer<T> {
     /// # Errors
     /// As [`Self::filled`], and [`Error::Stopped`].
     pub fn filled_unless(is_stopped: IsStopped<'_>, what: &'static str, len: usize, value: T) -> Result<Self, Error> {
+        Self::new(what, len, |values| fill(is_stopped, values, value))
+    }
+
+    /// A buffer whose values are written by `fill`: all of them, unless it fails.
+    fn new(
+        what: &'static str,
+        len: usize,
+        fill: impl FnOnce(&mut [MaybeUninit<T>]) -> Result<(), Error>,
+    ) -> Result<Self, Error> {
         const { assert!(align_of::<T>() <= LINE && size_of::<T>() > 0) };
         let memory = len.checked_mul(size_of::<T>()).and_then(Memory::new);
         let needed = (len as u64).saturating_mul(size_of::<T>() as u64);
@@ -64,11 +73,12 @@ impl<T: Copy + Send + Sync> Buffer<T> {
         // SAFETY: the memory holds so many values, aligned at lines, and belongs to nobody else.
         #[expect(unsafe_code, reason = "memory of our own")]
         let values = unsafe { slice::from_raw_parts_mut(start.cast().as_ptr(), len) };
-        fill(is_stopped, values, value)?;
+        fill(values)?;
         Ok(Self { start, len, _memory: memory })
     }
 
-    /// Replaces the buffer by one with copies of `value`, if it has fewer than `len` values.
+    /// Replaces the buffer by one with copies of `value`, if it has fewer than `len` values. Only this thread writes it, because it
+    /// may hold a lock: while a thread waits for others, it may take up work that needs the same lock.
     ///
     /// # Errors
     /// As [`Self::filled`]. The buffer is then empty.
@@ -76,7 +86,10 @@ impl<T: Copy + Send + Sync> Buffer<T> {
         if len > self.len {
             // Its memory may be part of what is allocated next.
             *self = Self::default();
-            *self = Self::filled(what, len, value)?;
+            *self = Self::new(what, len, |values| {
+                values.fill(MaybeUninit::new(value));
+                Ok(())
+            })?;
         }
         Ok(())
     }
@@ -124,7 +137,7 @@ fn fill<T: Copy + Send + Sync>(
     let [much, large] = [MUCH, LARGE].map(|bytes| bytes / size_of::<T>());
     for part in values.chunks_mut(much) {
         go_on(is_stopped)?;
-        if part.len() == much && rayon::current_thread_index().is_some() {
+        if part.len() > large && rayon::current_thread_index().is_some() {
             part.par_chunks_mut(large).for_each(|part| part.fill(MaybeUninit::new(value)));
         } else {
             part.fill(MaybeUninit::new(value));
