@@ -10,7 +10,6 @@
 mod coarser;
 mod costs;
 mod crossings;
-mod decided;
 mod decode;
 mod edges;
 mod kept;
@@ -207,7 +206,7 @@ impl Sweep<'_> {
         index: usize,
         beside: Beside<'_>,
         (lists, messages, work): (&Lists, &mut Messages, &mut Work),
-        then: impl FnOnce(&mut Pass<'_>),
+        then: impl FnOnce(&Pass<'_>),
     ) {
         let rows = self.band_rows(index);
         self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
@@ -226,7 +225,7 @@ impl Sweep<'_> {
             pass.backward(rows.clone());
             start = Start::Held;
         }
-        then(&mut pass);
+        then(&pass);
     }
 }
 

@@ -95,6 +95,22 @@ fn a_high_image_equals_the_reference() -> Result<(), Difference> {
 }
 
 /// Eight threads sweep a plan that was prepared for one thread, and vice versa.
+/// Labels are decided in chunks. With small steps and large truncations, those of neighbours lie far outside a chunk and still count.
+#[test]
+fn labels_of_neighbours_far_from_a_chunk_equal_the_reference() -> Result<(), Difference> {
+    let labels = 300;
+    let [scalar, rayon] = [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()];
+    for pair in [noise_pair(130, 40, 6), stepped_pair(400, 40, labels)] {
+        let settings = Settings { grids: 2, ..Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep) };
+        for (slope, truncation) in [(1, 63), (2, 63), (1, 40), (0, 63), (200, 5)] {
+            let model = Model::new(Profile::Census, labels).unwrap().with_smoothness(slope, truncation).unwrap();
+            let case = Case::new(pair.clone(), model, settings).unwrap();
+            POOLS[0].install(|| compare(scalar.as_ref(), rayon.as_ref(), &case))?;
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn a_matcher_may_move_to_another_pool() {
     let pair = noise_pair(90, 200, 4);
