@@ -10,6 +10,7 @@
 mod coarser;
 mod costs;
 mod crossings;
+mod decided;
 mod decode;
 mod edges;
 mod kept;
@@ -206,7 +207,7 @@ impl Sweep<'_> {
         index: usize,
         beside: Beside<'_>,
         (lists, messages, work): (&Lists, &mut Messages, &mut Work),
-        then: impl FnOnce(&Pass<'_>),
+        then: impl FnOnce(&mut Pass<'_>),
     ) {
         let rows = self.band_rows(index);
         self.count(lists, rows.clone(), |patch, labels| self.plan.band_messages(self.grid, patch) * labels);
@@ -225,7 +226,7 @@ impl Sweep<'_> {
             pass.backward(rows.clone());
             start = Start::Held;
         }
-        then(&pass);
+        then(&mut pass);
     }
 }
 

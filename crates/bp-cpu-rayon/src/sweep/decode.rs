@@ -9,13 +9,15 @@
 //! label = the smallest d with the lowest sum
 //! ```
 
-use std::ops::Range;
+use std::{mem, ops::Range};
 
-use bp_core::{MAX_TRUNCATION, Model, Smoothness};
+use bp_core::{EdgeLevels, MAX_TRUNCATION, Model};
 use fearless_simd::{Select, Simd, SimdBase, SimdInt, dispatch};
 
 use super::{
-    edges::{levels, of_sides},
+    Sweep,
+    decided::Labels,
+    edges::{levels, of_edges, of_sides},
     lists::List,
     messages::Place,
     padded::Padded,
@@ -26,66 +28,55 @@ use crate::{
     greys::Around,
 };
 
-/// A distance of labels that costs the truncation for every slope but 0.
-const FAR: usize = MAX_TRUNCATION as usize + 1;
-
-/// The labels compared at a time span less than this. Decided labels are clamped to [`FAR`] beyond either end of such a chunk,
-/// so distances to them stay within 8 bits.
-const CHUNK: usize = 256 - 2 * FAR;
-
-/// The labels of the nodes of a block.
-type Labels = [u16; LANES];
-
 impl Pass<'_> {
     /// Decides the labels of these rows, `[row][width]`, given those of the row above, if there are any.
-    pub(crate) fn decode(&self, rows: Range<usize>, above: Option<&[u16]>, labels: &mut [u16]) {
-        let level = self.sweep.level;
-        let mut above = above;
-        for (row, y) in labels.chunks_exact_mut(self.sweep.layout.size.width).zip(rows) {
-            let joined = above.filter(|_| self.sweep.layout.joined_above(y));
+    pub(crate) fn decode(&mut self, rows: Range<usize>, above: Option<&[u16]>, labels: &mut [u16]) {
+        let Sweep { level, layout, .. } = *self.sweep;
+        if let Some(above) = above {
+            // Two rows have the same place, and this one needs not exist.
+            self.work.decided.read(rows.start + 1, above);
+        }
+        for (row, y) in labels.chunks_exact_mut(layout.size.width).zip(rows.clone()) {
+            let joined = (y > rows.start || above.is_some()) && layout.joined_above(y);
             dispatch!(level, simd => self.decode_row(simd, y, joined, row));
-            above = Some(row);
         }
     }
 
     #[inline(always)]
-    fn decode_row<S: Simd>(&self, simd: S, y: usize, above: Option<&[u16]>, row: &mut [u16]) {
-        let patches = 0..self.lists.patches();
-        for patch in patches.clone() {
-            write(row, patch, self.decide::<_, false>(simd, patch, y, above, row));
+    fn decode_row<S: Simd>(&mut self, simd: S, y: usize, has_above: bool, row: &mut [u16]) {
+        let mut decided = mem::take(&mut self.work.decided);
+        // Even nodes come first.
+        for patch in 0..self.lists.patches() {
+            let known = [decided.of(y + 1, y % 2, patch, 0); 3];
+            let labels = self.decide::<_, false>(simd, patch, y, has_above, known);
+            decided.write(y, y % 2, patch, &labels);
         }
-        // Written one patch late: the next one reads a column of this one, and would wait for it.
-        let mut late = None;
-        for patch in patches {
-            let planes = self.decide::<_, true>(simd, patch, y, above, row);
-            if let Some((patch, planes)) = late.replace((patch, planes)) {
-                write(row, patch, planes);
-            }
+        let (plane, other) = (1 - y % 2, y % 2);
+        for patch in 0..self.lists.patches() {
+            let beside = decided.of(y, other, patch, if plane == 0 { -1 } else { 1 });
+            let known = [decided.of(y, other, patch, 0), beside, decided.of(y + 1, plane, patch, 0)];
+            let labels = self.decide::<_, true>(simd, patch, y, has_above, known);
+            decided.write(y, plane, patch, &labels);
         }
-        if let Some((patch, planes)) = late {
-            write(row, patch, planes);
-        }
+        decided.copy_to(y, row);
+        self.work.decided = decided;
     }
 
-    /// Decides the labels of the even or the odd nodes of a patch. Even nodes come first.
+    /// Decides the labels of the even or the odd nodes of a patch. `known` are labels by slot: of the neighbour in the same pair of
+    /// columns, of that in the next pair, and of that above. Even nodes make use of the last only.
     #[inline(always)]
     fn decide<S: Simd, const ODD: bool>(
         &self,
         simd: S,
         patch: usize,
         y: usize,
-        above: Option<&[u16]>,
-        row: &[u16],
-    ) -> [Labels; 2] {
+        has_above: bool,
+        known: [&Labels; 3],
+    ) -> Labels {
         let plane = if ODD { 1 - y % 2 } else { y % 2 };
         let (entries, range) = (self.lists.entries(), self.lists.range(patch));
         let place = Place { entries, row: y - self.rows.start, plane, range: &range };
         let messages = self.messages.at(&place);
-        let first = (2 * LANES * patch + plane) as isize;
-        let [left, right] = if ODD { [first - 1, first + 1].map(|x| every_second(row, x)) } else { [[0; LANES]; 2] };
-        // By slot: the neighbour in the same pair of columns, that in the next pair, and that above.
-        let [same, next] = if plane == 0 { [right, left] } else { [left, right] };
-        let known = [same, next, every_second(above.unwrap_or_default(), first)];
         let undecided = Undecided {
             plane,
             list: self.lists.list(patch),
@@ -95,51 +86,20 @@ impl Pass<'_> {
             below: messages.below,
             model: self.sweep.plan.model(),
             lane: LANES * patch,
-            masks: self.masks(plane, above.is_some()),
+            masks: self.masks(plane, has_above),
             greys: self.sweep.layout.around(plane, y),
         };
-        let labels = if undecided.greys.is_some() {
-            undecided.decide::<_, ODD, true>(simd, &known)
+        if undecided.greys.is_some() {
+            undecided.decide::<_, ODD, true>(simd, known)
         } else {
-            undecided.decide::<_, ODD, false>(simd, &known)
-        };
-        if plane == 0 { [labels, same] } else { [same, labels] }
+            undecided.decide::<_, ODD, false>(simd, known)
+        }
     }
 
     /// By slot, 255 where a node has a neighbour, `[lane]`.
     fn masks(&self, plane: usize, has_above: bool) -> [&[u8]; 3] {
         let [same, next] = self.sweep.layout.masks(plane);
         [same, next, self.sweep.layout.none_and_all()[usize::from(has_above)]]
-    }
-}
-
-/// The labels of every second column from x on; 0 outside the image.
-#[inline(always)]
-fn every_second(row: &[u16], x: isize) -> Labels {
-    let mut labels = [0; LANES];
-    let inside = usize::try_from(x).ok().and_then(|x| row.get(x..)?.first_chunk::<{ 2 * LANES - 1 }>());
-    // A known number of columns is dealt by vectors.
-    if let Some(columns) = inside {
-        labels.iter_mut().enumerate().for_each(|(lane, label)| *label = columns[2 * lane]);
-        return labels;
-    }
-    let first = usize::from(x < 0);
-    let columns = row.get((x + 2 * first as isize) as usize..).unwrap_or_default();
-    labels[first..].iter_mut().zip(columns.iter().step_by(2)).for_each(|(label, &decided)| *label = decided);
-    labels
-}
-
-/// Writes the labels of both planes of a patch, as far as there are columns.
-#[inline(always)]
-fn write(row: &mut [u16], patch: usize, planes: [Labels; 2]) {
-    let columns = &mut row[2 * LANES * patch..];
-    let mut labels = [0; 2 * LANES];
-    for (pair, (even, odd)) in labels.chunks_exact_mut(2).zip(planes[0].iter().zip(&planes[1])) {
-        (pair[0], pair[1]) = (*even, *odd);
-    }
-    match columns.first_chunk_mut() {
-        Some(columns) => *columns = labels,
-        None => columns.copy_from_slice(&labels[..columns.len()]),
     }
 }
 
@@ -161,20 +121,20 @@ struct Undecided<'a> {
 impl Undecided<'_> {
     /// Decides their labels, one chunk of labels at a time. `known` are the labels on both sides and above.
     #[inline(always)]
-    fn decide<S: Simd, const ODD: bool, const LEVELS: bool>(&self, simd: S, known: &[Labels; 3]) -> Labels {
+    fn decide<S: Simd, const ODD: bool, const LEVELS: bool>(&self, simd: S, known: [&Labels; 3]) -> Labels {
+        let edges = Edges::<S>::new::<LEVELS>(simd, self);
         let mut labels = [0; LANES];
         let mut best = Bytes::<S>::splat(simd, u8::MAX);
         let mut entry = 0;
         while entry < self.list.labels.len() {
-            let from = usize::from(self.list.labels[entry]);
-            let end = self.chunk_end(entry);
+            let from = self.list.labels[entry];
+            let end = self.chunk_end(entry, &edges);
             let before = best;
-            let nearest = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &mut best);
+            let nearest = self.chunk::<S, ODD, LEVELS>(simd, entry..end, known, &edges, &mut best);
             let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
             let (better, nearest): ([u8; LANES], [u8; LANES]) = (better.into(), nearest.into());
             for ((label, better), nearest) in labels.iter_mut().zip(better).zip(nearest) {
-                let decided = (from as u16 + u16::from(nearest)).wrapping_sub(FAR as u16);
-                *label = if better > 0 { decided } else { *label };
+                *label = if better > 0 { from + u16::from(nearest) } else { *label };
             }
             entry = end;
         }
@@ -183,35 +143,38 @@ impl Undecided<'_> {
 
     /// The end of the chunk that begins with an entry.
     #[inline(always)]
-    fn chunk_end(&self, entry: usize) -> usize {
+    fn chunk_end<S: Simd>(&self, entry: usize, edges: &Edges<S>) -> usize {
         let labels = &self.list.labels[entry..];
-        let inside = |label: u16| label - labels[0] < CHUNK as u16;
+        let inside = |label: u16| label - labels[0] <= edges.reach;
         // Mostly all of them.
         let all = labels.last().is_none_or(|&last| inside(last));
         entry + if all { labels.len() } else { labels.partition_point(|&label| inside(label)) }
     }
 
-    /// Compares these entries with the best so far, and returns for each node the label of the best of them, counted from [`FAR`]
-    /// below the first.
+    /// Compares these entries with the best so far, and returns for each node the label of the best of them, counted from the
+    /// first.
     #[inline(always)]
     fn chunk<S: Simd, const ODD: bool, const LEVELS: bool>(
         &self,
         simd: S,
         entries: Range<usize>,
-        known: &[Labels; 3],
+        known: [&Labels; 3],
+        edges: &Edges<S>,
         best: &mut Bytes<S>,
     ) -> Bytes<S> {
-        let from = usize::from(self.list.labels[entries.start]);
+        let from = self.list.labels[entries.start];
         let decided = if ODD { 0..3 } else { 2..3 };
-        let near = known.each_ref().map(|labels| near(simd, labels, from));
-        let smoothness = Edges::<S>::new::<LEVELS>(simd, self);
+        let mut there = [Bytes::splat(simd, 0); 3];
+        for side in decided.clone() {
+            there[side] = edges.positions::<LEVELS>(simd, side, known[side], from);
+        }
         let len = entries.len();
         let (labels, costs) = (&self.list.labels[entries.clone()], &self.costs[entries.clone()]);
         let (same, next) = (&self.same[entries.clone()], &self.next[entries.clone()]);
         let below = &self.below[entries][..len];
         let mut nearest = Bytes::splat(simd, 0);
         for i in 0..len {
-            let here = Bytes::splat(simd, (usize::from(labels[i]) - from + FAR) as u8);
+            let label = labels[i] - from;
             let mut sum = below[i].load(simd);
             if !ODD {
                 let next: Bytes<S> =
@@ -219,56 +182,71 @@ impl Undecided<'_> {
                 sum = sum + same[i].load(simd) + next;
             }
             for side in decided.clone() {
-                let distance = here.saturating_sub(near[side]) | near[side].saturating_sub(here);
-                sum += smoothness.of(side, distance);
+                let here = of_edges::<S, LEVELS>(simd, edges.levels[side], edges.position(label));
+                let distance = here.saturating_sub(there[side]) | there[side].saturating_sub(here);
+                sum += distance.min(edges.truncations[side]);
             }
             // The sum of four messages or smoothness costs is at most 4K, so only this addition can saturate.
             let belief = costs[i].load(simd).saturating_add(sum);
-            nearest = belief.simd_lt(*best).select(here, nearest);
+            nearest = belief.simd_lt(*best).select(Bytes::splat(simd, label as u8), nearest);
             *best = best.min(belief);
         }
         nearest
     }
 }
 
-/// The smoothness costs of the edges of a block's nodes to the neighbours that have labels; 0 where there is no neighbour.
+/// The edges of a block's nodes to the neighbours that have labels.
+///
+/// What the smoothness costs is the distance of two *positions*, at most the truncation. The position of the first label of a
+/// chunk is [`Self::first`], and that of a label d further is d steps of the edge's level further, in 8 bits. Neighbours' labels lie
+/// anywhere. Clamped, they are still a truncation away from all labels of the chunk.
 struct Edges<S: Simd> {
-    /// The distance from which on an edge costs its truncation.
-    far: [Bytes<S>; 3],
-    steps: [Bytes<S>; 3],
+    levels: [Bytes<S>; 3],
+    /// 0 where there is no neighbour.
     truncations: [Bytes<S>; 3],
+    /// The step of each level.
+    steps: [u8; EdgeLevels::COUNT],
+    /// The largest truncation.
+    first: u8,
+    /// How far the labels of a chunk may be apart.
+    reach: u16,
 }
 
 impl<S: Simd> Edges<S> {
     #[inline(always)]
     fn new<const LEVELS: bool>(simd: S, nodes: &Undecided<'_>) -> Self {
         let levels = levels(simd, nodes.greys.filter(|_| LEVELS), nodes.lane, [0, 1, 2]);
-        let edges = nodes.model.edges().smoothness();
-        let mut truncations = of_sides::<S, LEVELS>(simd, levels, edges.map(|edge| edge.truncation));
+        let smoothness = nodes.model.edges().smoothness();
+        let mut truncations = of_sides::<S, LEVELS>(simd, levels, smoothness.map(|edge| edge.truncation));
         for (truncation, mask) in truncations.iter_mut().zip(nodes.masks) {
             *truncation &= Bytes::from_slice(simd, &mask[nodes.lane..nodes.lane + LANES]);
         }
-        let far = |edge: Smoothness| edge.truncation.checked_div(edge.step()).map_or(0, |far| far + 1);
-        Self {
-            far: of_sides::<S, LEVELS>(simd, levels, edges.map(far)),
-            steps: of_sides::<S, LEVELS>(simd, levels, edges.map(Smoothness::step)),
-            truncations,
-        }
+        let (first, steps) = (nodes.model.truncation(), smoothness.map(|edge| edge.step()));
+        let reach = u16::from((u8::MAX - 2 * first) / steps[0].max(1));
+        Self { levels, truncations, steps, first, reach }
     }
 
-    /// The product of [`Self::far`] with a step is at most the truncation and a step, which fits 8 bits.
+    /// The position of a label of a chunk, counted from the first one, by level.
     #[inline(always)]
-    fn of(&self, side: usize, distance: Bytes<S>) -> Bytes<S> {
-        (distance.min(self.far[side]) * self.steps[side]).min(self.truncations[side])
+    fn position(&self, label: u16) -> [u8; EdgeLevels::COUNT] {
+        // No product exceeds 8 bits, so this multiplies all of them.
+        let first = u32::from_ne_bytes([self.first; EdgeLevels::COUNT]);
+        (u32::from_ne_bytes(self.steps) * u32::from(label) + first).to_ne_bytes()
     }
-}
 
-/// Decided labels relative to a chunk of labels, clamped to [`FAR`] beyond its ends.
-#[inline(always)]
-fn near<S: Simd>(simd: S, labels: &Labels, from: usize) -> Bytes<S> {
-    let relative = labels.map(
-        #[inline(always)]
-        |label| (label + FAR as u16).saturating_sub(from as u16).min(255) as u8,
-    );
-    Bytes::load_array(simd, relative)
+    /// The positions of neighbours' labels.
+    #[inline(always)]
+    fn positions<const LEVELS: bool>(&self, simd: S, side: usize, labels: &Labels, from: u16) -> Bytes<S> {
+        /// Labels that lie farther below cost the truncation, unless a step costs nothing.
+        const BELOW: u16 = MAX_TRUNCATION as u16;
+        let steps: [u8; LANES] = of_edges::<S, LEVELS>(simd, self.levels[side], self.steps).into();
+        let mut positions = [0; LANES];
+        for ((position, &label), step) in positions.iter_mut().zip(labels).zip(steps) {
+            let step = u16::from(step);
+            let above = (label + BELOW).saturating_sub(from).min(BELOW + u16::from(u8::MAX));
+            let position_above = step * above + u16::from(self.first);
+            *position = position_above.saturating_sub(step * BELOW).min(u8::MAX.into()) as u8;
+        }
+        Bytes::load_array(simd, positions)
+    }
 }

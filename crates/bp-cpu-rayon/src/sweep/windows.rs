@@ -13,6 +13,7 @@ use bp_core::{
 use super::{
     Sweep,
     crossings::{self, Crossings},
+    decided::{self, Decided},
     lists::{self, Lists},
     messages::{self, Messages, Place},
     refine::{self, CoarseRows},
@@ -37,6 +38,7 @@ pub(crate) struct Work {
     pub(crate) costs: Buffer<Block>,
     pub(crate) coarse_rows: CoarseRows,
     pub(crate) crossings: Crossings,
+    pub(crate) decided: Decided,
 }
 
 /// The costs of so many rows, for each entry. Sums of grid 3 are made of eight.
@@ -55,14 +57,15 @@ impl Work {
     ) -> Result<usize, Error> {
         let patches = Patch::all(plan.size(grid).width, rows);
         self.sets.clear();
-        self.fit_sets(patches.len())?;
+        self.fit_patches(patches.len())?;
         self.sets.iter_mut().zip(patches).for_each(|(set, patch)| *set = LabelSet::of(plan, grid, &patch, &coarser));
         Ok(self.sets.iter().map(LabelSet::count).sum())
     }
 
-    /// Makes room for the sets of so many patches.
-    fn fit_sets(&mut self, patches: usize) -> Result<(), Error> {
-        memory::grow("label sets", &mut self.sets, patches, LabelSet::all(0))
+    /// Makes room for the sets and the decided labels of so many patches.
+    fn fit_patches(&mut self, patches: usize) -> Result<(), Error> {
+        memory::grow("label sets", &mut self.sets, patches, LabelSet::all(0))?;
+        self.decided.fit(patches)
     }
 
     /// Makes room for so many rows with so many entries each.
@@ -80,7 +83,11 @@ impl Work {
     }
 
     fn bytes(&self) -> u64 {
-        memory::bytes(&self.sets) + self.costs.bytes() + self.coarse_rows.bytes() + self.crossings.bytes()
+        memory::bytes(&self.sets)
+            + self.costs.bytes()
+            + self.coarse_rows.bytes()
+            + self.crossings.bytes()
+            + self.decided.bytes()
     }
 }
 
@@ -102,7 +109,7 @@ pub(crate) fn bytes(plan: &Plan, patches: usize, entries: usize) -> u64 {
     let rows = BAND_ROWS.min(plan.image_size().height);
     let costs = ((costs(rows) * size_of::<Block>()) as u64).saturating_mul(entries as u64);
     let sets = (patches * size_of::<LabelSet>()) as u64;
-    let work = sets + costs + refine::bytes(entries) + crossings::bytes(entries);
+    let work = sets + costs + refine::bytes(entries) + crossings::bytes(entries) + decided::bytes(patches);
     let window = work.saturating_add(messages::bytes(rows, entries)).saturating_add(lists::bytes(patches, entries));
     (windows(plan) as u64).saturating_mul(window)
 }
@@ -124,7 +131,7 @@ impl Windows {
         self.windows.iter_mut().map(unused).try_for_each(|window| {
             window.lists.fit(patches, entries)?;
             window.messages.fit(rows, entries)?;
-            window.work.fit_sets(patches)?;
+            window.work.fit_patches(patches)?;
             window.work.fit(rows, entries)
         })
     }
