@@ -1,4 +1,4 @@
-// Label sets of a grid: the labels that differ by at most REACH from those of at least four nodes of the coarser grid around the
+// Label sets of a grid: the labels that differ by at most REACH from those of at least AGREEING nodes of the coarser grid around the
 // patch, or, if there is no such label, from that of any.
 
 @group(0) @binding(1) var<storage, read_write> sets: array<u32>;
@@ -10,7 +10,7 @@ const MOST_LABELS: u32 = 1024;
 
 const REACH: u32 = 1;
 // How many nodes suffice.
-const ENOUGH: u32 = 4;
+override AGREEING: u32 = 4;
 // How many coarse nodes are looked at beyond the parents.
 const MARGIN: u32 = 2;
 
@@ -75,12 +75,12 @@ fn label_sets(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     count(first, last, invocation);
     workgroupBarrier();
     for (var label = invocation; label < parameters.labels; label += INVOCATIONS) {
-        if atomicLoad(&counts[label]) >= ENOUGH {
+        if atomicLoad(&counts[label]) >= AGREEING {
             atomicStore(&some_have_enough, 1u);
         }
     }
     workgroupBarrier();
-    let fewest = select(1u, ENOUGH, atomicLoad(&some_have_enough) == 1);
+    let fewest = select(1u, AGREEING, atomicLoad(&some_have_enough) == 1);
     for (var word = invocation; word < set_words(); word += INVOCATIONS) {
         sets[(window * patches() + patch_index) * set_words() + word] = had_by(fewest, word);
     }

@@ -1,5 +1,7 @@
 //! How much freed memory the program keeps.
 
+use bp_core::memory;
+
 /// What glibc keeps of freed memory: buffers below this many bytes, and this many bytes at the end of the heap.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 struct Kept {
@@ -22,6 +24,9 @@ const MUCH: Kept = Kept { buffer: 8 << 20, all: 32 << 20 };
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "only the C library can set its own allocator")]
 pub(crate) fn set_up(is_limited: bool) {
+    if is_limited {
+        memory::return_freed();
+    }
     let Kept { buffer, all } = if is_limited { LITTLE } else { MUCH };
     let settings = [(libc::M_MMAP_THRESHOLD, buffer), (libc::M_TRIM_THRESHOLD, all), (libc::M_ARENA_MAX, 1)];
     for (setting, value) in settings {
@@ -32,4 +37,8 @@ pub(crate) fn set_up(is_limited: bool) {
 
 /// Other C libraries return large buffers by themselves.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub(crate) fn set_up(_is_limited: bool) {}
+pub(crate) fn set_up(is_limited: bool) {
+    if is_limited {
+        memory::return_freed();
+    }
+}

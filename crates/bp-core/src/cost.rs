@@ -2,18 +2,20 @@
 
 use fearless_simd::{Level, Simd, dispatch};
 
-use crate::{Error, Image, Model, Profile, Seed, Size, StereoPair, census, census::Neighbours, features, memory};
+use crate::{
+    Error, Image, Model, Profile, Seed, Size, StereoPair, census, census::Neighbours, features, memory::Buffer,
+};
 
 /// The per-pixel features that a profile compares, `[height][width]`, of both images.
 #[derive(Clone, Debug)]
 enum Planes {
-    Thesis([Vec<u8>; 2]),
-    Census([Vec<[u8; 1]>; 2]),
-    Mrf([Vec<[u8; 3]>; 2]),
-    Gradient([Vec<[u8; 2]>; 2]),
-    BirchfieldTomasi([Vec<[u8; 3]>; 2]),
-    Census16([Vec<[u8; 2]>; 2]),
-    Census32([Vec<[u8; 4]>; 2]),
+    Thesis([Buffer<u8>; 2]),
+    Census([Buffer<[u8; 1]>; 2]),
+    Mrf([Buffer<[u8; 3]>; 2]),
+    Gradient([Buffer<[u8; 2]>; 2]),
+    BirchfieldTomasi([Buffer<[u8; 3]>; 2]),
+    Census16([Buffer<[u8; 2]>; 2]),
+    Census32([Buffer<[u8; 4]>; 2]),
 }
 
 /// The data costs of all pixels and labels of a pair. It is allocated once and loaded with one pair after another.
@@ -104,11 +106,11 @@ impl DataCost {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         match &self.planes {
-            Planes::Thesis(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Census(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Gradient(planes) | Planes::Census16(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Census32(planes) => planes.iter().map(memory::bytes).sum(),
-            Planes::Mrf(planes) | Planes::BirchfieldTomasi(planes) => planes.iter().map(memory::bytes).sum(),
+            Planes::Thesis(planes) => planes.iter().map(Buffer::bytes).sum(),
+            Planes::Census(planes) => planes.iter().map(Buffer::bytes).sum(),
+            Planes::Gradient(planes) | Planes::Census16(planes) => planes.iter().map(Buffer::bytes).sum(),
+            Planes::Census32(planes) => planes.iter().map(Buffer::bytes).sum(),
+            Planes::Mrf(planes) | Planes::BirchfieldTomasi(planes) => planes.iter().map(Buffer::bytes).sum(),
         }
     }
 
@@ -127,8 +129,8 @@ impl DataCost {
     }
 }
 
-fn planes<T: Copy + Default + Send + Sync>(size: Size) -> Result<[Vec<T>; 2], Error> {
-    let plane = || memory::filled("images", size.pixels(), T::default());
+fn planes<T: Copy + Default + Send + Sync>(size: Size) -> Result<[Buffer<T>; 2], Error> {
+    let plane = || Buffer::filled("images", size.pixels(), T::default());
     Ok([plane()?, plane()?])
 }
 

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, Model, Size, memory};
+use crate::{Error, Model, Size, memory::Buffer};
 
 /// A disparity map `[height][width]`. Disparities are in pixels of the map's own size. Unknown pixels hold
 /// [`DisparityMap::UNKNOWN`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisparityMap {
     size: Size,
-    values: Vec<f32>,
+    values: Buffer<f32>,
 }
 
 impl DisparityMap {
@@ -29,20 +29,26 @@ impl DisparityMap {
                 *value = Self::UNKNOWN;
             }
         }
-        Ok(Self { size, values })
+        Ok(Self { size, values: values.into() })
     }
 
     /// The disparities of a model's labels, `[height][width]`.
     ///
-    /// # Panics
-    /// If `labels` does not hold one label per pixel.
-    #[must_use]
-    pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Self {
-        assert_eq!(labels.len(), size.pixels(), "one label a pixel");
-        let mut values = Vec::with_capacity(labels.len());
-        memory::ask_for_large_pages(values.spare_capacity_mut());
-        let labels = labels.par_iter().with_min_len(TOGETHER);
-        labels.map(|&label| model.disparity(label) as f32).collect_into_vec(&mut values);
+    /// # Errors
+    /// [`Error::PixelCount`] if `labels` does not hold one label per pixel, [`Error::OutOfMemory`].
+    pub fn from_labels(size: Size, model: &Model, labels: &[u16]) -> Result<Self, Error> {
+        if labels.len() != size.pixels() {
+            return Err(Error::PixelCount { size, found: labels.len() });
+        }
+        let values = Buffer::mapped("a disparity map", labels, |&label| model.disparity(label) as f32)?;
+        Ok(Self { size, values })
+    }
+
+    /// A map of finite values and [`DisparityMap::UNKNOWN`], one per pixel.
+    pub(crate) fn of(size: Size, values: Buffer<f32>) -> Self {
+        debug_assert!(
+            values.len() == size.pixels() && values.iter().all(|&value| value.is_finite() || value == Self::UNKNOWN)
+        );
         Self { size, values }
     }
 
@@ -74,15 +80,6 @@ impl DisparityMap {
         }
     }
 
-    /// The map with other values, which are copied by the threads of the current pool. Those that are not finite are
-    /// [`DisparityMap::UNKNOWN`].
-    pub(crate) fn with(self, values: &[f32]) -> Self {
-        self.replaced(|own| {
-            let parts = own.par_chunks_mut(TOGETHER).zip(values.par_chunks(TOGETHER));
-            parts.for_each(|(own, values)| own.copy_from_slice(values));
-        })
-    }
-
     /// The map after `change` has edited its values. `change` must set non-finite values to [`DisparityMap::UNKNOWN`].
     pub(crate) fn replaced(mut self, change: impl FnOnce(&mut [f32])) -> Self {
         change(&mut self.values);
@@ -103,7 +100,7 @@ impl DisparityMap {
 
     /// All values, `[height][width]`, without a copy.
     #[must_use]
-    pub fn into_values(self) -> Vec<f32> {
+    pub fn into_values(self) -> Buffer<f32> {
         self.values
     }
 

@@ -6,7 +6,8 @@ use std::{
 };
 
 use crate::{
-    Device, DisparityMap, Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, census, memory,
+    Device, DisparityMap, Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair, census,
+    memory::{self, Buffer},
     never,
 };
 
@@ -52,7 +53,7 @@ pub type Observer<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
 pub struct Driver {
     plan: Plan,
     solver: Box<dyn Solver>,
-    labels: Vec<u16>,
+    labels: Buffer<u16>,
     /// Whether the last solve finished, with messages on grid 0.
     has_messages: bool,
 }
@@ -75,7 +76,7 @@ impl Driver {
         let solver = device.prepare(&plan, is_stopped)?;
         let (size, labels, bytes) = (plan.image_size(), plan.model().labels(), solver.allocated_bytes());
         log::debug!("prepared for {size} pixels and {labels} labels in {:?}, {bytes} bytes", start.elapsed());
-        let labels = memory::filled_unless(is_stopped, "labels", plan.image_size().pixels(), 0)?;
+        let labels = Buffer::filled_unless(is_stopped, "labels", plan.image_size().pixels(), 0)?;
         Ok(Self { plan, solver, labels, has_messages: false })
     }
 
@@ -88,13 +89,13 @@ impl Driver {
     /// The bytes actually allocated for the plan.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
-        self.solver.allocated_bytes() + memory::bytes(&self.labels)
+        self.solver.allocated_bytes() + self.labels.bytes()
     }
 
     /// Makes solves fail with [`Error::OutOfMemory`] rather than allocate more than so many bytes in all, where label sets
     /// determine what is needed.
     pub(crate) fn limit_bytes(&mut self, bytes: u64) {
-        self.solver.limit_bytes(bytes.saturating_sub(memory::bytes(&self.labels)));
+        self.solver.limit_bytes(bytes.saturating_sub(self.labels.bytes()));
     }
 
     /// The time that [`Driver::new`] spent on compiling kernels, if the device compiles any.
@@ -219,8 +220,10 @@ impl Driver {
     }
 
     /// The disparity map of the last solve. Allocates the map.
-    #[must_use]
-    pub fn disparities(&self) -> DisparityMap {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn disparities(&self) -> Result<DisparityMap, Error> {
         DisparityMap::from_labels(self.plan.image_size(), self.plan.model(), &self.labels)
     }
 

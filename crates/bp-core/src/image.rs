@@ -5,7 +5,11 @@ use std::{borrow::Cow, ops::Range};
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{Error, Size, limits::MAX_SIDE, memory};
+use crate::{
+    Error, Size,
+    limits::MAX_SIDE,
+    memory::{self, Buffer},
+};
 
 mod plane;
 mod samples;
@@ -63,7 +67,7 @@ impl Image {
     /// # Errors
     /// As [`Size::new`]; [`Error::PixelCount`] if `pixels` does not hold `width * height` colours, [`Error::OutOfMemory`].
     pub fn from_rgb(width: usize, height: usize, pixels: Vec<[u8; 3]>) -> Result<Self, Error> {
-        Self::of_colours(width, height, pixels.into())
+        Self::of_colours(width, height, pixels)
     }
 
     /// An image of colours in the caller's memory, three bytes a pixel, `[height][width][3]`. They are read there for as long as the
@@ -75,12 +79,14 @@ impl Image {
         Self::of_colours(width, height, Plane::lent(bytes))
     }
 
-    fn of_colours(width: usize, height: usize, colours: Plane) -> Result<Self, Error> {
+    /// An image of colours, `[height][width]`.
+    pub(crate) fn of_colours(width: usize, height: usize, colours: impl Into<Plane>) -> Result<Self, Error> {
+        let colours = colours.into();
         let (size, pixels) = (Size::new(width, height)?, colours.colours());
         if colours.len() != 3 * size.pixels() {
             return Err(Error::PixelCount { size, found: colours.len().div_ceil(3) });
         }
-        let mut greys = memory::filled("grey values", pixels.len(), 0)?;
+        let mut greys = Buffer::filled("grey values", pixels.len(), 0)?;
         let parts = greys.par_chunks_mut(TOGETHER).zip(pixels.par_chunks(TOGETHER));
         let is_grey = parts.map(|(greys, pixels)| write_greys(pixels, greys)).reduce(|| true, |a, b| a && b);
         let colours = (!is_grey).then_some(colours);
@@ -92,7 +98,7 @@ impl Image {
     /// # Errors
     /// As [`Image::from_rgb`].
     pub fn from_grey(width: usize, height: usize, values: impl Into<Vec<u8>>) -> Result<Self, Error> {
-        Self::of_greys(width, height, values.into().into())
+        Self::of_greys(width, height, values.into())
     }
 
     /// An image of grey values in the caller's memory, `[height][width]`. They are read there for as long as the image or a clone
@@ -104,7 +110,9 @@ impl Image {
         Self::of_greys(width, height, Plane::lent(bytes))
     }
 
-    fn of_greys(width: usize, height: usize, greys: Plane) -> Result<Self, Error> {
+    /// An image of grey values, `[height][width]`.
+    pub(crate) fn of_greys(width: usize, height: usize, greys: impl Into<Plane>) -> Result<Self, Error> {
+        let greys = greys.into();
         let size = Size::new(width, height)?;
         if greys.len() != size.pixels() {
             return Err(Error::PixelCount { size, found: greys.len() });

@@ -24,9 +24,13 @@ impl LabelSet {
     /// How far a label may lie from a coarser label.
     const REACH: usize = 1;
 
-    /// How many nodes must have such a label. The labels of fewer are mostly mistakes in hidden areas, each of which would add
-    /// three labels; four nodes are as small as what the coarser grids find at all.
-    const AGREEING: u8 = 4;
+    /// How many nodes of the coarser grid must have such a label, to be in a set of `grid`. The labels of fewer are mostly mistakes in
+    /// hidden areas, each of which would add three labels. Four nodes of grid 2, which are twice as large a surface as eight of grid 1,
+    /// are as small as what the coarser grids find at all.
+    #[must_use]
+    pub const fn agreeing(grid: usize) -> u8 {
+        if grid == 0 { 8 } else { 4 }
+    }
 
     /// All labels below `labels`, which is at most [`MAX_LABELS`].
     #[must_use]
@@ -38,9 +42,9 @@ impl LabelSet {
         Self { words: array::from_fn(word) }
     }
 
-    /// The set of a patch of `grid`: the labels of `plan` that differ by at most 1 from those of at least four nodes of
-    /// [`Patch::region`], or, if there is no such label, from that of any. `coarser(y)` are the labels decided in row y of the next
-    /// coarser grid, `[width]`. On a grid without label sets, all labels.
+    /// The set of a patch of `grid`: the labels of `plan` that differ by at most 1 from those of at least [`LabelSet::agreeing`]
+    /// nodes of [`Patch::region`], or, if there is no such label, from that of any. `coarser(y)` are the labels decided in row y of
+    /// the next coarser grid, `[width]`. On a grid without label sets, all labels.
     ///
     /// # Panics
     /// If such a row is shorter than that grid.
@@ -63,7 +67,7 @@ impl LabelSet {
         }
         let reached = reached(lanes.each_ref().map(|lane| &lane[..labels]));
         let reached = &reached[..labels];
-        Some(Self::at_least(reached, Self::AGREEING))
+        Some(Self::at_least(reached, Self::agreeing(grid)))
             .filter(|set| set.count() > 0)
             .unwrap_or_else(|| Self::at_least(reached, 1))
     }
@@ -129,25 +133,30 @@ mod tests {
     }
 
     #[test]
-    fn a_set_reaches_one_label_from_those_of_four_coarser_nodes() {
+    fn a_set_reaches_one_label_from_those_of_eight_nodes_of_grid_1_or_four_of_others() {
         let (plan, patch) = (plan(true), Patch { columns: 0..64, rows: 0..32 });
-        let mut coarser = vec![40; plan.size(1).pixels()];
-        let set = |coarser: &[u16]| LabelSet::of(&plan, 0, &patch, |y| &coarser[75 * y..]);
-        for (node, label) in [0, 0, 1, 69, 69, 68].into_iter().enumerate() {
-            coarser[node] = label;
+        for (grid, agreeing) in [(0, 8), (1, 4)] {
+            let Size { width, .. } = plan.size(grid + 1);
+            let mut coarser = vec![40; plan.size(grid + 1).pixels()];
+            let set = |coarser: &[u16]| LabelSet::of(&plan, grid, &patch, |y| &coarser[width * y..]);
+            // One too few on either side: 0 and 1, 69 and 68.
+            let few = agreeing - 1;
+            coarser[..few].fill(0);
+            coarser[few..2 * few].fill(69);
+            (coarser[0], coarser[few]) = (1, 68);
+            // One more has a label near 69, but beyond the region.
+            coarser[width + 34] = 69;
+            assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [39, 40, 41], "grid {grid}");
+            (coarser[2 * few], coarser[2 * few + 1]) = (2, 67);
+            // Only 1 is near all low labels, and 68 near all high ones.
+            assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [1, 39, 40, 41, 68], "grid {grid}");
+            let set = set(&coarser);
+            assert_eq!((set.count(), set.contains(39), set.contains(5000)), (5, true, false));
         }
-        coarser[34] = 20;
-        // One node more has a label near 69, but beyond the region.
-        coarser[75 + 34] = 69;
-        assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [39, 40, 41]);
-        (coarser[6], coarser[7]) = (2, 67);
-        // Only 1 is near all four low labels, and 68 near all four high ones.
-        assert_eq!(set(&coarser).labels().collect::<Vec<_>>(), [1, 39, 40, 41, 68]);
-        assert_eq!((set(&coarser).count(), set(&coarser).contains(39), set(&coarser).contains(5000)), (5, true, false));
     }
 
     #[test]
-    fn where_no_four_nodes_agree_all_count() {
+    fn where_too_few_nodes_agree_all_count() {
         let plan = {
             let size = Size { width: 5, height: 3 };
             let settings = Algorithm::Sweep.settings(size, 1, 1, Schedule::Sweep);

@@ -17,7 +17,7 @@
 //! let device = bp_cpu_scalar::Scalar.open(0)?;
 //! let mut driver = Driver::new(device.as_ref(), plan)?;
 //! driver.solve(&pair)?;
-//! assert_eq!(driver.disparities().at(20, 10), Some(3.0));
+//! assert_eq!(driver.disparities()?.at(20, 10), Some(3.0));
 //! # Ok(())
 //! # }
 //! ```

@@ -8,6 +8,7 @@ use std::{hint::black_box, mem::MaybeUninit, time::Instant};
 use rayon::prelude::*;
 
 pub use buffer::Buffer;
+pub use pages::return_freed;
 
 use crate::{Error, IsStopped, never, stop::go_on};
 

@@ -9,7 +9,8 @@ use std::{
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::{
-    Device, Driver, Error, IsStopped, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census, memory,
+    Device, Driver, Error, IsStopped, Plan, Profile, Schedule, Seed, Settings, Size, StereoPair, Times, census,
+    memory::Buffer,
 };
 
 /// A part of a cut image with a plan of its own. No message crosses the cut, so its messages and labels are the same bits as
@@ -131,7 +132,7 @@ pub struct PartDriver {
     /// A pool of one thread for each worker.
     pools: Vec<ThreadPool>,
     most_bytes: u64,
-    labels: Vec<u16>,
+    labels: Buffer<u16>,
 }
 
 impl PartDriver {
@@ -148,7 +149,7 @@ impl PartDriver {
             Parting::SideBySide { workers } => (0..workers.clamp(1, parts.len())).map(|_| pool()).collect(),
             Parting::InTurn => Ok(Vec::new()),
         };
-        let labels = memory::filled("labels", whole.image_size().pixels(), 0)?;
+        let labels = Buffer::filled("labels", whole.image_size().pixels(), 0)?;
         let most_bytes = drivers.iter().map(Driver::allocated_bytes).sum();
         Ok(Self { whole, parts, parting, drivers, pools: pools?, most_bytes, labels })
     }
@@ -171,7 +172,7 @@ impl PartDriver {
     /// The most bytes that were allocated at a time.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
-        self.most_bytes + memory::bytes(&self.labels)
+        self.most_bytes + self.labels.bytes()
     }
 
     /// The labels of the last solve, `[height][width]`.

@@ -15,7 +15,8 @@ pub use tiling::{Needed, Tiling};
 use join::Joint;
 
 use crate::{
-    Device, DisparityMap, Driver, Error, IsStopped, Observer, Plan, Progress, Side, StereoPair, Times, memory, never,
+    Device, DisparityMap, Driver, Error, IsStopped, Observer, Plan, Progress, Side, StereoPair, Times, memory::Buffer,
+    never,
 };
 
 /// A way to solve tiles.
@@ -36,7 +37,7 @@ pub struct Tiled {
     /// The driver of the tile that was matched last.
     driver: Option<Driver>,
     /// The labels of all tiles; empty if there is only one.
-    labels: Vec<u16>,
+    labels: Buffer<u16>,
     most_bytes: u64,
     updates: u64,
 }
@@ -57,7 +58,7 @@ impl Tiled {
     /// As [`Tiled::new`], and [`Error::Stopped`].
     pub fn new_unless(is_stopped: IsStopped<'_>, device: &dyn Device, tiling: Tiling) -> Result<Self, Error> {
         let pixels = if tiling.is_whole() { 0 } else { tiling.plan().image_size().pixels() };
-        let labels = memory::filled_unless(is_stopped, "labels", pixels, 0)?;
+        let labels = Buffer::filled_unless(is_stopped, "labels", pixels, 0)?;
         let mut tiled = Self { tiling, driver: None, labels, most_bytes: 0, updates: 0 };
         if let Some(tile) = tiled.tiling.tiles().first() {
             tiled.driver = Some(tiled.prepared(is_stopped, device, tile)?);
@@ -86,7 +87,7 @@ impl Tiled {
     /// The peak number of bytes allocated so far: for a tile, and for the labels of all tiles.
     #[must_use]
     pub fn allocated_bytes(&self) -> u64 {
-        self.most_bytes + memory::bytes(&self.labels)
+        self.most_bytes + self.labels.bytes()
     }
 
     /// Matches a pair on the same device as in [`Tiled::new`]. [`Tiled::labels`] and [`Tiled::disparities`] hold the result
@@ -239,8 +240,10 @@ impl Tiled {
     }
 
     /// The disparity map of the last solve. Allocates the map.
-    #[must_use]
-    pub fn disparities(&self) -> DisparityMap {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn disparities(&self) -> Result<DisparityMap, Error> {
         DisparityMap::from_labels(self.plan().image_size(), self.plan().model(), self.labels())
     }
 

@@ -106,7 +106,7 @@ impl Plans<'_> {
         let mut tiled = Tiled::new(self.device, tiling)?;
         tiled.solve(self.device, pair)?;
         let energy = Energy::of(pair, &model, tiled.labels())?.total() as f64;
-        Ok(Solved { map: tiled.disparities(), labels: tiled.labels().to_vec(), energy })
+        Ok(Solved { map: tiled.disparities()?, labels: tiled.labels().to_vec(), energy })
     }
 }
 

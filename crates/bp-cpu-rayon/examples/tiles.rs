@@ -87,7 +87,7 @@ fn solve(device: &dyn Device, scene: &Scene, tiling: Tiling) -> Result<Run> {
     tiled.solve(device, &scene.pair)?;
     let labels = tiled.labels().to_vec();
     let energy = Energy::of(&scene.pair, tiled.plan().model(), &labels)?.total() as f64;
-    let bad = scene.truth.errors(&tiled.disparities())?.visible.map_or(f64::NAN, |visible| visible.bad[1]);
+    let bad = scene.truth.errors(&tiled.disparities()?)?.visible.map_or(f64::NAN, |visible| visible.bad[1]);
     Ok(Run { labels, bad, energy, updates, bytes: tiled.allocated_bytes() })
 }
 

@@ -19,7 +19,7 @@ fn both(pair: &StereoPair) -> [DisparityMap; 2] {
     let mut driver = Driver::new(Rayon.open(0).unwrap().as_ref(), plan).unwrap();
     let mut map = |pair: &StereoPair| {
         driver.solve(pair).unwrap();
-        driver.disparities()
+        driver.disparities().unwrap()
     };
     [map(pair), map(&pair.mirrored()).mirrored()]
 }

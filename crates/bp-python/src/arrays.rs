@@ -277,11 +277,9 @@ pub(crate) fn map(name: &str, object: &Bound<'_, PyAny>) -> PyResult<DisparityMa
 }
 
 /// A new array `[height][width]`, with NaN where the value is not finite.
-pub(crate) fn plane(py: Python<'_>, size: Size, mut values: Vec<f32>) -> PyResult<Bound<'_, PyArray2<f32>>> {
-    for value in values.iter_mut().filter(|value| !value.is_finite()) {
-        *value = f32::NAN;
-    }
-    PyArray1::from_vec(py, values).reshape([size.height, size.width])
+pub(crate) fn plane<'py>(py: Python<'py>, size: Size, values: &[f32]) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let finite = values.iter().map(|&value| if value.is_finite() { value } else { f32::NAN });
+    PyArray1::from_vec(py, finite.collect()).reshape([size.height, size.width])
 }
 
 /// The array that the caller gave for a map of this size.

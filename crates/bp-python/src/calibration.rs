@@ -45,7 +45,7 @@ impl Calibration {
     fn depth<'py>(&self, py: Python<'py>, disparity: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let map = map("disparity", disparity)?;
         let calibration = self.0.of(map.size()).map_err(raised)?;
-        plane(py, map.size(), depth_map(&map, &calibration))
+        plane(py, map.size(), &depth_map(&map, &calibration))
     }
 
     /// The points that the pixels show: float32 [height][width][3], x to the right, y down and z forward from the

@@ -39,7 +39,7 @@ pub(crate) fn read_map(
 ) -> PyResult<Bound<'_, PyArray2<f32>>> {
     there(&path)?;
     let map = py.detach(|| io::read_map(&path, scale, Limits::megapixels(max_megapixels))).map_err(raised)?;
-    plane(py, map.size(), map.into_values())
+    plane(py, map.size(), map.values())
 }
 
 /// Writes a disparity map in the format of the path's ending: .pfm, .tif, .npy, or .png in KITTI's format.

@@ -116,12 +116,12 @@ impl Matcher {
         valid.iter().for_each(|valid| solved.restrict(valid));
         let described = description::Answer::from(&solved);
         let Disparity { map, confidence, .. } = solved;
-        let confidence = confidence.map(|values| plane(py, pair.size(), values)).transpose()?.map(Bound::unbind);
+        let confidence = confidence.map(|values| plane(py, pair.size(), &values)).transpose()?.map(Bound::unbind);
         state.answer = Some(Answer { confidence, described });
         let map = match out {
             // Looked at again: a callback may have changed its shape.
             Some(out) => target(out, map.size()).and_then(|out| fill(&out, &map).map(|()| out))?,
-            None => plane(py, pair.size(), map.into_values())?,
+            None => plane(py, pair.size(), map.values())?,
         };
         Ok(map.into_any())
     }

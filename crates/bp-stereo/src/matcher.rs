@@ -327,7 +327,7 @@ impl Prepared {
             done = done.saturating_add(if view == View::Right { of_right } else { updates });
             // Freeing the tiles makes room for the map.
             tiled.free_tiles();
-            Ok((times, tiled.disparities()))
+            Ok((times, tiled.disparities()?))
         })
     }
 }

@@ -108,7 +108,7 @@ fn run(order: &str, scene: &Scene, labels: usize) -> Result<Run> {
     for steps in (0..plan.settings().steps).step_by(plan.settings().schedule.steps_per_loop() as usize) {
         solver.update_messages(0, steps..steps + plan.settings().schedule.steps_per_loop())?;
         solver.select_labels(0, &mut answer)?;
-        let errors = scene.truth.errors(&DisparityMap::from_labels(pair.size(), plan.model(), &answer))?;
+        let errors = scene.truth.errors(&DisparityMap::from_labels(pair.size(), plan.model(), &answer)?)?;
         found.energies.push(Energy::of(pair, plan.model(), &answer)?.total());
         found.bad.push(errors.visible.ok_or("a scene without visible pixels")?.bad[1]);
     }

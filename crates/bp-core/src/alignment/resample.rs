@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::Alignment;
-use crate::{Error, Image, Size, memory};
+use crate::{Error, Image, Size, memory::Buffer};
 
 /// Rows are taken in steps of 1 / `STEPS` of a pixel.
 const STEPS: usize = 64;
@@ -29,20 +29,20 @@ pub(super) fn resampled(image: &Image, alignment: &Alignment) -> Result<Image, E
     let Size { width, height } = image.size();
     if image.is_grey() {
         let greys = resampled_rows(image.size(), alignment, |y| image.greys_near(y).as_chunks::<1>().0)?;
-        return Image::from_grey(width, height, greys.into_flattened());
+        return Image::of_greys(width, height, greys);
     }
     let colours = resampled_rows(image.size(), alignment, |y| image.colours_near(y).unwrap_or_default())?;
-    Image::from_rgb(width, height, colours)
+    Image::of_colours(width, height, colours)
 }
 
 fn resampled_rows<'a, const CHANNELS: usize>(
     size: Size,
     alignment: &'a Alignment,
     row_near: impl Fn(isize) -> &'a [[u8; CHANNELS]] + Sync,
-) -> Result<Vec<[u8; CHANNELS]>, Error> {
+) -> Result<Buffer<[u8; CHANNELS]>, Error> {
     let (level, weights) = (Level::new(), array::from_fn(whole_weights));
     let resampling = Resampling { alignment, weights, row_near };
-    let mut pixels = memory::filled("an aligned image", size.pixels(), [0; CHANNELS])?;
+    let mut pixels = Buffer::filled("an aligned image", size.pixels(), [0; CHANNELS])?;
     pixels.par_chunks_exact_mut(size.width).enumerate().for_each(|(y, row)| {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]

@@ -1,12 +1,12 @@
 //! Means of similar disparities.
 
-use std::array;
+use std::{array, ops::RangeInclusive};
 
-use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
+use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, SimdInt, dispatch, u8x16};
 use rayon::prelude::*;
 
 use super::check::AGREE;
-use crate::{DisparityMap, Error, IsStopped, memory, stop::go_on};
+use crate::{DisparityMap, Error, IsStopped, memory::Buffer, stop::go_on};
 
 /// Windows are 3x3 pixels that lie this far apart, in one pass after the other. Two passes make means over 9x9 pixels of two
 /// ninths of the differences, with the same errors. Such windows are the edge-avoiding wavelets of Dammertz et al. 2010.
@@ -30,18 +30,17 @@ const MOST: f32 = 1000.0;
 const PARTS: f32 = 32.0;
 
 /// Writes means of means of the disparities around each pixel, over 9x9 pixels. Only those count that differ from the one
-/// in the middle by no more than [`AGREE`]. Both maps are `[height][width]`.
+/// in the middle by no more than [`AGREE`]. Both maps are `[height][width]`; known disparities lie within `limits`.
 ///
 /// Disparities up to [`MOST`] are rounded to 1/32 px before each pass and added up as integers, which takes less time.
 pub(super) fn write_means(
     width: usize,
     map: &[f32],
+    limits: &RangeInclusive<f32>,
     means: &mut [f32],
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
-    let is_large = |&value: &f32| value != DisparityMap::UNKNOWN && value.abs() > MOST;
-    let any_large = |values: &[f32]| values.iter().fold(false, |any, value| any | is_large(value));
-    let all_small = !map.par_chunks(ROWS * width).any(any_large);
+    let all_small = -MOST <= *limits.start() && *limits.end() <= MOST;
     means.par_chunks_mut(ROWS * width).enumerate().try_for_each(|(index, means)| {
         if all_small {
             write_rows::<u16>(width, map, ROWS * index, means, is_stopped)
@@ -108,7 +107,7 @@ fn enter<S: Simd, T: Value>(simd: S, row: &[f32], values: &mut [T]) {
 /// Rows of a map, with unknown pixels around them.
 struct Block<T> {
     /// `[row][column]`, with [`MARGIN`] more columns on both sides.
-    values: Vec<T>,
+    values: Buffer<T>,
     wide: usize,
 }
 
@@ -117,7 +116,7 @@ impl<T: Value> Block<T> {
 
     fn new(width: usize) -> Result<Self, Error> {
         let wide = wide(width);
-        Ok(Self { values: memory::filled("rows of a map", Self::ROWS * wide, T::UNKNOWN)?, wide })
+        Ok(Self { values: Buffer::filled("rows of a map", Self::ROWS * wide, T::UNKNOWN)?, wide })
     }
 
     /// A row without its margins.
@@ -143,8 +142,8 @@ trait Value: Mean<Self> + Copy + Send + Sync + 'static {
 
 /// The mean of a window.
 trait Mean<T> {
-    /// `offset` is the mean less the value in the middle.
-    fn at(middle: T, offset: f32) -> Self;
+    /// The mean of `count` values whose differences from the one in the middle add up to `sum`. `inverse` is that of [`INVERSES`].
+    fn at(middle: T, sum: T, count: T, inverse: T) -> Self;
 }
 
 impl Value for f32 {
@@ -174,9 +173,10 @@ impl Value for f32 {
                         }
                     }
                     // An unknown pixel is near nothing, not even itself.
-                    let offsets = sums / counts.max(one);
-                    for ((mean, &middle), &offset) in means.iter_mut().zip(middle.as_slice()).zip(offsets.as_slice()) {
-                        *mean = M::at(middle, offset);
+                    let counts = counts.max(one);
+                    let sums = sums.as_slice().iter().zip(counts.as_slice());
+                    for ((mean, &middle), (&sum, &count)) in means.iter_mut().zip(middle.as_slice()).zip(sums) {
+                        *mean = M::at(middle, sum, count, 0.0);
                     }
                 }
             },
@@ -186,9 +186,39 @@ impl Value for f32 {
 
 impl Mean<f32> for f32 {
     #[inline(always)]
-    fn at(middle: f32, offset: f32) -> Self {
-        middle + offset
+    fn at(middle: f32, sum: f32, count: f32, _: f32) -> Self {
+        middle + sum / count
     }
+}
+
+/// The largest difference of values that are near each other, in [`PARTS`] of a pixel, and one more than their range.
+const NEAR: u16 = (AGREE * PARTS) as u16;
+const FAR: u16 = 2 * NEAR + 1;
+
+/// 2^16 / (2 i) for a count of i values, rounded up. For numbers below 3600, the upper 16 bits of the product with it are the quotient
+/// by 2 i.
+const INVERSES: [u16; 10] = {
+    let (mut inverses, mut count) = ([0; 10], 1);
+    while count < inverses.len() {
+        inverses[count] = (1_u32 << 15).div_ceil(count as u32) as u16;
+        count += 1;
+    }
+    inverses
+};
+
+/// The inverses of counts, one byte after the other: vectors look up bytes.
+#[inline(always)]
+fn inverses<S: Simd>(simd: S, counts: S::u16s) -> S::u16s {
+    let counts = counts.bitcast::<S::u8s>();
+    let [low, high] = [0, 8].map(
+        #[inline(always)]
+        |shift| {
+            let byte = |count| INVERSES.get(count).map_or(0, |inverse| (inverse >> shift) as u8);
+            let table = S::u8s::block_splat(u8x16::from_fn(simd, byte));
+            table.swizzle_dyn_within_blocks(counts).bitcast::<S::u16s>()
+        },
+    );
+    low | high << 8
 }
 
 /// A disparity in [`PARTS`] of a pixel. Negative ones wrap, and so do differences.
@@ -202,8 +232,6 @@ impl Value for u16 {
 
     #[inline(always)]
     fn write_means<S: Simd, M: Mean<u16>>(simd: S, rows: [&[u16]; SIDE], spacing: usize, means: &mut [M]) {
-        const NEAR: u16 = (AGREE * PARTS) as u16;
-        const FAR: u16 = 2 * NEAR + 1;
         simd.vectorize(
             #[inline(always)]
             || {
@@ -222,10 +250,11 @@ impl Value for u16 {
                             counts += below.min(one);
                         }
                     }
-                    let sums = counts * (far - near) - sums;
-                    let sums = sums.as_slice().iter().zip(counts.as_slice());
-                    for ((mean, &middle), (&sum, &count)) in means.iter_mut().zip(middle.as_slice()).zip(sums) {
-                        *mean = M::at(middle, f32::from(sum as i16) / f32::from(count));
+                    let (sums, inverses) = (counts * (far - near) - sums, inverses(simd, counts));
+                    let counts = counts.as_slice().iter().zip(inverses.as_slice());
+                    let windows = middle.as_slice().iter().zip(sums.as_slice()).zip(counts);
+                    for (mean, ((&middle, &sum), (&count, &inverse))) in means.iter_mut().zip(windows) {
+                        *mean = M::at(middle, sum, count, inverse);
                     }
                 }
             },
@@ -234,16 +263,22 @@ impl Value for u16 {
 }
 
 impl Mean<u16> for u16 {
+    /// Rounds the mean to the nearest integer, the even one of two. A product takes less time than a quotient.
     #[inline(always)]
-    fn at(middle: u16, offset: f32) -> Self {
-        middle.wrapping_add(rounded(offset))
+    fn at(middle: u16, sum: u16, count: u16, inverse: u16) -> Self {
+        // Twice the sum of what the values lie above the least near one, and half a step more.
+        let doubled = sum.wrapping_mul(2).wrapping_add(FAR * count);
+        let quotient = ((u32::from(doubled) * u32::from(inverse)) >> 16) as u16;
+        let is_tie = quotient * 2 * count == doubled;
+        let rounded = quotient - (u16::from(is_tie) & quotient);
+        middle.wrapping_add(rounded).wrapping_sub(NEAR)
     }
 }
 
 impl Mean<u16> for f32 {
     #[inline(always)]
-    fn at(middle: u16, offset: f32) -> Self {
-        let mean = (f32::from(middle as i16) + offset) / PARTS;
+    fn at(middle: u16, sum: u16, count: u16, _: u16) -> Self {
+        let mean = (f32::from(middle as i16) + f32::from(sum as i16) / f32::from(count)) / PARTS;
         if middle == <u16 as Value>::UNKNOWN { DisparityMap::UNKNOWN } else { mean }
     }
 }
@@ -288,7 +323,9 @@ mod tests {
 
     fn means(width: usize, map: &[f32]) -> Vec<f32> {
         let mut means = vec![0.0; map.len()];
-        write_means(width, map, &mut means, &never).unwrap();
+        let known = || map.iter().copied().filter(|value| value.is_finite());
+        let limits = known().fold(0.0, f32::min)..=known().fold(0.0, f32::max);
+        write_means(width, map, &limits, &mut means, &never).unwrap();
         means
     }
 

@@ -35,14 +35,14 @@ fn medians<const SIDE: usize, const VALUES: usize>(
 ) -> Result<DisparityMap, Error> {
     let (size, level) = (map.size(), Level::new());
     let framed = Framed::new(size, map.values(), SIDE / 2, Frame::Repeated)?;
-    let mut medians = map.values().to_vec();
+    let mut medians = map.clone().into_values();
     medians.par_chunks_exact_mut(size.width).enumerate().try_for_each(|(y, row)| {
         go_on(is_stopped)?;
         let windows = array::from_fn(|index| framed.row(y, index % SIDE, index / SIDE));
         dispatch!(level, simd => write_row::<_, VALUES>(simd, &windows, row));
         Ok(())
     })?;
-    DisparityMap::new(size, medians)
+    Ok(DisparityMap::of(size, medians))
 }
 
 /// Writes the medians of a row. `windows` holds a shifted row for every position in the window.

@@ -41,14 +41,14 @@ const ROWS: usize = 48;
 pub(super) fn write_offsets(
     pair: &StereoPair,
     map: &[f32],
-    limits: RangeInclusive<f32>,
+    limits: &RangeInclusive<f32>,
     refined: &mut [f32],
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
     let width = pair.size().width;
     refined.par_chunks_mut(ROWS * width).enumerate().try_for_each(|(index, refined)| {
         let first = ROWS * index;
-        let part = Part { pair, map, rows: first..first + refined.len() / width, limits: limits.clone() };
+        let part = Part { pair, map, rows: first..first + refined.len() / width, limits };
         part.refine(refined, is_stopped)
     })
 }
@@ -65,7 +65,7 @@ struct Part<'a> {
     pair: &'a StereoPair,
     map: &'a [f32],
     rows: Range<usize>,
-    limits: RangeInclusive<f32>,
+    limits: &'a RangeInclusive<f32>,
 }
 
 impl Part<'_> {
@@ -80,7 +80,7 @@ impl Part<'_> {
             }
             let Some(y) = coming.checked_sub(REACH).filter(|y| self.rows.contains(y)) else { continue };
             let refined = &mut refined[(y - self.rows.start) * width..][..width];
-            dispatch!(level, simd => windows.refine(simd, y, row_of(y), &self.limits, refined));
+            dispatch!(level, simd => windows.refine(simd, y, row_of(y), self.limits, refined));
             if let Some(last) = y.checked_sub(REACH) {
                 dispatch!(level, simd => windows.leave(simd, last));
             }

@@ -1,7 +1,7 @@
 //! Removal of small surfaces, which are usually wrong.
 
 use super::check::AGREE;
-use crate::{DisparityMap, Error, memory};
+use crate::{DisparityMap, Error, memory::Buffer};
 
 /// Makes surfaces of fewer than `least` pixels unknown. A surface consists of adjacent pixels, each of which differs from
 /// the next by no more than [`AGREE`].
@@ -10,7 +10,7 @@ use crate::{DisparityMap, Error, memory};
 /// [`Error::OutOfMemory`].
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
-    let mut surfaces = memory::filled("surfaces", pixels, 0)?;
+    let mut surfaces = Buffer::filled("surfaces", pixels, 0)?;
     join(map.values(), width, &mut surfaces);
     // Pixels of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
     // first one holds the number of pixels, added to that of the image.

@@ -14,15 +14,12 @@ use crate::{DisparityMap, Error, IsStopped, StereoPair, memory::Buffer, metrics:
 pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
-    let width = map.size().width;
-    let mut other = Buffer::filled_unless(is_stopped, "a map", map.values().len(), 0.0)?;
-    let mut refined = Ok(());
-    let map = map.replaced(|values| {
-        refined = write_means(width, values, &mut other, is_stopped)
-            .and_then(|()| write_offsets(pair, &other, least..=largest, values, is_stopped))
-            .and_then(|()| write_means(width, values, &mut other, is_stopped));
-    });
-    refined.map(|()| map.with(&other))
+    let (size, limits, mut values) = (map.size(), least..=largest, map.into_values());
+    let mut means = Buffer::filled_unless(is_stopped, "a map of means", size.pixels(), 0.0)?;
+    write_means(size.width, &values, &limits, &mut means, is_stopped)?;
+    write_offsets(pair, &means, &limits, &mut values, is_stopped)?;
+    write_means(size.width, &values, &limits, &mut means, is_stopped)?;
+    Ok(DisparityMap::of(size, means))
 }
 
 #[cfg(test)]
@@ -108,7 +105,7 @@ mod tests {
         let slope = |x: usize| 10.0 + 0.25 * x as f32;
         let steps: Vec<f32> = (0..size.pixels()).map(|i| slope(i % size.width).round()).collect();
         let mut means = vec![0.0; size.pixels()];
-        write_means(size.width, &steps, &mut means, &never).unwrap();
+        write_means(size.width, &steps, &(10.0..=26.0), &mut means, &never).unwrap();
         let worst = (8..56).map(|x| (means[4 * size.width + x] - slope(x)).abs()).fold(0.0, f32::max);
         assert!(worst <= 0.25, "{worst}");
     }

@@ -1,12 +1,12 @@
 //! Windows around pixels, row by row.
 
-use crate::{DisparityMap, Error, Size, memory};
+use crate::{DisparityMap, Error, Size, memory::Buffer};
 
 /// A map with a frame around it, `[height + 2 frame][width + 2 frame]`, so that windows never leave it.
 pub(super) struct Framed {
     width: usize,
     frame: usize,
-    values: Vec<f32>,
+    values: Buffer<f32>,
 }
 
 /// The contents of the frame.
@@ -22,7 +22,7 @@ impl Framed {
     /// Puts `values`, `[height][width]`, in a frame of this width.
     pub(super) fn new(size: Size, values: &[f32], frame: usize, kind: Frame) -> Result<Self, Error> {
         let (width, height) = (size.width + 2 * frame, size.height + 2 * frame);
-        let mut framed = memory::filled("a map with a frame", width * height, DisparityMap::UNKNOWN)?;
+        let mut framed = Buffer::filled("a map with a frame", width * height, DisparityMap::UNKNOWN)?;
         for (y, row) in framed.chunks_exact_mut(width).enumerate() {
             let inside = (frame..frame + size.height).contains(&y);
             if kind == Frame::Unknown && !inside {

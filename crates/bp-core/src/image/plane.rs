@@ -4,11 +4,11 @@ use std::ops::Deref;
 
 use bytes::Bytes;
 
-use crate::memory;
+use crate::memory::{self, Buffer};
 
 /// Bytes of all pixels, in memory of the image's own or lent by its caller. Clones share them.
 #[derive(Clone)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     bytes: Bytes,
     /// Those of our own memory.
     held: u64,
@@ -40,6 +40,27 @@ impl From<Vec<u8>> for Plane {
 impl From<Vec<[u8; 3]>> for Plane {
     fn from(colours: Vec<[u8; 3]>) -> Self {
         colours.into_flattened().into()
+    }
+}
+
+impl From<Buffer<u8>> for Plane {
+    fn from(values: Buffer<u8>) -> Self {
+        Self { held: values.bytes(), bytes: Bytes::from_owner(values) }
+    }
+}
+
+impl<const CHANNELS: usize> From<Buffer<[u8; CHANNELS]>> for Plane {
+    fn from(pixels: Buffer<[u8; CHANNELS]>) -> Self {
+        Self { held: pixels.bytes(), bytes: Bytes::from_owner(Flattened(pixels)) }
+    }
+}
+
+/// All channels of all pixels, one after another.
+struct Flattened<const CHANNELS: usize>(Buffer<[u8; CHANNELS]>);
+
+impl<const CHANNELS: usize> AsRef<[u8]> for Flattened<CHANNELS> {
+    fn as_ref(&self) -> &[u8] {
+        self.0.as_flattened()
     }
 }
 

@@ -2,8 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{Image, plane::Plane, scaled};
-use crate::{Error, Size, memory};
+use super::{Image, scaled};
+use crate::{
+    Error, Size,
+    memory::{self, Buffer},
+};
 
 /// This share of all values becomes black, and as many white. A few bright roofs or dead pixels would leave no shades for the
 /// others.
@@ -65,11 +68,10 @@ impl Samples {
     /// [`Error::OutOfMemory`].
     pub fn stretched(self, stretch: &Stretch) -> Result<Image, Error> {
         let Self { size: Size { width, height }, channels, values } = self;
-        let mut shades = memory::filled("shades", values.len(), 0)?;
+        let mut shades = Buffer::filled("shades", values.len(), 0)?;
         shades.par_iter_mut().zip(&values).for_each(|(shade, &value)| *shade = stretch.shade(value));
         drop(values);
-        let plane = Plane::from(shades);
-        if channels == 1 { Image::of_greys(width, height, plane) } else { Image::of_colours(width, height, plane) }
+        if channels == 1 { Image::of_greys(width, height, shades) } else { Image::of_colours(width, height, shades) }
     }
 }
 

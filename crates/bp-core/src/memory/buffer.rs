@@ -5,8 +5,9 @@
 //! takes many times as long as reading the value. So buffers lie next to each other in pages of 2 MiB.
 
 use std::{
+    alloc::Layout,
     fmt,
-    mem::MaybeUninit,
+    mem::{ManuallyDrop, MaybeUninit},
     ops::{Deref, DerefMut},
     ptr::NonNull,
     slice,
@@ -77,6 +78,22 @@ impl<T: Copy + Send + Sync> Buffer<T> {
         Ok(Self { start, len, _memory: memory })
     }
 
+    /// A buffer with what `map` makes of each value. The threads of the current pool share the work.
+    ///
+    /// # Errors
+    /// As [`Self::filled`].
+    pub fn mapped<S: Sync>(what: &'static str, values: &[S], map: impl Fn(&S) -> T + Sync) -> Result<Self, Error> {
+        Self::new(what, values.len(), |mapped| {
+            let parts = mapped.par_chunks_mut(TOGETHER).zip(values.par_chunks(TOGETHER));
+            parts.for_each(|(mapped, values)| {
+                for (mapped, value) in mapped.iter_mut().zip(values) {
+                    mapped.write(map(value));
+                }
+            });
+            Ok(())
+        })
+    }
+
     /// Replaces the buffer by one with copies of `value`, if it has fewer than `len` values. Only this thread writes it, because it
     /// may hold a lock: while a thread waits for others, it may take up work that needs the same lock.
     ///
@@ -121,11 +138,64 @@ impl<T> DerefMut for Buffer<T> {
     }
 }
 
+impl<T: Copy + Send + Sync> Clone for Buffer<T> {
+    /// A copy.
+    ///
+    /// # Panics
+    /// If the allocator refuses. For a vector, the program would end.
+    fn clone(&self) -> Self {
+        Self::mapped("a copy", self, |&value| value).unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+impl<T: PartialEq> PartialEq for Buffer<T> {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl<'a, T> IntoIterator for &'a Buffer<T> {
+    type Item = &'a T;
+    type IntoIter = slice::Iter<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<'a, T> IntoIterator for &'a mut Buffer<T> {
+    type Item = &'a mut T;
+    type IntoIter = slice::IterMut<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
+impl<T: Copy> From<Vec<T>> for Buffer<T> {
+    /// The values stay where they are.
+    fn from(values: Vec<T>) -> Self {
+        let mut values = ManuallyDrop::new(values);
+        let layout = Layout::array::<T>(values.capacity()).unwrap_or(Layout::new::<()>());
+        let start = NonNull::from(values.as_mut_slice()).cast::<T>();
+        Self { start, len: values.len(), _memory: Memory::of_vector(start.cast(), layout) }
+    }
+}
+
+impl<T> AsRef<[T]> for Buffer<T> {
+    fn as_ref(&self) -> &[T] {
+        self
+    }
+}
+
 impl<T: fmt::Debug> fmt::Debug for Buffer<T> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.debug_list().entries(self.iter()).finish()
     }
 }
+
+/// Values that one thread makes of others at a time.
+const TOGETHER: usize = 1 << 15;
 
 /// Writes memory for the first time. Most of the time is the system's, to hand it out. So the threads of a pool ask for much
 /// of it together.
@@ -134,11 +204,12 @@ fn fill<T: Copy + Send + Sync>(
     values: &mut [MaybeUninit<T>],
     value: T,
 ) -> Result<(), Error> {
-    let [much, large] = [MUCH, LARGE].map(|bytes| bytes / size_of::<T>());
+    let [much, large, little] = [MUCH, LARGE, LARGE / 16].map(|bytes| bytes / size_of::<T>());
     for part in values.chunks_mut(much) {
         go_on(is_stopped)?;
-        if part.len() > large && rayon::current_thread_index().is_some() {
-            part.par_chunks_mut(large).for_each(|part| part.fill(MaybeUninit::new(value)));
+        if part.len() > 4 * little && rayon::current_thread_index().is_some() {
+            let together = if part.len() > 4 * large { large } else { little };
+            part.par_chunks_mut(together).for_each(|part| part.fill(MaybeUninit::new(value)));
         } else {
             part.fill(MaybeUninit::new(value));
         }
@@ -174,6 +245,22 @@ mod tests {
             });
         }
         assert!(all.iter().all(|(value, buffer)| buffer.iter().all(|byte| byte == value)));
+    }
+
+    #[test]
+    fn a_vector_becomes_a_buffer_where_it_is() {
+        for len in [0, 3, 100_000] {
+            let mut values: Vec<u32> = (0..len).collect();
+            values.reserve(100);
+            let (place, expected) = (values.as_ptr(), values.clone());
+            let buffer = Buffer::from(values);
+            assert!(buffer.as_ptr() == place && *buffer == *expected);
+            let copy = buffer.clone();
+            assert!(copy == buffer && (len == 0 || copy.as_ptr() != place));
+            let doubled = Buffer::mapped("numbers", &buffer, |value| 2 * u64::from(*value)).unwrap();
+            assert!(doubled.iter().zip(&expected).all(|(doubled, &value)| *doubled == 2 * u64::from(value)));
+            assert_eq!((doubled.len(), doubled.bytes()), (len as usize, 8 * u64::from(len)));
+        }
     }
 
     #[test]

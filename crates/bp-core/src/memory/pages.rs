@@ -5,7 +5,10 @@ use std::{
     mem::MaybeUninit,
     ptr::NonNull,
     slice,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use range_alloc::RangeAllocator;
@@ -28,38 +31,56 @@ pub(super) const SMALL: usize = 16 << 10;
 /// As much as this is not shared either.
 pub(super) const CHUNK: usize = 16 << 20;
 
+/// Whether freed memory goes back to the system at once.
+static RETURNS: AtomicBool = AtomicBool::new(false);
+
+/// Makes freed memory go back to the system at once, for programs that must stay within a limit. Buffers of 2 MiB and more then share
+/// no pages. Otherwise up to 16 MiB of freed memory are kept, so that no page has to be made anew for the next pair.
+pub fn return_freed() {
+    RETURNS.store(true, Ordering::Relaxed);
+    keep_idle(0);
+}
+
 /// The memory of a buffer. Freed when dropped.
 pub(super) struct Memory {
     pub(super) start: NonNull<u8>,
     bytes: usize,
+    /// How it was allocated; `None` if it is shared.
+    own: Option<Layout>,
 }
 
 impl Memory {
-    pub(super) const NONE: Self = Self { start: NonNull::<Line>::dangling().cast(), bytes: 0 };
+    pub(super) const NONE: Self =
+        Self { start: NonNull::<Line>::dangling().cast(), bytes: 0, own: Some(Layout::new::<()>()) };
 
     /// `None` if the allocator refuses.
     pub(super) fn new(bytes: usize) -> Option<Self> {
-        let start = match bytes {
-            0 => Self::NONE.start,
-            SMALL..CHUNK if SHARES => take(bytes)?,
-            _ => allocate(Self::layout(bytes)?)?,
-        };
-        Some(Self { start, bytes })
+        let returns = RETURNS.load(Ordering::Relaxed);
+        if bytes == 0 {
+            return Some(Self::NONE);
+        }
+        if SHARES && (SMALL..if returns { LARGE } else { CHUNK }).contains(&bytes) {
+            return Some(Self { start: take(bytes)?, bytes, own: None });
+        }
+        if bytes >= CHUNK {
+            keep_idle(0);
+        }
+        let align = if SHARES && bytes >= LARGE { LARGE } else { LINE };
+        let layout = Layout::from_size_align(bytes, align).ok()?;
+        Some(Self { start: allocate(layout)?, bytes, own: Some(layout) })
     }
 
-    /// The layout of memory that is not shared.
-    fn layout(bytes: usize) -> Option<Layout> {
-        let align = if SHARES && bytes >= CHUNK { LARGE } else { LINE };
-        Layout::from_size_align(bytes, align).ok()
+    /// The memory of a vector, which nobody else may free.
+    pub(super) fn of_vector(start: NonNull<u8>, layout: Layout) -> Self {
+        Self { start, bytes: layout.size(), own: Some(layout) }
     }
 }
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        match self.bytes {
-            0 => {}
-            SMALL..CHUNK if SHARES => give_back(self.start, self.bytes),
-            bytes => free(self.start, Self::layout(bytes)),
+        match self.own {
+            Some(layout) => free(self.start, layout),
+            None => give_back(self.start, self.bytes),
         }
     }
 }
@@ -74,8 +95,8 @@ fn allocate(layout: Layout) -> Option<NonNull<u8>> {
 }
 
 #[expect(unsafe_code, reason = "the counterpart of `allocate`")]
-fn free(start: NonNull<u8>, layout: Option<Layout>) {
-    if let Some(layout) = layout {
+fn free(start: NonNull<u8>, layout: Layout) {
+    if layout.size() > 0 {
         // SAFETY: it was allocated with this layout, and its owner is gone.
         unsafe { dealloc(start.as_ptr(), layout) }
     }
@@ -100,13 +121,13 @@ fn chunks() -> MutexGuard<'static, Vec<Chunk>> {
 }
 
 impl Chunk {
-    const LAYOUT: Option<Layout> = match Layout::from_size_align(CHUNK, LARGE) {
-        Ok(layout) => Some(layout),
-        Err(_) => None,
+    const LAYOUT: Layout = match Layout::from_size_align(CHUNK, LARGE) {
+        Ok(layout) => layout,
+        Err(_) => panic!("an alignment is a power of two"),
     };
 
     fn new() -> Option<Self> {
-        Some(Self { start: allocate(Self::LAYOUT?)?, lines: RangeAllocator::new(0..CHUNK / LINE) })
+        Some(Self { start: allocate(Self::LAYOUT)?, lines: RangeAllocator::new(0..CHUNK / LINE) })
     }
 
     fn take(&mut self, bytes: usize) -> Option<NonNull<u8>> {
@@ -133,15 +154,26 @@ fn take(bytes: usize) -> Option<NonNull<u8>> {
     start
 }
 
-/// Returns shared memory. The system gets back what nobody shares any more.
+/// Returns shared memory. The system gets back chunks that nobody shares any more, except for one: the next pair takes it, and
+/// pages that come back from the system are cleared first.
 fn give_back(start: NonNull<u8>, bytes: usize) {
     let mut chunks = chunks();
-    let found = chunks.iter_mut().enumerate().find_map(|(index, chunk)| {
-        let first = chunk.first_line(start)?;
-        chunk.lines.free_range(first..first + bytes.div_ceil(LINE));
-        Some((index, chunk.lines.is_empty()))
+    let found = chunks.iter_mut().find_map(|chunk| Some((chunk.first_line(start)?, chunk)));
+    let Some((first, chunk)) = found else { return };
+    chunk.lines.free_range(first..first + bytes.div_ceil(LINE));
+    drop(chunks);
+    keep_idle(usize::from(!RETURNS.load(Ordering::Relaxed)));
+}
+
+/// Returns chunks that nobody shares to the system, except for so many.
+fn keep_idle(most: usize) {
+    let mut idle = 0;
+    chunks().retain(|chunk| {
+        idle += usize::from(chunk.lines.is_empty());
+        let is_kept = !chunk.lines.is_empty() || idle <= most;
+        if !is_kept {
+            free(chunk.start, Chunk::LAYOUT);
+        }
+        is_kept
     });
-    if let Some((index, true)) = found {
-        free(chunks.remove(index).start, Chunk::LAYOUT);
-    }
 }

@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::{camera::Rig, view::Rectification};
-use crate::{Calibration, Error, Image, Size, StereoPair, memory};
+use crate::{Calibration, Error, Image, Size, StereoPair, memory::Buffer};
 
 /// Positions are kept in parts of a pixel.
 const PARTS: f64 = 256.0;
@@ -20,7 +20,7 @@ pub struct Rectifier {
     /// The size of the raw images.
     raw: Size,
     /// For each image, where its pixels come from: column and row in 1 / `PARTS` of a pixel, `[height][width]`.
-    positions: [Vec<[u32; 2]>; 2],
+    positions: [Buffer<[u32; 2]>; 2],
 }
 
 impl Rectifier {
@@ -76,10 +76,10 @@ impl Rectifier {
 
     fn resampled(&self, index: usize, image: &Image) -> Result<Image, Error> {
         let (size, level) = (self.rectification.size, Level::new());
-        let mut pixels = memory::filled("a rectified image", size.pixels(), [0; 3])?;
+        let mut pixels = Buffer::filled("a rectified image", size.pixels(), [0; 3])?;
         let rows = pixels.par_chunks_exact_mut(size.width).zip(self.positions[index].par_chunks_exact(size.width));
         rows.for_each(|(row, positions)| dispatch!(level, simd => resample(simd, image, positions, row)));
-        Image::from_rgb(size.width, size.height, pixels)
+        Image::of_colours(size.width, size.height, pixels)
     }
 }
 
@@ -150,7 +150,7 @@ fn resample<S: Simd>(simd: S, image: &Image, positions: &[[u32; 2]], row: &mut [
 }
 
 /// Where the pixels of one rectified image come from.
-fn positions(rig: &Rig, rectification: &Rectification, index: usize) -> Result<Vec<[u32; 2]>, Error> {
+fn positions(rig: &Rig, rectification: &Rectification, index: usize) -> Result<Buffer<[u32; 2]>, Error> {
     let size = Size::new(rectification.size.width, rectification.size.height)?;
     let (camera, ray) = (rig.cameras[index], rectification.ray(index));
     let position = |pixel: [f64; 2]| {
@@ -158,7 +158,7 @@ fn positions(rig: &Rig, rectification: &Rectification, index: usize) -> Result<V
         let [right, bottom] = [camera.size.width, camera.size.height].map(|side| (side - 1) as f64 * PARTS);
         ((0.0..=right).contains(&column) && (0.0..=bottom).contains(&row)).then_some([column as u32, row as u32])
     };
-    let mut positions = memory::filled("the positions of rectified pixels", size.pixels(), NOWHERE)?;
+    let mut positions = Buffer::filled("the positions of rectified pixels", size.pixels(), NOWHERE)?;
     positions.par_chunks_exact_mut(size.width).enumerate().for_each(|(y, row)| {
         for (x, found) in row.iter_mut().enumerate() {
             *found = position([x as f64, y as f64]).unwrap_or(NOWHERE);

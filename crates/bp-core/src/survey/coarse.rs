@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use self::search::Search;
 use super::shrink::LONGEST_SIDE;
-use crate::{DisparityMap, Error, StereoPair, census, finish, memory};
+use crate::{DisparityMap, Error, StereoPair, census, finish, memory::Buffer};
 
 /// The most rows that one thread matches together.
 const ROWS: usize = 40;
@@ -33,7 +33,7 @@ pub(super) struct Matches {
 impl Matches {
     /// How many pixels have a match.
     pub(super) fn count(&self) -> usize {
-        self.found().count()
+        self.map.values().iter().filter(|disparity| disparity.is_finite()).count()
     }
 
     /// The share of pixels that have a match, from 0 to 1.
@@ -54,9 +54,10 @@ impl Matches {
 
     /// Every pixel that has a match.
     pub(super) fn found(&self) -> impl Iterator<Item = Found> {
-        let width = self.width();
-        let known = self.map.values().iter().enumerate().filter(|(_, disparity)| disparity.is_finite());
-        known.map(move |(i, &disparity)| (i % width, i / width, disparity as i32))
+        self.map.values().chunks_exact(self.width()).enumerate().flat_map(|(y, row)| {
+            let known = row.iter().enumerate().filter(|(_, disparity)| disparity.is_finite());
+            known.map(move |(x, &disparity)| (x, y, disparity as i32))
+        })
     }
 }
 
@@ -66,7 +67,7 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
     debug_assert!(size.width <= LONGEST_SIDE);
     let codes = |image| census::codes(image, 0..size.width, 0..size.height);
     let codes: [Vec<u8>; 2] = rayon::join(|| codes(small.left()), || codes(small.right())).into();
-    let mut disparities = memory::filled("coarse matches", size.pixels(), DisparityMap::UNKNOWN)?;
+    let mut disparities = Buffer::filled("coarse matches", size.pixels(), DisparityMap::UNKNOWN)?;
     // Parts of equal height keep all threads busy to the end.
     let rows = size.height.div_ceil(size.height.div_ceil(ROWS));
     disparities.par_chunks_mut(rows * size.width).enumerate().try_for_each(|(part, disparities)| {
@@ -74,7 +75,7 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
         dispatch!(level, simd => search.match_rows(simd, rows * part, disparities));
         Ok(())
     })?;
-    let map = DisparityMap::new(size, disparities)?;
+    let map = DisparityMap::of(size, disparities);
     let map = finish::remove_speckles(map, (size.pixels() / SPECK).max(LEAST_PATCH))?;
     Ok(Matches { rows_down, map })
 }

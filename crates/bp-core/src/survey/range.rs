@@ -3,6 +3,7 @@
 use super::{
     coarse::{Found, Matches},
     ends::{self, Coarse},
+    shrink::LONGEST_SIDE,
 };
 use crate::{Image, MAX_LABELS, Model, StereoPair};
 
@@ -61,21 +62,21 @@ impl DisparityRange {
 impl SeenDisparities {
     /// The range of coarse matches. With the pair and its shrunk left image, its ends are also looked for at full resolution.
     pub(super) fn of(matches: &Matches, factor: usize, closely: Option<(&StereoPair, &Image)>) -> Option<Self> {
-        let all: Vec<Found> = matches.found().collect();
-        let [least, largest] = outermost(&all)?;
+        let all = outermost(matches.found())?;
         // If the match of a pixel may lie outside the right image, the one inside may be false.
-        let is_inside = |x: usize| x as i32 >= largest && (x as i32 - least) < matches.width() as i32;
-        let inside: Vec<Found> = all.iter().copied().filter(|&(x, ..)| is_inside(x)).collect();
-        let inside = if inside.is_empty() { all } else { inside };
-        let [least, largest] = outermost(&inside)?;
+        let is_inside = |&(x, ..): &Found| x as i32 >= all[1] && (x as i32 - all[0]) < matches.width() as i32;
+        let inside = || matches.found().filter(is_inside);
+        let ends = outermost(inside());
+        let [least, largest] = ends.unwrap_or(all);
         let step = factor as i32;
         let Some((pair, small)) = closely else {
             let margin = margin(step * (largest - least)) + step / 2;
             let [least, largest] = outside([step * least, step * largest], step);
             return Some(Self { least, largest, margin });
         };
+        let found: Vec<Found> = if ends.is_some() { inside().collect() } else { matches.found().collect() };
         let mut exact =
-            ends::disparities(pair, &Coarse { small, matches, found: &inside, ends: [least, largest], factor });
+            ends::disparities(pair, &Coarse { small, matches, found: &found, ends: [least, largest], factor });
         // Repeated pictures match far away; a pair that shows no negative disparity has none.
         exact.retain(|&disparity| least < 0 || disparity >= 0);
         let [least, largest] = joined([step * least, step * largest], step, &exact);
@@ -99,12 +100,19 @@ impl SeenDisparities {
 }
 
 /// The least and the largest disparity, when one in [`BEYOND`] at either end does not count.
-fn outermost(found: &[Found]) -> Option<[i32; 2]> {
-    let mut values: Vec<i32> = found.iter().map(|&(.., disparity)| disparity).collect();
-    let strays = values.len() / BEYOND;
-    let last = values.len().checked_sub(strays + 1)?;
-    let least = *values.select_nth_unstable(strays).1;
-    Some([least, *values.select_nth_unstable(last).1])
+fn outermost(found: impl Iterator<Item = Found>) -> Option<[i32; 2]> {
+    // How often each disparity occurs, from minus to plus the width of a shrunk image.
+    let mut counts = [0_usize; 2 * LONGEST_SIDE + 1];
+    found.for_each(|(.., disparity)| counts[(disparity + LONGEST_SIDE as i32) as usize] += 1);
+    let strays = counts.iter().sum::<usize>() / BEYOND;
+    let reached = |mut sum: usize| {
+        move |&count: &usize| {
+            sum += count;
+            sum > strays
+        }
+    };
+    let (least, largest) = (counts.iter().position(reached(0))?, counts.iter().rposition(reached(0))?);
+    Some([least, largest].map(|index| index as i32 - LONGEST_SIDE as i32))
 }
 
 /// The ends of the range in pixels: those of coarse matching, half a shrunk pixel farther out, and what was found at full

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{Error, Image, Size, StereoPair, memory};
+use crate::{Error, Image, Size, StereoPair, memory::Buffer};
 
 /// The longest side of the shrunk images in pixels. Disparities of up to half of it, in both directions, fit 8 bits.
 pub const LONGEST_SIDE: usize = 200;
@@ -38,14 +38,14 @@ pub(super) fn shrunk(pair: &StereoPair, factor: usize) -> Result<StereoPair, Err
 fn mean_of_blocks(image: &Image, factor: usize) -> Result<Image, Error> {
     let (Size { width, height }, level) = (image.size(), Level::new());
     let (columns, rows) = ((width / factor).max(1), (height / factor).max(1));
-    let mut means = memory::filled("a smaller image", columns * rows, 0u8)?;
+    let mut means = Buffer::filled("a smaller image", columns * rows, 0u8)?;
     means.par_chunks_exact_mut(columns).with_min_len(MIN_ROWS).enumerate().for_each(|(row, means)| {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || write_means(image, factor, row, means),
         ));
     });
-    Image::from_grey(columns, rows, means)
+    Image::of_greys(columns, rows, means)
 }
 
 /// Writes the means of a row of blocks.

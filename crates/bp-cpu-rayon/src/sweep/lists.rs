@@ -85,11 +85,13 @@ impl Lists {
     }
 
     /// The entries of a patch.
+    #[inline(always)]
     pub(crate) fn range(&self, patch: usize) -> Range<usize> {
         self.starts[patch]..self.starts[patch + 1]
     }
 
     /// The list of a patch.
+    #[inline(always)]
     pub(crate) fn list(&self, patch: usize) -> List<'_> {
         let range = self.range(patch);
         List { labels: &self.labels[range.clone()], steps: &self.steps[range.start + patch..range.end + patch + 1] }

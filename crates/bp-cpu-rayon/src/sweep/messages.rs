@@ -38,6 +38,7 @@ impl Messages {
     }
 
     /// The edges of the nodes of `plane` in a row, for these entries of all. Rows are counted from the first one.
+    #[inline(always)]
     pub(crate) fn around(&mut self, at: &Place<'_>) -> Around<'_> {
         let &Place { entries, row, plane, range } = at;
         let inside = row * entries + range.start..row * entries + range.end;
@@ -51,6 +52,7 @@ impl Messages {
     }
 
     /// The same, to be read.
+    #[inline(always)]
     pub(crate) fn at(&self, at: &Place<'_>) -> Held<'_> {
         let &Place { entries, row, plane, range } = at;
         let inside = row * entries + range.start..row * entries + range.end;

@@ -194,7 +194,14 @@ impl Pass<'_> {
     }
 
     /// Sets the messages of a patch over horizontal edges that do not exist to zeros.
+    #[inline(always)]
     fn close(&mut self, patch: usize, y: usize) {
+        if self.sweep.gaps.iter().flatten().any(|gap| gap.patch == patch) {
+            self.close_gaps(patch, y);
+        }
+    }
+
+    fn close_gaps(&mut self, patch: usize, y: usize) {
         let entries = self.lists.entries();
         let range = self.lists.range(patch);
         let inside = (y - self.rows.start) * entries;

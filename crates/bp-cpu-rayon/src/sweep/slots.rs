@@ -20,6 +20,8 @@ pub(super) struct Slots<T> {
 struct Turns {
     slots: Vec<Turn>,
     has_failed: bool,
+    /// How many threads wait for a change.
+    waiting: usize,
 }
 
 #[derive(Clone, Default)]
@@ -33,7 +35,7 @@ struct Turn {
 impl<T> Slots<T> {
     /// Slots with this memory.
     pub(super) fn new(values: Vec<T>) -> Self {
-        let turns = Turns { slots: vec![Turn::default(); values.len()], has_failed: false };
+        let turns = Turns { slots: vec![Turn::default(); values.len()], ..Turns::default() };
         Self {
             values: values.into_iter().map(RwLock::new).collect(),
             turns: Mutex::new(turns),
@@ -62,8 +64,7 @@ impl<T> Slots<T> {
         let before = index.checked_sub(self.values.len());
         self.wait(|turns| turns.slots[slot].made == before && turns.slots[slot].readers == 0)?;
         make(&mut self.values[slot].write().unwrap_or_else(PoisonError::into_inner))?;
-        self.turns().slots[slot] = Turn { made: Some(index), readers };
-        self.changed.notify_all();
+        self.change(|turns| turns.slots[slot] = Turn { made: Some(index), readers });
         Ok(())
     }
 
@@ -79,8 +80,7 @@ impl<T> Slots<T> {
 
     /// Wakes everyone who waits: a task failed.
     pub(super) fn fail(&self) {
-        self.turns().has_failed = true;
-        self.changed.notify_all();
+        self.change(|turns| turns.has_failed = true);
     }
 
     /// Calls `of` with the memory of every slot and adds up the results.
@@ -90,8 +90,20 @@ impl<T> Slots<T> {
 
     fn wait(&self, until: impl Fn(&Turns) -> bool) -> Result<(), Error> {
         let waits = |turns: &mut Turns| !turns.has_failed && !until(turns);
-        let turns = self.changed.wait_while(self.turns(), waits).unwrap_or_else(PoisonError::into_inner);
+        let mut turns = self.turns();
+        turns.waiting += 1;
+        let mut turns = self.changed.wait_while(turns, waits).unwrap_or_else(PoisonError::into_inner);
+        turns.waiting -= 1;
         if turns.has_failed { Err(Error::Stopped) } else { Ok(()) }
+    }
+
+    /// Changes the turns and wakes those who wait, if any: telling nobody would cost a call of the system, hundreds of times a match.
+    fn change(&self, change: impl FnOnce(&mut Turns)) {
+        let mut turns = self.turns();
+        change(&mut turns);
+        if turns.waiting > 0 {
+            self.changed.notify_all();
+        }
     }
 
     fn turns(&self) -> MutexGuard<'_, Turns> {
@@ -116,9 +128,10 @@ impl<T> Deref for Reading<'_, T> {
 
 impl<T> Drop for Reading<'_, T> {
     fn drop(&mut self) {
-        let turn = &mut self.slots.turns().slots[self.slot];
-        turn.readers = turn.readers.saturating_sub(1);
-        self.slots.changed.notify_all();
+        self.slots.change(|turns| {
+            let turn = &mut turns.slots[self.slot];
+            turn.readers = turn.readers.saturating_sub(1);
+        });
     }
 }
 

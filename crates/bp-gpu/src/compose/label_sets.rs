@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use bp_core::{BAND_ROWS, Patch, Seam, Side};
+use bp_core::{BAND_ROWS, LabelSet, Patch, Seam, Side};
 
 use super::{
     composer::{Composer, Nodes, Rows, Work},
@@ -91,7 +91,8 @@ impl Composer<'_> {
         let row_items = size.width.div_ceil(Patch::COLUMNS);
         let mut work = Work { row_items, rows: Rows::from_top(count), ..work };
         work.parameters.seams = seams.into();
-        let pipeline = Pipeline { kernel: Kernel::LabelSets, constants: Vec::new() };
+        let constants = vec![("AGREEING", LabelSet::agreeing(grid).into())];
+        let pipeline = Pipeline { kernel: Kernel::LabelSets, constants };
         self.dispatch(part, pipeline, vec![sets, self.buffers.labels[grid + 1]], work);
         part.push_short(Command::Barrier);
     }

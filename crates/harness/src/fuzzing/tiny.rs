@@ -64,7 +64,7 @@ fn all(drawn: &Drawn, devices: [&dyn Device; 2]) -> Result<(), Error> {
     let tilings = [Ok(Tiling::cut(plan.clone(), tile.0, tile.1)), Tiling::within(plan, *memory, &needed, &likely)];
     tilings.into_iter().flatten().try_for_each(|tiling| tiles(&tiling, pair, &left, devices))?;
     let map = |labels: &[u16]| DisparityMap::from_labels(pair.size(), plan.model(), labels);
-    finished(drawn.finish, pair, map(&left), &map(&right).mirrored())?;
+    finished(drawn.finish, pair, map(&left)?, &map(&right)?.mirrored())?;
     surveyed(pair)
 }
 

@@ -201,7 +201,7 @@ fn prepare<'a>(runner: &'a Runner, planned: &Planned, problem: &'a Problem) -> R
 /// The results that all backends must agree on, by name.
 fn answer(driver: &Driver, problem: &Problem) -> Result<[(&'static str, String); 5], Failure> {
     let (scene, plan) = (&problem.scene, driver.plan());
-    let errors = scene.truth.errors(&driver.disparities())?;
+    let errors = scene.truth.errors(&driver.disparities()?)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let energy = Energy::of(&scene.pair, plan.model(), driver.labels())?.total();
     Ok([

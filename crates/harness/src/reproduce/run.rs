@@ -239,7 +239,7 @@ fn first_measurement(
     solved: Solved,
     folder: &Path,
 ) -> Result<Measurement, Failure> {
-    let disparities = DisparityMap::from_labels(plan.image_size(), plan.model(), &solved.labels);
+    let disparities = DisparityMap::from_labels(plan.image_size(), plan.model(), &solved.labels)?;
     let errors = scene.truth.errors(&disparities)?;
     let visible = errors.visible.ok_or_else(|| Failure::other("a scene without visible pixels"))?;
     let map = format!("{}/{}-{}.png", record::MAPS_FOLDER, cell.scene, cell.plan);

@@ -9,7 +9,7 @@ use super::{
     best::write_best,
     compared::{LANES, UNIT, differences, first_steps, interpolate},
 };
-use crate::{Error, StereoPair, memory};
+use crate::{Error, StereoPair, memory::Buffer};
 
 /// The columns that interpolation reads beyond the left and right border.
 const BORDER: [usize; 2] = [1, 2];
@@ -22,20 +22,20 @@ pub(super) struct Windows {
     /// How many rows there are.
     rows: usize,
     /// The grey values of a row of the left image, in [`UNIT`]s.
-    left: Vec<i16>,
+    left: Buffer<i16>,
     /// Those of the right image, whose borders are repeated outward by [`BORDER`].
-    greys: Vec<u8>,
+    greys: Buffer<u8>,
     /// The right image's row in steps.
-    right: Vec<i16>,
+    right: Buffer<i16>,
     /// See [`first_steps`]; `[row mod 7][column]`.
-    first: Vec<i32>,
+    first: Buffer<i32>,
     /// Grey differences in [`UNIT`]s, `[row mod 7][step][column]`. Rows have [`REACH`] more columns on both sides, with zeros.
-    differences: Vec<i16>,
+    differences: Buffer<i16>,
     /// Sums of the differences in each column, and of their squares, `[step][column]`.
-    sums: Vec<i32>,
-    squares: Vec<i32>,
+    sums: Buffer<i32>,
+    squares: Buffer<i32>,
     /// The variances in the windows around a row, times their pixels, `[step][column]`.
-    variances: Vec<f32>,
+    variances: Buffer<f32>,
 }
 
 impl Windows {
@@ -46,14 +46,14 @@ impl Windows {
             width,
             columns,
             rows: 0,
-            left: memory::filled(what, columns, 0)?,
-            greys: memory::filled(what, BORDER[0] + width + BORDER[1], 0)?,
-            right: memory::filled(what, STEPS * columns, 0)?,
-            first: memory::filled(what, SIDE * columns, 0)?,
-            differences: memory::filled(what, SIDE * all, 0)?,
-            sums: memory::filled(what, all, 0)?,
-            squares: memory::filled(what, all, 0)?,
-            variances: memory::filled(what, TRIED * width, 0.0)?,
+            left: Buffer::filled(what, columns, 0)?,
+            greys: Buffer::filled(what, BORDER[0] + width + BORDER[1], 0)?,
+            right: Buffer::filled(what, STEPS * columns, 0)?,
+            first: Buffer::filled(what, SIDE * columns, 0)?,
+            differences: Buffer::filled(what, SIDE * all, 0)?,
+            sums: Buffer::filled(what, all, 0)?,
+            squares: Buffer::filled(what, all, 0)?,
+            variances: Buffer::filled(what, TRIED * width, 0.0)?,
         })
     }
 

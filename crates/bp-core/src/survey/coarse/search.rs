@@ -2,7 +2,7 @@
 
 use fearless_simd::{Select, Simd, SimdBase, SimdInt, u8x32};
 
-use crate::{Error, Size, memory};
+use crate::{Error, Size, memory::Buffer};
 
 /// Half the side of a window: the costs of 25 pixels add up to at most 200, which fits 8 bits.
 const RADIUS: usize = 2;
@@ -29,33 +29,33 @@ pub(super) struct Search<'a> {
     /// The width, rounded up.
     wide: usize,
     /// 255 at the columns of an image, 0 around them, with `reach` more columns on both sides.
-    inside: Vec<u8>,
+    inside: Buffer<u8>,
     /// Codes of a row of the left image.
-    left_codes: Vec<u8>,
+    left_codes: Buffer<u8>,
     /// Codes of a row of the right image, with `reach` more columns on both sides.
-    right_codes: Vec<u8>,
+    right_codes: Buffer<u8>,
     /// Costs of the pixels of a row, `[disparity][column]`, with [`RADIUS`] more columns on both sides.
-    pixels: Vec<u8>,
+    pixels: Buffer<u8>,
     /// Costs summed along rows, `[row mod SIDE][disparity][column]`.
-    strips: Vec<u8>,
+    strips: Buffer<u8>,
     /// Costs of the windows of one row, `[disparity][column]`, with `reach` more columns before the first and after the last
     /// disparity.
-    windows: Vec<u8>,
+    windows: Buffer<u8>,
     /// The best disparities of left pixels, `[column]`.
-    left: Vec<u8>,
+    left: Buffer<u8>,
     /// Their costs.
-    least: Vec<u8>,
+    least: Buffer<u8>,
     /// The least costs of left pixels at disparities that are not adjacent to the best one.
-    second: Vec<u8>,
+    second: Buffer<u8>,
     /// The best disparities of right pixels.
-    right: Vec<u8>,
+    right: Buffer<u8>,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(size: Size, codes: &'a [Vec<u8>; 2], rows_down: isize) -> Result<Self, Error> {
         let (reach, wide) = (size.width / 2, size.width.next_multiple_of(LANES));
         let disparities = 2 * reach + 1;
-        let filled = |len, value| memory::filled("coarse costs", len, value);
+        let filled = |len, value| Buffer::filled("coarse costs", len, value);
         let mut inside = filled(wide + 2 * reach, 0)?;
         inside[reach..reach + size.width].fill(u8::MAX);
         Ok(Self {
