@@ -5,17 +5,13 @@ use std::{borrow::Cow, ops::Range};
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
-use crate::{
-    Error, Size,
-    limits::MAX_SIDE,
-    memory::{self, Buffer},
-};
+use crate::{Error, Size, limits::MAX_SIDE, memory::Buffer};
 
 mod plane;
 mod samples;
 mod shades;
 
-use plane::Plane;
+use plane::{Plane, mirrored, part_of};
 
 pub use samples::{Samples, Stretch};
 pub use shades::{NotAShade, common_factor, factor_to_8_bits, narrow, scaled};
@@ -293,21 +289,6 @@ fn write_greys(pixels: &[[u8; 3]], greys: &mut [u8]) -> bool {
             differing == 0
         },
     ))
-}
-
-fn mirrored<T: Copy>(width: usize, values: &[T]) -> Vec<T> {
-    let mut mirrored = values.to_vec();
-    mirrored.chunks_exact_mut(width).for_each(<[_]>::reverse);
-    mirrored
-}
-
-/// Some columns and rows of values in rows of this width.
-fn part_of<T: Copy>(values: &[T], width: usize, columns: &Range<usize>, rows: &Range<usize>) -> Vec<T> {
-    let mut part = Vec::with_capacity(rows.len() * columns.len());
-    memory::ask_for_large_pages(part.spare_capacity_mut());
-    let rows = values[rows.start * width..rows.end * width].chunks_exact(width);
-    rows.for_each(|row| part.extend_from_slice(&row[columns.clone()]));
-    part
 }
 
 impl std::fmt::Debug for Image {

@@ -49,14 +49,12 @@ fn ratios_of_tiles(pairs: &[(StereoPair, usize)]) -> [f64; 2] {
     means.map(|sum| sum / pairs.len() as f64)
 }
 
-/// Bands that exchanged nothing had ratios of 5.7, 10.0, 12.8 and 16.6. Straight borders of tiles had 2.0 between rows. Label sets have
-/// 1.3, 1.3, 1.3 and 1.6: these scenes have few borders every 128 rows, and labels that hardly eight nodes of grid 1 have.
+/// Bands that exchanged nothing had ratios of 5.7, 10.0, 12.8 and 16.6. Straight borders of tiles had 2.0 between rows.
 #[test]
 fn synthetic_scenes_have_no_seams() {
     let pairs: Vec<_> = (0..6).map(|scene| (synthetic::scene(scene, 2).pair, 56)).collect();
-    for (label_sets, most) in [(false, 1.5), (true, 1.6)] {
-        let ratios = ratios(&pairs, label_sets);
-        assert!(ratios.iter().all(|&ratio| ratio < most), "{ratios:?}");
+    for ratios in [false, true].map(|label_sets| ratios(&pairs, label_sets)) {
+        assert!(ratios.iter().all(|&ratio| ratio < 1.5), "{ratios:?}");
     }
     let tiles = ratios_of_tiles(&pairs);
     assert!(tiles.iter().all(|&ratio| ratio < 1.5), "{tiles:?}");

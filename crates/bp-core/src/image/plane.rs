@@ -1,6 +1,6 @@
 //! The values of an image in memory.
 
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 use bytes::Bytes;
 
@@ -70,4 +70,20 @@ impl Deref for Plane {
     fn deref(&self) -> &[u8] {
         &self.bytes
     }
+}
+
+/// Values in rows of this width, mirrored left to right.
+pub(super) fn mirrored<T: Copy>(width: usize, values: &[T]) -> Vec<T> {
+    let mut mirrored = values.to_vec();
+    mirrored.chunks_exact_mut(width).for_each(<[_]>::reverse);
+    mirrored
+}
+
+/// Some columns and rows of values in rows of this width.
+pub(super) fn part_of<T: Copy>(values: &[T], width: usize, columns: &Range<usize>, rows: &Range<usize>) -> Vec<T> {
+    let mut part = Vec::with_capacity(rows.len() * columns.len());
+    memory::ask_for_large_pages(part.spare_capacity_mut());
+    let rows = values[rows.start * width..rows.end * width].chunks_exact(width);
+    rows.for_each(|row| part.extend_from_slice(&row[columns.clone()]));
+    part
 }

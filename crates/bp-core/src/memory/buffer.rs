@@ -178,7 +178,7 @@ impl<T: Copy> From<Vec<T>> for Buffer<T> {
         let mut values = ManuallyDrop::new(values);
         let layout = Layout::array::<T>(values.capacity()).unwrap_or(Layout::new::<()>());
         let start = NonNull::from(values.as_mut_slice()).cast::<T>();
-        Self { start, len: values.len(), _memory: Memory::of_vector(start.cast(), layout) }
+        Self { start, len: values.len(), _memory: Memory::own(start.cast(), layout) }
     }
 }
 

@@ -44,43 +44,42 @@ pub fn return_freed() {
 /// The memory of a buffer. Freed when dropped.
 pub(super) struct Memory {
     pub(super) start: NonNull<u8>,
-    bytes: usize,
-    /// How it was allocated; `None` if it is shared.
-    own: Option<Layout>,
+    layout: Layout,
+    is_shared: bool,
 }
 
 impl Memory {
-    pub(super) const NONE: Self =
-        Self { start: NonNull::<Line>::dangling().cast(), bytes: 0, own: Some(Layout::new::<()>()) };
+    pub(super) const NONE: Self = Self::own(NonNull::<Line>::dangling().cast(), Layout::new::<()>());
 
     /// `None` if the allocator refuses.
     pub(super) fn new(bytes: usize) -> Option<Self> {
-        let returns = RETURNS.load(Ordering::Relaxed);
         if bytes == 0 {
             return Some(Self::NONE);
         }
-        if SHARES && (SMALL..if returns { LARGE } else { CHUNK }).contains(&bytes) {
-            return Some(Self { start: take(bytes)?, bytes, own: None });
+        let align = if SHARES && bytes >= LARGE { LARGE } else { LINE };
+        let layout = Layout::from_size_align(bytes, align).ok()?;
+        let not_shared = if RETURNS.load(Ordering::Relaxed) { LARGE } else { CHUNK };
+        if SHARES && (SMALL..not_shared).contains(&bytes) {
+            return Some(Self { start: take(bytes)?, layout, is_shared: true });
         }
         if bytes >= CHUNK {
             keep_idle(0);
         }
-        let align = if SHARES && bytes >= LARGE { LARGE } else { LINE };
-        let layout = Layout::from_size_align(bytes, align).ok()?;
-        Some(Self { start: allocate(layout)?, bytes, own: Some(layout) })
+        Some(Self::own(allocate(layout)?, layout))
     }
 
-    /// The memory of a vector, which nobody else may free.
-    pub(super) fn of_vector(start: NonNull<u8>, layout: Layout) -> Self {
-        Self { start, bytes: layout.size(), own: Some(layout) }
+    /// Memory that was allocated with this layout, as a vector's is, and that nobody else may free.
+    pub(super) const fn own(start: NonNull<u8>, layout: Layout) -> Self {
+        Self { start, layout, is_shared: false }
     }
 }
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        match self.own {
-            Some(layout) => free(self.start, layout),
-            None => give_back(self.start, self.bytes),
+        if self.is_shared {
+            give_back(self.start, self.layout.size());
+        } else {
+            free(self.start, self.layout);
         }
     }
 }
