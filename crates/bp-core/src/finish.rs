@@ -9,6 +9,7 @@ mod fill;
 mod means;
 mod median;
 mod offsets;
+mod rows;
 mod speckles;
 mod subpixel;
 mod window;

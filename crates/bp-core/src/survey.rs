@@ -84,10 +84,10 @@ impl Survey {
         let factor = shrink::factor(pair.size());
         let small = shrink::shrunk(pair, factor)?;
         let looks = looks(&small)?;
-        let best = looks.iter().reduce(|a, b| if b.count() > a.count() { b } else { a });
-        let (count, matched) = best.map_or((0, 0.0), |best| (best.count(), best.share()));
+        let best = looks.iter().reduce(|a, b| if b.count > a.count { b } else { a });
+        let (count, matched) = best.map_or((0, 0.0), |best| (best.count, best.share()));
         let best = best.filter(|_| count >= LEAST_MATCHES && matched >= LEAST_SHARE);
-        let negative = best.map_or(0, |best| best.found().filter(|&(_, _, disparity)| disparity < 0).count());
+        let negative = best.map_or(0, Matches::negative);
         // A shrunk image is still matched if its rows are apart by one pixel, and half a pixel more at its borders.
         let most_down = looks.iter().map(|look| look.rows_down.unsigned_abs()).max().unwrap_or(0);
         let reach = factor * (most_down + 1) + factor.div_ceil(2);

@@ -27,7 +27,7 @@ const LARGEST_SPREAD: f64 = 0.5;
 /// The numbers of terms to choose from: none, a constant, a plane, a quadratic.
 const CHOICES: [usize; 4] = [0, 1, 3, TERMS];
 
-/// The rows by which a point moved, and the terms at its place.
+/// The terms at the place of a point, and the rows by which it moved.
 struct Point {
     terms: [f64; TERMS],
     rows: f64,
@@ -39,6 +39,9 @@ impl Point {
         self.rows - self.terms.iter().zip(coefficients).map(|(term, coefficient)| term * coefficient).sum::<f64>()
     }
 }
+
+/// The normal equations of a weighted least-squares fit. The last column is the right side.
+type Equations = [[f64; TERMS + 1]; TERMS];
 
 /// The coefficients; `None` if too few points agree. Terms without a clear effect are left out.
 pub(super) fn quadratic(size: Size, moved: &[Moved]) -> Option<[f64; TERMS]> {
@@ -57,7 +60,7 @@ pub(super) fn quadratic(size: Size, moved: &[Moved]) -> Option<[f64; TERMS]> {
             let kept = (1.0 - part * part).max(0.0);
             point.weight = moved.weight * kept * kept;
         }
-        coefficients = fitted(&points, TERMS)?;
+        coefficients = solved(equations(&points), TERMS)?;
     }
     let agree = points.iter().filter(|point| point.residual(&coefficients).abs() < 3.0 * spread).count();
     let enough = agree >= LEAST_POINTS && agree as f64 >= LEAST_SHARE * points.len() as f64;
@@ -71,7 +74,8 @@ fn chosen(points: &[Point]) -> Option<[f64; TERMS]> {
         points.iter().map(|point| point.weight * square(point.residual(coefficients))).sum()
     };
     let count = points.iter().filter(|point| point.weight > 0.0).count();
-    let fits: Vec<[f64; TERMS]> = CHOICES.into_iter().filter_map(|terms| fitted(points, terms)).collect();
+    let equations = equations(points);
+    let fits: Vec<[f64; TERMS]> = CHOICES.into_iter().filter_map(|terms| solved(equations, terms)).collect();
     let variance = squares(fits.last()?) / count.checked_sub(TERMS)? as f64;
     // The logarithm of whole powers of two: that of floats may differ between machines.
     let price = |terms: usize| terms as f64 * LN_2 * f64::from(count.checked_ilog2().unwrap_or(0)) * variance;
@@ -85,23 +89,22 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The weighted least-squares fit of the first `count` terms; `None` if the points do not determine them.
-fn fitted(points: &[Point], count: usize) -> Option<[f64; TERMS]> {
-    let mut rows = [[0.0; TERMS + 1]; TERMS];
-    for Point { terms, rows: moved, weight } in points {
-        for (i, row) in rows[..count].iter_mut().enumerate() {
-            for (sum, term) in row.iter_mut().zip(terms[..count].iter()) {
-                *sum += weight * terms[i] * term;
-            }
-            row[TERMS] += weight * terms[i] * moved;
+fn equations(points: &[Point]) -> Equations {
+    let mut equations = [[0.0; TERMS + 1]; TERMS];
+    for Point { terms: [a, b, c, d, e, f], rows, weight } in points {
+        let values = [*a, *b, *c, *d, *e, *f, *rows];
+        for (row, term) in equations.iter_mut().zip(values) {
+            let weighted = weight * term;
+            row.iter_mut().zip(values).for_each(|(sum, value)| *sum += weighted * value);
         }
     }
-    solved(&mut rows[..count])
+    equations
 }
 
-/// The solution of a positive definite system by elimination; its last column is the right side. Missing rows give 0.
-fn solved(rows: &mut [[f64; TERMS + 1]]) -> Option<[f64; TERMS]> {
-    for i in 0..rows.len() {
+/// The fit of the first `count` terms by elimination; `None` if the points do not determine them. The other terms are 0.
+fn solved(mut equations: Equations, count: usize) -> Option<[f64; TERMS]> {
+    let rows = &mut equations[..count];
+    for i in 0..count {
         let pivot = rows[i];
         if pivot[i].is_nan() || pivot[i] <= f64::EPSILON * rows[0][0].abs() {
             return None;

@@ -17,6 +17,9 @@ const STEEPEST: f32 = SLANT as f32 / MIDDLE[1] as f32;
 /// The columns that a window and its interpolation may read.
 const WIDE: usize = WIDTH + 3 + 2 * SLANT;
 
+/// The same, rounded up to whole vectors.
+const LINE: usize = WIDE.next_multiple_of(16);
+
 /// The least mean of the squared slopes along columns.
 const LEAST_CONTRAST: f32 = 1.0;
 
@@ -39,8 +42,8 @@ const FARTHEST: f32 = 1.5;
 /// [`FARTHEST`] in whole pixels.
 const FAR: usize = FARTHEST.ceil() as usize;
 
-/// The columns and rows that windows this far away may read.
-const AREA: [usize; 2] = [WIDE + 2 * FAR, HEIGHT + 3 + 2 * FAR];
+/// The columns and rows that are interpolated for windows this far away.
+const AREA: [usize; 2] = [LINE + 2 * FAR, HEIGHT + 3 + 2 * FAR];
 
 /// A window matches if the sum of its squared differences is at most this share of the sum of its squared contrasts.
 const LARGEST_SHARE: f32 = 0.25;
@@ -271,16 +274,19 @@ impl Area {
         let [left, top] = [left.checked_sub(self.first[0])?, top.checked_sub(self.first[1])?];
         let greys = self.values.get(top..top + HEIGHT + 3)?;
         let down = weights(y - y.floor());
-        for (j, row) in window.iter_mut().enumerate() {
+        // All lines first: loading at another place what was just stored has to wait for it.
+        let mut lines = [[0.0; LINE]; HEIGHT];
+        for (j, line) in lines.iter_mut().enumerate() {
             let near = [0, 1, 2, 3].map(
                 #[inline(always)]
-                |i: usize| greys[j + i].get(left..left + WIDE),
+                |i: usize| greys[j + i].get(left..left + LINE),
             );
             let [Some(a), Some(b), Some(c), Some(d)] = near else { return None };
-            let mut line = [0.0; WIDE];
-            for i in 0..WIDE {
+            for i in 0..LINE {
                 line[i] = down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i];
             }
+        }
+        for (j, (row, line)) in window.iter_mut().zip(&lines).enumerate() {
             let shift = SLANT as f32 + x - x.floor() + slant * (j as f32 - MIDDLE[1] as f32);
             let across = weights(shift - shift.floor());
             let line = line.get(shift as usize..shift as usize + WIDTH + 3)?;

@@ -14,6 +14,9 @@ const STEPS: usize = 64;
 /// This many neighbouring pixels are taken from the same rows.
 const TOGETHER: usize = 32;
 
+/// So many runs of such pixels are located at once.
+const RUNS: usize = 16;
+
 /// The sum of the weights of four rows.
 const ONE: i16 = 1 << 7;
 
@@ -65,17 +68,30 @@ impl<'a, R> Resampling<'a, R> {
     where
         R: Fn(isize) -> &'a [[u8; CHANNELS]],
     {
-        for (run, out) in row.chunks_mut(TOGETHER).enumerate() {
-            let x = run * TOGETHER;
-            let rows = self.alignment.rows_at((x + TOGETHER / 2) as f64, y as f64);
-            let step = (STEPS as f64 * rows + 0.5).floor() as isize;
-            let top = y as isize + step.div_euclid(STEPS as isize) - 1;
-            let rows = [0, 1, 2, 3].map(
-                #[inline(always)]
-                |i| (self.row_near)(top + i)[x..x + out.len()].as_flattened(),
-            );
-            write_mixed(rows, self.weights[step.rem_euclid(STEPS as isize) as usize], out.as_flattened_mut());
+        for (part, row) in row.chunks_mut(RUNS * TOGETHER).enumerate() {
+            let first = part * RUNS * TOGETHER;
+            for ((run, out), step) in row.chunks_mut(TOGETHER).enumerate().zip(self.steps(first, y)) {
+                let (x, step) = (first + run * TOGETHER, step as isize);
+                let top = y as isize + step.div_euclid(STEPS as isize) - 1;
+                let rows = [0, 1, 2, 3].map(
+                    #[inline(always)]
+                    |i| (self.row_near)(top + i)[x..x + out.len()].as_flattened(),
+                );
+                write_mixed(rows, self.weights[step.rem_euclid(STEPS as isize) as usize], out.as_flattened_mut());
+            }
         }
+    }
+
+    /// By how many steps runs of pixels move, the first of which begins at column x. This takes vectors of runs.
+    #[inline(always)]
+    fn steps(&self, x: usize, y: usize) -> [f64; RUNS] {
+        array::from_fn(
+            #[inline(always)]
+            |run| {
+                let middle = x + run * TOGETHER + TOGETHER / 2;
+                (STEPS as f64 * self.alignment.rows_at(middle as f64, y as f64) + 0.5).floor()
+            },
+        )
     }
 }
 

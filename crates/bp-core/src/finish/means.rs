@@ -5,7 +5,7 @@ use std::{array, ops::RangeInclusive};
 use fearless_simd::{Bytes, Level, Select, Simd, SimdBase, SimdInt, dispatch, u8x16};
 use rayon::prelude::*;
 
-use super::check::AGREE;
+use super::{check::AGREE, rows::rows_together};
 use crate::{DisparityMap, Error, IsStopped, memory::Buffer, stop::go_on};
 
 /// Windows are 3x3 pixels that lie this far apart, in one pass after the other. Two passes make means over 9x9 pixels of two
@@ -18,9 +18,6 @@ const REACH: usize = 8;
 
 /// Unknown columns on both sides of a map.
 const MARGIN: usize = 3;
-
-/// Rows that one thread computes together.
-const ROWS: usize = 48;
 
 /// The most lanes of a vector. Rows have room for whole vectors.
 const MOST_LANES: usize = 32;
@@ -41,18 +38,19 @@ pub(super) fn write_means(
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
     let all_small = -MOST <= *limits.start() && *limits.end() <= MOST;
-    means.par_chunks_mut(ROWS * width).enumerate().try_for_each(|(index, means)| {
+    let rows = rows_together(map.len() / width, rayon::current_num_threads());
+    means.par_chunks_mut(rows * width).enumerate().try_for_each(|(index, means)| {
         if all_small {
-            write_rows::<u16>(width, map, ROWS * index, means, is_stopped)
+            write_rows::<u16>(width, map, rows * index, means, is_stopped)
         } else {
-            write_rows::<f32>(width, map, ROWS * index, means, is_stopped)
+            write_rows::<f32>(width, map, rows * index, means, is_stopped)
         }
     })
 }
 
-/// The temporary bytes of a thread for a map of this width.
-pub(super) fn bytes(width: usize) -> u64 {
-    2 * (Block::<f32>::ROWS * wide(width) * size_of::<f32>()) as u64
+/// The temporary bytes of a thread for so many rows of this width.
+pub(super) fn bytes(width: usize, rows: usize) -> u64 {
+    2 * ((rows + 2 * REACH) * wide(width) * size_of::<f32>()) as u64
 }
 
 /// The columns of a row and its margins.
@@ -74,7 +72,7 @@ where
     let last = first + means.len() / width;
     let around = |reach: usize| first.saturating_sub(reach)..(last + reach).min(height);
     let place = |y: usize| y + REACH - first;
-    let [mut before, mut after] = [Block::<T>::new(width)?, Block::new(width)?];
+    let [mut before, mut after] = [Block::<T>::around(last - first, width)?, Block::around(last - first, width)?];
     for y in around(REACH) {
         dispatch!(level, simd => enter(simd, &map[y * width..][..width], before.row(place(y))));
     }
@@ -112,11 +110,10 @@ struct Block<T> {
 }
 
 impl<T: Value> Block<T> {
-    const ROWS: usize = ROWS + 2 * REACH;
-
-    fn new(width: usize) -> Result<Self, Error> {
+    /// So many rows, and [`REACH`] more above and below.
+    fn around(rows: usize, width: usize) -> Result<Self, Error> {
         let wide = wide(width);
-        Ok(Self { values: Buffer::filled("rows of a map", Self::ROWS * wide, T::UNKNOWN)?, wide })
+        Ok(Self { values: Buffer::filled("rows of a map", (rows + 2 * REACH) * wide, T::UNKNOWN)?, wide })
     }
 
     /// A row without its margins.
@@ -293,7 +290,7 @@ fn rounded(value: f32) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::never;
+    use crate::{finish::rows::TOGETHER, never};
 
     /// The mean of one window less the disparity in its middle, in the same order of additions.
     fn offset(width: usize, map: &[f32], spacing: usize, at: usize) -> f32 {
@@ -342,7 +339,7 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "takes minutes")]
     fn vectors_compute_what_single_pixels_do() {
-        for (width, height) in [(1, 1), (3, 12), (31, 2), (40, 9), (73, 11), (130, 5), (9, 2 * ROWS + 1)] {
+        for (width, height) in [(1, 1), (3, 12), (31, 2), (40, 9), (73, 11), (130, 5), (9, 2 * TOGETHER.end() + 1)] {
             let value = |i: usize| match i * i * 29 % 101 {
                 0..5 => DisparityMap::UNKNOWN,
                 noise => (i % width) as f32 * 0.07 + noise as f32 / 40.0 - 3.0,

@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use self::windows::Windows;
-use super::means;
+use super::{means, rows::rows_together};
 use crate::{Error, IsStopped, Size, StereoPair, stop::go_on};
 
 /// Disparities are tried in steps of a quarter of a pixel.
@@ -23,9 +23,6 @@ const MIDDLE: usize = TRIED / 2;
 /// How far windows reach from their centres.
 const REACH: usize = 3;
 const SIDE: usize = 2 * REACH + 1;
-
-/// Rows that one thread computes together.
-const ROWS: usize = 48;
 
 /// Writes the disparities of a map, `[height][width]`, plus the offsets, of about half a pixel at most, at which the right image
 /// fits the left one best. They stay within `limits`.
@@ -46,8 +43,9 @@ pub(super) fn write_offsets(
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
     let width = pair.size().width;
-    refined.par_chunks_mut(ROWS * width).enumerate().try_for_each(|(index, refined)| {
-        let first = ROWS * index;
+    let rows = rows_together(map.len() / width, rayon::current_num_threads());
+    refined.par_chunks_mut(rows * width).enumerate().try_for_each(|(index, refined)| {
+        let first = rows * index;
         let part = Part { pair, map, rows: first..first + refined.len() / width, limits };
         part.refine(refined, is_stopped)
     })
@@ -57,7 +55,9 @@ pub(super) fn write_offsets(
 /// rows that means are taken of.
 #[must_use]
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
-    size.height.div_ceil(ROWS).min(threads) as u64 * Windows::bytes(size.width).max(means::bytes(size.width))
+    let rows = rows_together(size.height, threads);
+    let parts = size.height.div_ceil(rows).min(threads) as u64;
+    parts * Windows::bytes(size.width).max(means::bytes(size.width, rows))
 }
 
 /// Some rows of a map.

@@ -28,17 +28,19 @@ pub(super) struct Matches {
     pub(super) rows_down: isize,
     /// Disparities in small pixels.
     map: DisparityMap,
+    /// How many pixels have a match.
+    pub(super) count: usize,
 }
 
 impl Matches {
-    /// How many pixels have a match.
-    pub(super) fn count(&self) -> usize {
-        self.map.values().iter().filter(|disparity| disparity.is_finite()).count()
+    /// How many pixels have a negative disparity.
+    pub(super) fn negative(&self) -> usize {
+        self.map.values().iter().filter(|&&disparity| disparity < 0.0).count()
     }
 
     /// The share of pixels that have a match, from 0 to 1.
     pub(super) fn share(&self) -> f64 {
-        self.count() as f64 / self.map.size().pixels() as f64
+        self.count as f64 / self.map.size().pixels() as f64
     }
 
     /// The width of the small images.
@@ -48,7 +50,7 @@ impl Matches {
 
     /// The disparity of a pixel, if it has a match.
     pub(super) fn at(&self, x: usize, y: usize) -> Option<i32> {
-        let disparity = self.map.values()[y * self.width() + x];
+        let disparity = self.row(y)[x];
         disparity.is_finite().then_some(disparity as i32)
     }
 
@@ -58,6 +60,11 @@ impl Matches {
             let known = row.iter().enumerate().filter(|(_, disparity)| disparity.is_finite());
             known.map(move |(x, &disparity)| (x, y, disparity as i32))
         })
+    }
+
+    /// The disparities of a row, not finite where there is no match.
+    pub(super) fn row(&self, y: usize) -> &[f32] {
+        &self.map.values()[y * self.width()..][..self.width()]
     }
 }
 
@@ -77,5 +84,6 @@ pub(super) fn find(small: &StereoPair, rows_down: isize) -> Result<Matches, Erro
     })?;
     let map = DisparityMap::of(size, disparities);
     let map = finish::remove_speckles(map, (size.pixels() / SPECK).max(LEAST_PATCH))?;
-    Ok(Matches { rows_down, map })
+    let count = map.values().iter().filter(|disparity| disparity.is_finite()).count();
+    Ok(Matches { rows_down, map, count })
 }

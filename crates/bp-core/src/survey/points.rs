@@ -1,5 +1,7 @@
 //! Matches a few hundred points again at full resolution, also above and below their rows.
 
+use std::cmp::Reverse;
+
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
@@ -7,7 +9,7 @@ use super::{
     coarse::{Found, Matches},
     codes::Codes,
 };
-use crate::{Image, StereoPair};
+use crate::{Image, Size, StereoPair};
 
 /// One point is chosen from each square of this many small pixels a side.
 const CELL: usize = 6;
@@ -61,24 +63,41 @@ pub(super) fn find(pair: &StereoPair, small: &Image, looks: &[Matches], factor: 
 
 /// In each cell of the small image, the match with the most contrast between the rows above and below.
 fn places(small: &Image, look: &Matches, factor: usize) -> Vec<Place> {
-    let cells = small.size().width.div_ceil(CELL);
-    let mut best: Vec<Option<(u16, usize, usize, i32)>> = vec![None; cells * small.size().height.div_ceil(CELL)];
-    for (x, y, disparity) in look.found() {
-        let cell = &mut best[(y / CELL) * cells + x / CELL];
-        let contrast = contrast(small, x, y);
-        if cell.is_none_or(|(most, ..)| contrast > most) {
-            *cell = Some((contrast, x, y, disparity));
-        }
-    }
-    best.into_iter().flatten().map(|(_, x, y, disparity)| Place::of((x, y, disparity), factor)).collect()
+    let of_cells = |cells: usize| {
+        let found = places_below(small, look, CELL * cells);
+        found.into_iter().map(|found| Place::of(found, factor))
+    };
+    (0..small.size().height.div_ceil(CELL)).into_par_iter().flat_map_iter(of_cells).collect()
 }
 
-/// The sum of differences between the three pixels above and the three below.
-fn contrast(small: &Image, x: usize, y: usize) -> u16 {
+/// Those of the cells whose first row is `top`. Of several with the same contrast, the first one.
+fn places_below(small: &Image, look: &Matches, top: usize) -> Vec<Found> {
+    let Size { width, height } = small.size();
+    // For each column, one more than the most contrast of its matches, times `CELL`, plus how far up that match is.
+    let mut ranks = vec![0_u16; width];
+    for (y, up) in (top..height).zip((0..CELL as u16).rev()) {
+        for ((best, contrast), disparity) in ranks.iter_mut().zip(contrasts(small, y)).zip(look.row(y)) {
+            let rank = (contrast + 1) * CELL as u16 + up;
+            *best = (*best).max(if disparity.is_finite() { rank } else { 0 });
+        }
+    }
+    let of_cell = |(left, ranks): (usize, &[u16])| {
+        let best = ranks.iter().enumerate().min_by_key(|&(_, &rank)| Reverse(rank));
+        let (column, &rank) = best.filter(|&(_, &rank)| rank > 0)?;
+        let (x, y) = (left + column, top + CELL - 1 - usize::from(rank) % CELL);
+        look.at(x, y).map(|disparity| (x, y, disparity))
+    };
+    (0..).step_by(CELL).zip(ranks.chunks(CELL)).filter_map(of_cell).collect()
+}
+
+/// The sums of differences between the three pixels above and the three below the pixels of a row.
+fn contrasts(small: &Image, y: usize) -> Vec<u16> {
     let [above, below] = [-1, 1].map(|dy| small.greys_near(y as isize + dy));
-    let columns = x.saturating_sub(1)..(x + 2).min(above.len());
-    let pairs = above[columns.clone()].iter().zip(&below[columns]);
-    pairs.map(|(&above, &below)| u16::from(above.abs_diff(below))).sum()
+    let mut differences = vec![0; above.len() + 2];
+    for ((difference, &above), &below) in differences[1..].iter_mut().zip(above).zip(below) {
+        *difference = u16::from(above.abs_diff(below));
+    }
+    differences.windows(3).map(|three| three.iter().sum()).collect()
 }
 
 /// Matches some places.

@@ -1,6 +1,6 @@
 //! The search: costs of windows, in vectors of columns, for all disparities.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdInt, u8x32};
+use fearless_simd::{Select, Simd, SimdBase, SimdInt};
 
 use crate::{Error, Size, memory::Buffer};
 
@@ -14,12 +14,10 @@ const OUTSIDE: u8 = 4;
 /// Greater than the cost of any window.
 const IMPOSSIBLE: u8 = u8::MAX;
 
-/// Columns that are searched together.
-const LANES: usize = 32;
-type Bytes<S> = u8x32<S>;
+/// The most columns that are searched together. Rows are rounded up to this.
+const MOST_LANES: usize = 64;
 
-/// The costs of some rows, and buffers for the results of one. Index `reach + d` is disparity d. Rows are rounded up to whole
-/// vectors.
+/// The costs of some rows, and buffers for the results of one. Index `reach + d` is disparity d.
 pub(super) struct Search<'a> {
     size: Size,
     /// Codes of both images, `[height][width]`.
@@ -53,7 +51,7 @@ pub(super) struct Search<'a> {
 
 impl<'a> Search<'a> {
     pub(super) fn new(size: Size, codes: &'a [Vec<u8>; 2], rows_down: isize) -> Result<Self, Error> {
-        let (reach, wide) = (size.width / 2, size.width.next_multiple_of(LANES));
+        let (reach, wide) = (size.width / 2, size.width.next_multiple_of(MOST_LANES));
         let disparities = 2 * reach + 1;
         let filled = |len, value| Buffer::filled("coarse costs", len, value);
         let mut inside = filled(wide + 2 * reach, 0)?;
@@ -86,7 +84,7 @@ impl<'a> Search<'a> {
                 (first..first + 2 * RADIUS).for_each(|coming| self.enter(simd, coming));
                 for (y, row) in (first..).zip(disparities.chunks_exact_mut(self.size.width)) {
                     self.enter(simd, y + 2 * RADIUS);
-                    for column in (0..self.wide).step_by(LANES) {
+                    for column in (0..self.size.width).step_by(S::u8s::LEN) {
                         self.find_left(simd, column);
                         self.find_right(simd, column);
                     }
@@ -109,24 +107,24 @@ impl<'a> Search<'a> {
         // Two walks: sums need costs on both sides, which would not be at hand yet if they had just been stored.
         for (index, costs) in self.pixels.chunks_exact_mut(self.wide + 2 * RADIUS).enumerate() {
             let shift = 2 * self.reach - index;
-            for column in (0..self.wide).step_by(LANES) {
+            for column in (0..width).step_by(S::u8s::LEN) {
                 let differing = load(simd, &self.left_codes, column) ^ load(simd, &self.right_codes, shift + column);
                 let inside = load(simd, &self.inside, self.reach + column) & load(simd, &self.inside, shift + column);
-                let cost = differing.count_ones() & inside | Bytes::splat(simd, OUTSIDE) & !inside;
-                cost.store_slice(&mut costs[RADIUS + column..][..LANES]);
+                let cost = differing.count_ones() & inside | S::u8s::splat(simd, OUTSIDE) & !inside;
+                cost.store_slice(&mut costs[RADIUS + column..][..S::u8s::LEN]);
             }
         }
         let windows = self.windows[self.reach..].chunks_exact_mut(self.wide);
         let strips = self.strips[strips].chunks_exact_mut(self.wide);
         for ((costs, strips), windows) in self.pixels.chunks_exact(self.wide + 2 * RADIUS).zip(strips).zip(windows) {
-            for column in (0..self.wide).step_by(LANES) {
+            for column in (0..width).step_by(S::u8s::LEN) {
                 let mut sum = load(simd, costs, column);
                 for shift in 1..SIDE {
                     sum += load(simd, costs, column + shift);
                 }
                 let window = load(simd, windows, column) - load(simd, strips, column) + sum;
-                window.store_slice(&mut windows[column..][..LANES]);
-                sum.store_slice(&mut strips[column..][..LANES]);
+                window.store_slice(&mut windows[column..][..S::u8s::LEN]);
+                sum.store_slice(&mut strips[column..][..S::u8s::LEN]);
             }
         }
     }
@@ -134,47 +132,46 @@ impl<'a> Search<'a> {
     /// Finds the best disparities of left pixels from `column` on, and their least costs elsewhere.
     #[inline(always)]
     fn find_left<S: Simd>(&mut self, simd: S, column: usize) {
-        let last = 2 * self.reach;
-        let (best, least) = find_best(
-            simd,
-            last,
-            #[inline(always)]
-            |index| self.left_costs(simd, column, index),
-        );
-        let mut second = Bytes::splat(simd, IMPOSSIBLE);
-        for index in 0..=last {
+        let [none, most, one] = [0, IMPOSSIBLE, 1].map(|value| S::u8s::splat(simd, value));
+        let (mut best, mut least, mut second) = (none, most, most);
+        // The costs of the disparity before, and the least of all disparities before that.
+        let (mut adjacent, mut before) = (most, most);
+        for index in 0..=2 * self.reach {
             let costs = self.left_costs(simd, column, index);
-            // From 0 to 2 if they are adjacent. No other difference wraps around to that.
-            let difference = best - Bytes::splat(simd, index as u8) + Bytes::splat(simd, 1);
-            second = difference.simd_lt(Bytes::splat(simd, 3)).select(second, second.min(costs));
+            let index = S::u8s::splat(simd, index as u8);
+            let (is_better, is_next) = (costs.simd_lt(least), index.simd_eq(best + one));
+            second = is_better.select(before, is_next.select(second, second.min(costs)));
+            best = is_better.select(index, best);
+            least = least.min(costs);
+            (adjacent, before) = (costs, before.min(adjacent));
         }
-        best.store_slice(&mut self.left[column..][..LANES]);
-        least.store_slice(&mut self.least[column..][..LANES]);
-        second.store_slice(&mut self.second[column..][..LANES]);
+        best.store_slice(&mut self.left[column..][..S::u8s::LEN]);
+        least.store_slice(&mut self.least[column..][..S::u8s::LEN]);
+        second.store_slice(&mut self.second[column..][..S::u8s::LEN]);
     }
 
     /// Finds the best disparities of right pixels from `column` on.
     #[inline(always)]
     fn find_right<S: Simd>(&mut self, simd: S, column: usize) {
-        let (best, _) = find_best(
-            simd,
-            2 * self.reach,
-            #[inline(always)]
-            |index| self.right_costs(simd, column, index),
-        );
-        best.store_slice(&mut self.right[column..][..LANES]);
+        let (mut best, mut least) = (S::u8s::splat(simd, 0), S::u8s::splat(simd, IMPOSSIBLE));
+        for index in 0..=2 * self.reach {
+            let costs = self.right_costs(simd, column, index);
+            best = costs.simd_lt(least).select(S::u8s::splat(simd, index as u8), best);
+            least = least.min(costs);
+        }
+        best.store_slice(&mut self.right[column..][..S::u8s::LEN]);
     }
 
     /// The costs of left pixels from `column` on; impossible where the right pixel would lie outside.
     #[inline(always)]
-    fn left_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> Bytes<S> {
+    fn left_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> S::u8s {
         let inside = load(simd, &self.inside, 2 * self.reach - index + column);
         load(simd, &self.windows, self.reach + index * self.wide + column) | !inside
     }
 
     /// The costs of right pixels from `column` on; impossible where the left pixel would lie outside.
     #[inline(always)]
-    fn right_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> Bytes<S> {
+    fn right_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> S::u8s {
         // Right column x matches left column x + index - reach.
         let inside = load(simd, &self.inside, column + index);
         load(simd, &self.windows, index * self.wide + column + index) | !inside
@@ -196,18 +193,6 @@ impl<'a> Search<'a> {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, values: &[u8], at: usize) -> Bytes<S> {
-    Bytes::from_slice(simd, &values[at..at + LANES])
-}
-
-/// The first of the best disparities up to `last`, and its cost.
-#[inline(always)]
-fn find_best<S: Simd>(simd: S, last: usize, cost: impl Fn(usize) -> Bytes<S>) -> (Bytes<S>, Bytes<S>) {
-    let (mut best, mut least) = (Bytes::splat(simd, 0), Bytes::splat(simd, IMPOSSIBLE));
-    for index in 0..=last {
-        let cost = cost(index);
-        best = cost.simd_lt(least).select(Bytes::splat(simd, index as u8), best);
-        least = least.min(cost);
-    }
-    (best, least)
+fn load<S: Simd>(simd: S, values: &[u8], at: usize) -> S::u8s {
+    S::u8s::from_slice(simd, &values[at..at + S::u8s::LEN])
 }
