@@ -1,7 +1,9 @@
 //! Compares the rayon backend with the reference, on every instruction set of this CPU.
 #![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use bp_core::{Algorithm, Backend, Driver, Model, Plan, Profile, Schedule, Settings, Side};
+use bp_core::{
+    Algorithm, Backend, Driver, Image, Model, Node, Plan, Profile, Schedule, Settings, Side, Size, StereoPair,
+};
 use bp_cpu_rayon::Rayon;
 use bp_cpu_scalar::Scalar;
 use bp_testkit::{
@@ -94,13 +96,24 @@ fn a_high_image_equals_the_reference() -> Result<(), Difference> {
     Ok(())
 }
 
-/// Eight threads sweep a plan that was prepared for one thread, and vice versa.
+/// Surfaces 31 pixels apart in blocks of 4x4, the nearer ones of which lie just after label 130: there a chunk begins, if the slope is 1
+/// and the truncation 63.
+fn pair_with_jumps(size: Size) -> StereoPair {
+    let grey = |x: usize, y: usize| (x * x * 31 + y * y * 17 + x * y * 7) % 251;
+    let view = |shift: &dyn Fn(usize, usize) -> usize| {
+        let greys: Vec<u8> = size.nodes().map(|Node { x, y }| grey(x + shift(x, y), y) as u8).collect();
+        Image::from_grey(size.width, size.height, greys).unwrap()
+    };
+    StereoPair::new(view(&|_, _| 0), view(&|x, y| 100 + 31 * ((x / 4 + y / 4) % 2))).unwrap()
+}
+
 /// Labels are decided in chunks. With small steps and large truncations, those of neighbours lie far outside a chunk and still count.
 #[test]
 fn labels_of_neighbours_far_from_a_chunk_equal_the_reference() -> Result<(), Difference> {
     let labels = 300;
     let [scalar, rayon] = [Scalar.open(0).unwrap(), Rayon.open(0).unwrap()];
-    for pair in [noise_pair(130, 40, 6), stepped_pair(400, 40, labels)] {
+    let jumps = pair_with_jumps(Size { width: 400, height: 20 });
+    for pair in [noise_pair(130, 40, 6), stepped_pair(400, 40, labels), jumps] {
         let settings = Settings { grids: 2, ..Algorithm::Sweep.settings(pair.size(), 1, 1, Schedule::Sweep) };
         for (slope, truncation) in [(1, 63), (2, 63), (1, 40), (0, 63), (200, 5)] {
             let model = Model::new(Profile::Census, labels).unwrap().with_smoothness(slope, truncation).unwrap();
@@ -111,6 +124,7 @@ fn labels_of_neighbours_far_from_a_chunk_equal_the_reference() -> Result<(), Dif
     Ok(())
 }
 
+/// Eight threads sweep a plan that was prepared for one thread, and vice versa.
 #[test]
 fn a_matcher_may_move_to_another_pool() {
     let pair = noise_pair(90, 200, 4);
