@@ -112,3 +112,25 @@ fn whole_weights(step: usize) -> Weights {
     let [above, _, next, below] = super::weights(step as f32 / STEPS as f32).map(weight);
     [above, ONE - above - next - below, next, below].map(i16::cast_unsigned)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_rows_are_copied_in_images_of_any_width() {
+        for width in [1, 31, RUNS * TOGETHER + 1, 2 * RUNS * TOGETHER + 40] {
+            let size = Size { width, height: 4 };
+            let grey = |x: usize, y: usize| (x * x * 7 + 61 * y) as u8;
+            let image = |row_of: &dyn Fn(usize) -> usize| {
+                let greys: Vec<u8> = size.nodes().map(|node| grey(node.x, row_of(node.y))).collect();
+                Image::from_grey(width, size.height, greys).unwrap()
+            };
+            for rows in [-1_isize, 0, 2] {
+                let alignment = Alignment::new(size, [rows as f64, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+                let expected = image(&|y| y.saturating_add_signed(rows).min(size.height - 1));
+                assert_eq!(resampled(&image(&|y| y), &alignment).unwrap(), expected, "{width} columns, {rows} rows");
+            }
+        }
+    }
+}

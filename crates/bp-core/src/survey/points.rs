@@ -37,7 +37,7 @@ pub(crate) struct Point {
 }
 
 /// A left pixel at full resolution, and the column where its match is expected.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Place {
     x: usize,
     y: usize,
@@ -174,4 +174,34 @@ impl Compared {
 #[inline(always)]
 fn word(codes: &[u8]) -> u64 {
     codes.first_chunk().copied().map_or(0, u64::from_le_bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::coarse, *};
+
+    #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
+    fn each_cell_gives_its_match_with_the_most_contrast() {
+        let view = |shift: usize| {
+            // Dark and bright areas, so that contrasts are alike in many cells.
+            let grey = |x: usize, y: usize| if x * x * y % 7 < 3 { 20 } else { (x * x * 29 + y * y * 13) as u8 };
+            let size = Size { width: 83, height: 44 };
+            let greys: Vec<u8> = size.nodes().map(|node| grey(node.x + shift, node.y)).collect();
+            Image::from_grey(size.width, size.height, greys).unwrap()
+        };
+        let (left, factor) = (view(0), 3);
+        let look = coarse::find(&StereoPair::new(left.clone(), view(4)).unwrap(), 0).unwrap();
+        let contrast = |&(x, y, _): &Found| -> i32 {
+            let [above, below] = [-1, 1].map(|dy| left.greys_near(y as isize + dy));
+            let columns = x.saturating_sub(1)..(x + 2).min(above.len());
+            columns.map(|x| i32::from(above[x].abs_diff(below[x]))).sum()
+        };
+        let mut cells = std::collections::BTreeMap::<_, Vec<Found>>::new();
+        look.found().for_each(|found| cells.entry((found.1 / CELL, found.0 / CELL)).or_default().push(found));
+        let best = cells.values().filter_map(|of_cell| of_cell.iter().min_by_key(|found| -contrast(found)));
+        let expected: Vec<_> = best.map(|&found| Place::of(found, factor)).collect();
+        assert_eq!(places(&left, &look, factor), expected);
+        assert!(expected.len() > 40, "{}", expected.len());
+    }
 }

@@ -196,3 +196,81 @@ impl<'a> Search<'a> {
 fn load<S: Simd>(simd: S, values: &[u8], at: usize) -> S::u8s {
     S::u8s::from_slice(simd, &values[at..at + S::u8s::LEN])
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::DisparityMap;
+
+    /// Images of noise, the right one shifted by 3 in the upper rows and by -2 in the lower ones.
+    fn codes(size: Size) -> [Vec<u8>; 2] {
+        let code = |x: usize, y: usize| (x * x * 29 + x * y * 5 + y * 71) as u8;
+        let shift = |y: usize| if y < size.height / 2 { 5 } else { 0 };
+        let view =
+            |shift: &dyn Fn(usize) -> usize| size.nodes().map(|node| code(node.x + shift(node.y), node.y)).collect();
+        [view(&|_| 2), view(&shift)]
+    }
+
+    /// The costs of the window around a pixel of the left image, by disparity.
+    fn window(size: Size, [left, right]: &[Vec<u8>; 2], rows_down: isize, x: usize, y: usize) -> Vec<u32> {
+        let (reach, inside) = ((size.width / 2) as isize, 0..size.width as isize);
+        let near = |y: isize| y.clamp(0, size.height as isize - 1) as usize;
+        let cost = |x: isize, y: usize, disparity: isize| {
+            if !inside.contains(&x) || !inside.contains(&(x - disparity)) {
+                return OUTSIDE.into();
+            }
+            let below = near(y as isize + rows_down);
+            (left[y * size.width + x as usize] ^ right[below * size.width + (x - disparity) as usize]).count_ones()
+        };
+        let around = |i: usize| (i as isize - RADIUS as isize)..=(i + RADIUS) as isize;
+        let of = |disparity: isize| {
+            let row = |y: isize| around(x).map(|x| cost(x, near(y), disparity)).sum::<u32>();
+            let sum = around(y).map(row).sum();
+            if inside.contains(&(x as isize - disparity)) { sum } else { IMPOSSIBLE.into() }
+        };
+        (-reach..=reach).map(of).collect()
+    }
+
+    fn first_least(costs: impl Iterator<Item = u32>) -> (usize, u32) {
+        costs.enumerate().min_by_key(|&(_, cost)| cost).unwrap()
+    }
+
+    /// The matches of a row, pixel by pixel.
+    fn expected(size: Size, codes: &[Vec<u8>; 2], rows_down: isize, y: usize) -> Vec<f32> {
+        let reach = size.width / 2;
+        let windows: Vec<_> = (0..size.width).map(|x| window(size, codes, rows_down, x, y)).collect();
+        let of_right = |x: usize| {
+            let cost =
+                |index: usize| (x + index).checked_sub(reach).and_then(|left| windows.get(left)?.get(index).copied());
+            first_least((0..=2 * reach).map(|index| cost(index).unwrap_or(IMPOSSIBLE.into()))).0
+        };
+        let of_left = |(x, costs): (usize, &Vec<u32>)| {
+            let (best, least) = first_least(costs.iter().copied());
+            let others = costs.iter().enumerate().filter(|&(index, _)| index.abs_diff(best) > 1);
+            let second = others.map(|(_, &cost)| cost).min().unwrap_or(IMPOSSIBLE.into());
+            let distinct = second != IMPOSSIBLE.into() && 10 * second > 11 * least;
+            let agrees = distinct && of_right(x + reach - best).abs_diff(best) <= 1;
+            if agrees { best as f32 - reach as f32 } else { DisparityMap::UNKNOWN }
+        };
+        windows.iter().enumerate().map(of_left).collect()
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
+    fn vectors_find_what_single_pixels_do() {
+        for (width, height, rows_down) in [(1, 1, 0), (2, 3, 0), (31, 5, 0), (64, 4, 1), (97, 9, 0), (130, 6, -2)] {
+            let size = Size { width, height };
+            let codes = codes(size);
+            let expected: Vec<_> = (0..height).flat_map(|y| expected(size, &codes, rows_down, y)).collect();
+            for level in [Level::new(), Level::baseline()] {
+                let mut found = vec![DisparityMap::UNKNOWN; size.pixels()];
+                let mut search = Search::new(size, &codes, rows_down).unwrap();
+                dispatch!(level, simd => search.match_rows(simd, 0, &mut found));
+                assert_eq!(found, expected, "{size}, {rows_down} rows down");
+            }
+            assert!(width < 31 || rows_down != 0 || expected.iter().filter(|found| found.is_finite()).count() > width);
+        }
+    }
+}
