@@ -19,7 +19,7 @@ use clap::{
     builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser},
 };
 
-pub(crate) use finishing::FinishArgs;
+pub(crate) use finishing::{Check, FinishArgs};
 pub(crate) use many::ManyArgs;
 pub(crate) use matching::{EvaluateArgs, MatchArgs, PlanArgs, TruthArgs};
 pub(crate) use measuring::{ConformArgs, GateArgs, ReproduceArgs, SpeedArgs};

@@ -87,6 +87,7 @@ fn the_least_memory_limit_is_kept() {
         ("ppm", ""),
         ("ppm", "--picture p.png"),
         ("ppm", "--speckle 20"),
+        ("ppm", "--check unique"),
         ("ppm", "--check left-right --median 3 --confidence c.npy"),
         ("jpg", ""),
         ("png", ""),

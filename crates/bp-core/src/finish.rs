@@ -1,6 +1,7 @@
 //! Operations on disparity maps after matching, the same for all backends: checks, filling, filters and confidence.
 //!
-//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, speckles, fill, median, sub-pixel.
+//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, uniqueness, speckles, fill, median,
+//! sub-pixel.
 
 mod border;
 mod check;
@@ -12,6 +13,8 @@ mod offsets;
 mod rows;
 mod speckles;
 mod subpixel;
+mod unique;
+mod variances;
 mod window;
 
 pub use border::fill_border;
@@ -22,6 +25,7 @@ pub use median::{MEDIANS, median};
 pub use offsets::window_bytes;
 pub use speckles::remove_speckles;
 pub use subpixel::subpixel;
+pub use unique::check_unique;
 
 use crate::{DisparityMap, Error, IsStopped, StereoPair};
 
@@ -30,6 +34,8 @@ use crate::{DisparityMap, Error, IsStopped, StereoPair};
 pub struct Finish {
     /// Whether [`check_left_right`] makes pixels unknown that contradict the right image's map.
     pub check: bool,
+    /// Whether pixels become unknown whose match fits another pixel better; see [`check_unique`].
+    pub unique: bool,
     /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
     pub speckles: Option<usize>,
     /// Whether unknown pixels are filled after the check and the speckles; see [`fill_border`]
@@ -59,6 +65,9 @@ impl Finish {
             (true, Some(right)) => check_left_right(left, right)?,
             (true, None) => return Err(Error::Plan("a left-right check needs the right image's map too")),
         };
+        if self.unique {
+            map = check_unique(pair, map, is_stopped)?;
+        }
         if let Some(least) = self.speckles {
             map = remove_speckles(map, least)?;
         }
@@ -125,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_map_of_unknown_pixels_stays_one() {
-        let all = Finish { check: true, speckles: Some(2), fill: true, median: Some(5), subpixel: true };
+        let all = Finish { check: true, unique: true, speckles: Some(2), fill: true, median: Some(5), subpixel: true };
         let unknown = map(2, &[NONE; 4]);
         let image = || Image::from_grey(2, 2, [0; 4]).unwrap();
         let blank = StereoPair::new(image(), image()).unwrap();

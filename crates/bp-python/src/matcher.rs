@@ -53,7 +53,7 @@ pub(crate) fn match_pair<'py>(
 ///
 /// Options, all with a default: `algorithm` ("sweep", or one of the thesis, such as "cfbp"), `quality` ("fast",
 /// "balanced" or "best"), `profile`, `slope`, `truncation`, `edge_threshold`, `stretch`, `align` ("auto" or "off"), `labels`
-/// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `speckle`, `fill`, `median`, `subpixel`,
+/// ("auto", "quarter_of_width" or a number), `min_disparity`, `check`, `unique`, `speckle`, `fill`, `median`, `subpixel`,
 /// `confidence`, `energy`, `backend` ("rayon", "scalar", "vulkan" or "wgpu"), `device`, `threads` and `max_memory` (bytes).
 /// The library's documentation describes them; `options` shows their values. With `stretch`, the values of both images have any
 /// range: by one scale, the 0.5 % darkest become black and the 0.5 % brightest white, and where `left` is NaN, so is the map.

@@ -9,7 +9,7 @@ use pyo3::{
 use pythonize::depythonize;
 
 /// The options that are true or false. Python would take every other value for one of both.
-const FLAGS: [&str; 6] = ["stretch", "check", "fill", "subpixel", "confidence", "energy"];
+const FLAGS: [&str; 7] = ["stretch", "check", "unique", "fill", "subpixel", "confidence", "energy"];
 
 /// The options that keywords name. Two of them have a short form: `labels=64`, and `algorithm="cfbp"`.
 pub(crate) fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {

@@ -103,6 +103,9 @@ impl From<&bp_core::Alignment> for Rows {
 pub struct Finish {
     /// Whether a left-right check made pixels unknown.
     pub check: bool,
+    /// Whether pixels were made unknown whose match fits another pixel better.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unique: bool,
     /// Surfaces with fewer pixels than this were made unknown.
     pub speckles: Option<usize>,
     /// Whether unknown pixels were filled.
@@ -330,8 +333,15 @@ impl Finish {
     /// Describes the operations on a map; `None` if there are none.
     #[must_use]
     pub fn of(finish: bp_core::finish::Finish) -> Option<Self> {
-        let bp_core::finish::Finish { check, speckles, fill, median, subpixel } = finish;
-        (finish != bp_core::finish::Finish::default()).then_some(Self { check, speckles, fill, median, subpixel })
+        let bp_core::finish::Finish { check, unique, speckles, fill, median, subpixel } = finish;
+        (finish != bp_core::finish::Finish::default()).then_some(Self {
+            check,
+            unique,
+            speckles,
+            fill,
+            median,
+            subpixel,
+        })
     }
 }
 

@@ -71,7 +71,7 @@ pub(crate) fn finished(
     for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
         *trust = 0.0;
     }
-    let map = Finish { check: false, speckles: None, ..finish }.apply(pair, judged, None, is_stopped)?;
+    let map = Finish { check: false, unique: false, speckles: None, ..finish }.apply(pair, judged, None, is_stopped)?;
     Ok(Finished {
         map,
         confidence,

@@ -187,8 +187,8 @@ fn finishing(options: &Options, size: Size) -> u64 {
     let filtered = a_pixel(FINISHING) + framed;
     let refined = a_pixel(FINISHING) + finish::window_bytes(size, rayon::current_num_threads());
     let trusted = if options.confidence { a_pixel(CONFIDENCE) + 2 * framed } else { 0 };
-    let speckles = if options.speckle.is_some() { a_pixel(SPECKLE) } else { 0 };
-    let refined = if options.finish().subpixel { refined } else { 0 };
+    let speckles = if options.speckle.is_some() || options.unique { a_pixel(SPECKLE) } else { 0 };
+    let refined = if options.finish().subpixel || options.unique { refined } else { 0 };
     let judged = if options.energy { Energy::temporary_bytes(size, rayon::current_num_threads()) } else { 0 };
     filtered.max(refined).max(judged).max(trusted).max(speckles)
 }

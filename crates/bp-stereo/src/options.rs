@@ -48,9 +48,12 @@ pub struct Options {
     /// Whether the right image is matched too, and pixels on which the two maps disagree become unknown. `None` means no, or as
     /// [`Options::quality`] says.
     pub check: Option<bool>,
+    /// Whether pixels become unknown whose match in the right image fits another pixel better; see
+    /// [`check_unique`](bp_core::finish::check_unique). The right image need not be matched for that.
+    pub unique: bool,
     /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
-    /// Whether pixels that the check or the speckle filter made unknown are filled from their row. At the left border, the
+    /// Whether pixels that a check or the speckle filter made unknown are filled from their row. At the left border, the
     /// next surface is extended with its slope.
     pub fill: bool,
     /// Side of a median filter's window: 3, 5 or 7. `None` means no filter, or that of [`Options::quality`].
@@ -143,6 +146,7 @@ impl Default for Options {
             labels: Labels::default(),
             min_disparity: None,
             check: None,
+            unique: false,
             speckle: None,
             fill: true,
             median: None,
@@ -190,6 +194,8 @@ setters! {
     with_edge_threshold: u8 => edge_threshold = Some;
     /// With [`Options::check`].
     with_check: bool => check = Some;
+    /// With [`Options::unique`].
+    with_unique: bool => unique = std::convert::identity;
     /// With [`Options::speckle`].
     with_speckle: usize => speckle = Some;
     /// With [`Options::median`].
@@ -227,8 +233,9 @@ impl Options {
         let (is_best, check) = (self.quality == Quality::Best, self.checks());
         Finish {
             check,
+            unique: self.unique,
             speckles: self.speckle,
-            fill: self.fill && (check || self.speckle.is_some()),
+            fill: self.fill && (check || self.unique || self.speckle.is_some()),
             median: self.median.or(is_best.then_some(3)),
             subpixel: self.subpixel.unwrap_or(self.quality != Quality::Fast),
         }

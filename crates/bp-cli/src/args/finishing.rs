@@ -11,12 +11,14 @@ use super::{named, switch};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "After matching, in this order")]
 pub(crate) struct FinishArgs {
-    /// Match the right image too, and drop pixels on which the two maps disagree.
+    /// Drop pixels that fail a check: left-right or unique.
     ///
-    /// The maps disagree, by more than one pixel, at occluded pixels and at most wrong ones. The check takes
-    /// half as long as the match, or as long where all labels are tried. Dropped pixels are filled, unless --fill off is given.
-    #[arg(long, value_parser = named(&[()], |()| "left-right"))]
-    pub(crate) check: Option<()>,
+    /// left-right also matches the right image. The two maps disagree, by more than one pixel, at occluded pixels and at most wrong
+    /// ones. This takes half as long as the match, or as long where all labels are tried. unique needs no second match: of
+    /// pixels that match the same place of the right image, those that fit it less well are dropped, with small surfaces that are left
+    /// and pixels whose match lies outside the image. It finds fewer wrong pixels. Dropped pixels are filled, unless --fill off is given.
+    #[arg(long, value_parser = named(&[Check::LeftRight, Check::Unique], Check::name))]
+    pub(crate) check: Option<Check>,
     /// Drop surfaces with fewer than N pixels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) speckle: Option<u32>,
@@ -39,6 +41,24 @@ pub(crate) struct FinishArgs {
     /// 32-bit floats, .png holds 65535 times the value. This option matches the right image too.
     #[arg(long, value_name = "MAP", hide_short_help = true)]
     pub(crate) confidence: Option<PathBuf>,
+}
+
+/// A check of the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Check {
+    /// Against the right image's map.
+    LeftRight,
+    /// Against other pixels of the same map.
+    Unique,
+}
+
+impl Check {
+    fn name(self) -> &'static str {
+        match self {
+            Self::LeftRight => "left-right",
+            Self::Unique => "unique",
+        }
+    }
 }
 
 /// The name of a median's window, one of [`MEDIANS`].

@@ -52,7 +52,7 @@ pub(crate) struct ManyArgs {
     ///
     /// This is faster, and as accurate where little moves. Every N-th frame starts cold; the frames up to the next cold
     /// start are matched and resumed together. Needs --schedule sync or checkerboard, for example --algorithm cfbp
-    /// --half-steps 10. Excludes --check and --also confidence, which match both views.
+    /// --half-steps 10. Excludes --check left-right and --also confidence, which match both views.
     #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, hide_short_help = true,
           default_missing_value = "30", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     pub(crate) warm_start: Option<u32>,

@@ -14,7 +14,7 @@ use bp_stereo::{
     pairs::Source,
 };
 
-use super::{ManyArgs, MatchArgs, OutputArgs, PlanArgs};
+use super::{Check, ManyArgs, MatchArgs, OutputArgs, PlanArgs};
 use crate::{colour_bar, failure::Failure, interrupt};
 
 /// The algorithms that count loops as the thesis does, for messages.
@@ -36,7 +36,8 @@ impl MatchArgs {
             align: plan.align.meaning()?,
             labels: plan.labels.unwrap_or_default(),
             min_disparity: plan.min_disparity,
-            check: finish.check.map(|()| true),
+            check: finish.check.map(|check| check == Check::LeftRight),
+            unique: finish.check == Some(Check::Unique),
             speckle: finish.speckle.map(|least| least as usize),
             fill: finish.fill.unwrap_or(true),
             median: finish.median,

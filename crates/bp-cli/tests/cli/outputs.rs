@@ -318,11 +318,14 @@ fn only_sidecars_of_this_program_are_removed() {
 
 #[test]
 fn what_the_check_made_unknown_is_not_trusted() {
-    let folder = Folder::new();
-    succeeds(&folder, &format!("{MATCH} holes.pfm --check left-right --fill off --confidence c.pfm"));
-    succeeds(&folder, &format!("{MATCH} filled.pfm --check left-right --median 3 --confidence same.pfm"));
-    let (map, trust) = (floats(&folder.path("holes.pfm")), floats(&folder.path("c.pfm")));
-    assert!(map.iter().any(|value| !value.is_finite()) && trust.iter().any(|&trust| trust > 0.9));
-    assert!(map.iter().zip(&trust).all(|(value, &trust)| value.is_finite() || trust == 0.0));
-    assert_eq!(floats(&folder.path("same.pfm")), trust);
+    for check in ["left-right", "unique"] {
+        let folder = Folder::new();
+        succeeds(&folder, &format!("{MATCH} holes.pfm --check {check} --fill off --confidence c.pfm"));
+        succeeds(&folder, &format!("{MATCH} filled.pfm --check {check} --median 3 --confidence same.pfm"));
+        let (map, trust) = (floats(&folder.path("holes.pfm")), floats(&folder.path("c.pfm")));
+        assert!(map.iter().any(|value| !value.is_finite()) && trust.iter().any(|&trust| trust > 0.9));
+        assert!(map.iter().zip(&trust).all(|(value, &trust)| value.is_finite() || trust == 0.0));
+        assert_eq!(floats(&folder.path("same.pfm")), trust);
+        assert!(floats(&folder.path("filled.pfm")).iter().all(|value| value.is_finite()));
+    }
 }

@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use self::windows::Windows;
-use super::{means, rows::rows_together};
+use super::{means, rows::rows_together, variances::REACH};
 use crate::{Error, IsStopped, Size, StereoPair, stop::go_on};
 
 /// Disparities are tried in steps of a quarter of a pixel.
@@ -19,10 +19,6 @@ const STEPS: usize = 4;
 /// The number of disparities that are tried, and the one in the middle.
 const TRIED: usize = 5;
 const MIDDLE: usize = TRIED / 2;
-
-/// How far windows reach from their centres.
-const REACH: usize = 3;
-const SIDE: usize = 2 * REACH + 1;
 
 /// Writes the disparities of a map, `[height][width]`, plus the offsets, of about half a pixel at most, at which the right image
 /// fits the left one best. They stay within `limits`.
@@ -52,7 +48,7 @@ pub(super) fn write_offsets(
 }
 
 /// The temporary bytes of [`super::subpixel()`] besides maps, for a map of this size on this many threads: rows of windows, or
-/// rows that means are taken of.
+/// rows that means are taken of. [`super::check_unique`] needs fewer.
 #[must_use]
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
     let rows = rows_together(size.height, threads);

@@ -1,5 +1,7 @@
 //! Removal of small surfaces, which are usually wrong.
 
+use std::ops::Range;
+
 use super::check::AGREE;
 use crate::{DisparityMap, Error, memory::Buffer};
 
@@ -12,47 +14,72 @@ pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, 
     let (width, pixels) = (map.size().width, map.size().pixels());
     let mut surfaces = Buffer::filled("surfaces", pixels, 0)?;
     join(map.values(), width, &mut surfaces);
-    // Pixels of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
+    // Runs of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
     // first one holds the number of pixels, added to that of the image.
-    for pixel in 0..pixels {
-        let before = surfaces[pixel];
-        let first = if before == pixel || surfaces[before] >= pixels { before } else { surfaces[before] };
-        surfaces[pixel] = if first == pixel { pixels } else { first };
-        surfaces[first] += 1;
+    for Range { start, end } in runs(map.values(), width, 0) {
+        let before = surfaces[start];
+        let first = if before == start || surfaces[before] >= pixels { before } else { surfaces[before] };
+        surfaces[start] = if first == start { pixels } else { first };
+        surfaces[first] += end - start;
     }
-    let count = |pixel: usize| {
-        let holds = surfaces[pixel];
+    let count = |start: usize| {
+        let holds = surfaces[start];
         (if holds >= pixels { holds } else { surfaces[holds] }) - pixels
     };
     Ok(map.replaced(|values| {
-        for (_, value) in values.iter_mut().enumerate().filter(|(pixel, _)| count(*pixel) < least) {
-            *value = DisparityMap::UNKNOWN;
+        let mut start = 0;
+        for run in values.chunks_exact_mut(width).flat_map(|row| row.chunk_by_mut(agree)) {
+            let end = start + run.len();
+            if run[0].is_finite() && count(start) < least {
+                run.fill(DisparityMap::UNKNOWN);
+            }
+            start = end;
         }
     }))
 }
 
-/// Sets `surfaces` to an earlier pixel of the same surface for each pixel, or the pixel itself if it is the first.
+/// Whether adjacent pixels belong to the same surface. The difference of unknown pixels is infinite, or none.
+fn agree(a: &f32, b: &f32) -> bool {
+    (a - b).abs() <= AGREE
+}
+
+/// The longest runs of pixels that belong to the same surface in each row, if the first pixel of the rows is the given one.
+fn runs(rows: &[f32], width: usize, first: usize) -> impl Iterator<Item = Range<usize>> {
+    let all = rows.chunks_exact(width).flat_map(|row| row.chunk_by(agree)).scan(first, |end, run| {
+        let start = *end;
+        *end += run.len();
+        Some((start..*end, run[0]))
+    });
+    all.filter(|(_, disparity)| disparity.is_finite()).map(|(run, _)| run)
+}
+
+/// Sets `surfaces` to the first pixel of an earlier run of the same surface for the first pixel of each run, or that pixel
+/// itself if there is none.
 fn join(values: &[f32], width: usize, surfaces: &mut [usize]) {
-    // The difference of unknown pixels is infinite, or none.
-    let agree = |a: usize, b: usize| (values[a] - values[b]).abs() <= AGREE;
-    for start in (0..values.len()).step_by(width) {
-        for pixel in start..start + width {
-            let left = (pixel > start && agree(pixel - 1, pixel)).then(|| surfaces[pixel - 1]);
-            let above = (start > 0 && agree(pixel - width, pixel)).then(|| surfaces[pixel - width]);
-            surfaces[pixel] = match (left, above) {
-                (Some(left), Some(above)) if left != above => {
-                    let (left, above) = (first(surfaces, left), first(surfaces, above));
-                    surfaces[left.max(above)] = left.min(above);
-                    left.min(above)
+    let (mut above, mut own) = (vec![], vec![]);
+    for (y, row) in values.chunks_exact(width).enumerate() {
+        own.extend(runs(row, width, y * width));
+        own.iter().for_each(|run: &Range<usize>| surfaces[run.start] = run.start);
+        let mut others = above.iter().map(|run: &Range<usize>| run.start + width..run.end + width).peekable();
+        for run in &own {
+            let mut touch = |other: &Range<usize>| {
+                let mut shared = run.start.max(other.start)..run.end.min(other.end);
+                if shared.any(|pixel| agree(&values[pixel - width], &values[pixel])) {
+                    let [a, b] = [run.start, other.start - width].map(|run| first(surfaces, run));
+                    surfaces[a.max(b)] = a.min(b);
                 }
-                (Some(before), _) | (None, Some(before)) => before,
-                (None, None) => pixel,
             };
+            while let Some(other) = others.next_if(|other| other.end <= run.end) {
+                touch(&other);
+            }
+            others.peek().into_iter().for_each(touch);
         }
+        std::mem::swap(&mut above, &mut own);
+        own.clear();
     }
 }
 
-/// The first pixel of the surface that a pixel belongs to, as far as it is joined.
+/// The first pixel of the surface that a run belongs to, as far as it is joined.
 fn first(surfaces: &mut [usize], mut pixel: usize) -> usize {
     while surfaces[pixel] != pixel {
         // Every second step becomes one of two, so that paths stay short.

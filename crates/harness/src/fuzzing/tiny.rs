@@ -176,6 +176,7 @@ fn finish(from: &mut Unstructured<'_>) -> arbitrary::Result<Finish> {
     let median = *from.choose(&MEDIANS)?;
     Ok(Finish {
         check: from.arbitrary()?,
+        unique: from.arbitrary()?,
         speckles: from.arbitrary::<Option<u8>>()?.map(usize::from),
         fill: from.arbitrary()?,
         median: from.arbitrary::<bool>()?.then_some(median),

@@ -3,12 +3,10 @@
 use fearless_simd::{Select, Simd, SimdBase, SimdCvtTruncate, SimdFloat, f32x8, i16x8, i32x8};
 
 use super::{MIDDLE, STEPS, TRIED};
+use crate::finish::variances::LANES;
 
 /// The grey value of a whole pixel, in the units of [`interpolate`].
 pub(super) const UNIT: i16 = 8;
-
-/// Columns that are compared together.
-pub(super) const LANES: usize = 8;
 
 /// Writes where the tried disparities of every pixel of a row begin in the right image's row in steps; -1 if one of them
 /// lies outside. `first` has columns up to a multiple of [`LANES`].

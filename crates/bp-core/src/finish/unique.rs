@@ -1,0 +1,285 @@
+//! The uniqueness check, which needs no map of the right image.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, Simd, SimdBase, SimdCvtTruncate, SimdFloat, dispatch, f32x8, i32x8};
+use rayon::prelude::*;
+
+use super::{
+    check::AGREE,
+    rows::rows_together,
+    speckles::remove_speckles,
+    variances::{LANES, REACH, SIDE, Variances},
+};
+use crate::{DisparityMap, Error, IsStopped, Size, StereoPair, memory::Buffer, metrics::check_size, stop::go_on};
+
+/// Surfaces that cover less than `1 / SPECK` of the image are removed.
+const SPECK: usize = 3400;
+
+/// A column that no pixel matches.
+const NONE: i32 = -1;
+
+/// Makes pixels unknown whose match in the right image fits another pixel better: a point of the right image is one
+/// point of the left one (Marr and Poggio 1976). Where several pixels match the same column `floor(x - d + 1/2)`, the one
+/// stays whose 7x7 window has the least variance of grey differences, and those whose disparity differs by no more than [`AGREE`]
+/// from its own. Pixels whose match lies outside the image become unknown too, and then surfaces of less than one part
+/// in 3400 of the image.
+///
+/// # Errors
+/// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
+pub fn check_unique(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
+    check_size("the disparity map", map.size(), pair.size())?;
+    let Size { width, height } = map.size();
+    let mut kept = Buffer::filled_unless(is_stopped, "a checked map", map.size().pixels(), DisparityMap::UNKNOWN)?;
+    let rows = rows_together(height, rayon::current_num_threads());
+    kept.par_chunks_mut(rows * width).enumerate().try_for_each(|(index, kept)| {
+        let first = rows * index;
+        let part = Part { pair, map: map.values(), rows: first..first + kept.len() / width };
+        part.keep(kept, is_stopped)
+    })?;
+    let size = map.size();
+    // Makes room for the surfaces.
+    drop(map);
+    remove_speckles(DisparityMap::of(size, kept), size.pixels() / SPECK)
+}
+
+/// Some rows of a map.
+struct Part<'a> {
+    pair: &'a StereoPair,
+    map: &'a [f32],
+    rows: Range<usize>,
+}
+
+impl Part<'_> {
+    /// Copies the pixels that stay known.
+    fn keep(&self, kept: &mut [f32], is_stopped: IsStopped<'_>) -> Result<(), Error> {
+        let (Size { width, height }, level) = (self.pair.size(), Level::new());
+        let mut claims = Claims::new(width)?;
+        let row_of = |y: usize| &self.map[y * width..][..width];
+        for coming in self.rows.start.saturating_sub(REACH)..self.rows.end + REACH {
+            go_on(is_stopped)?;
+            if coming < height {
+                dispatch!(level, simd => claims.enter(simd, self.pair, coming, row_of(coming)));
+            }
+            let Some(y) = coming.checked_sub(REACH).filter(|y| self.rows.contains(y)) else { continue };
+            let kept = &mut kept[(y - self.rows.start) * width..][..width];
+            dispatch!(level, simd => claims.keep(simd, y, row_of(y), kept));
+            if let Some(last) = y.checked_sub(REACH) {
+                dispatch!(level, simd => claims.leave(simd, last));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The best of the pixels that match a column of the right image: its variance and its disparity.
+type Claim = (f32, f32);
+
+/// The columns that the pixels of a row match.
+struct Claims {
+    width: usize,
+    /// The matching columns or [`NONE`], `[row mod 7][column]`.
+    matches: Buffer<i32>,
+    variances: Variances,
+    /// By column of the right image.
+    best: Buffer<Claim>,
+}
+
+impl Claims {
+    fn new(width: usize) -> Result<Self, Error> {
+        let columns = width.next_multiple_of(LANES);
+        Ok(Self {
+            width,
+            matches: Buffer::filled("matching columns", SIDE * columns, NONE)?,
+            variances: Variances::new(width, 1)?,
+            best: Buffer::filled("matched columns", width, (0.0, 0.0))?,
+        })
+    }
+
+    /// The matches of row y.
+    #[inline(always)]
+    fn matches(&self, y: usize) -> Range<usize> {
+        let columns = self.width.next_multiple_of(LANES);
+        (y % SIDE) * columns..(y % SIDE + 1) * columns
+    }
+
+    /// Adds row y, which has these disparities.
+    #[inline(always)]
+    fn enter<S: Simd>(&mut self, simd: S, pair: &StereoPair, y: usize, disparities: &[f32]) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let range = self.matches(y);
+                let matches = &mut self.matches[range];
+                write_matches(simd, disparities, matches);
+                let [left, right] =
+                    [pair.left(), pair.right()].map(|image| &image.greys()[y * self.width..][..self.width]);
+                for row in self.variances.differences_mut(y) {
+                    for ((difference, &left), &column) in row.iter_mut().zip(left).zip(&*matches) {
+                        let right = right.get(column as usize).map_or(left, |&right| right);
+                        *difference = i16::from(left) - i16::from(right);
+                    }
+                }
+                self.variances.enter(y);
+            },
+        );
+    }
+
+    /// Removes row y.
+    #[inline(always)]
+    fn leave<S: Simd>(&mut self, simd: S, y: usize) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.variances.leave(y),
+        );
+    }
+
+    /// Copies the disparities of row y, which is in the middle, where they agree with the best ones.
+    #[inline(always)]
+    fn keep<S: Simd>(&mut self, simd: S, y: usize, disparities: &[f32], kept: &mut [f32]) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let range = self.matches(y);
+                let Self { matches, variances, best, .. } = self;
+                let matches = &matches[range];
+                best.fill((f32::INFINITY, DisparityMap::UNKNOWN));
+                // Of equal variances, that of the nearest pixel counts: its disparity is larger, so it lies farther right.
+                for ((&variance, &disparity), &column) in variances.compute().iter().zip(disparities).zip(matches) {
+                    if let Some(best) = best.get_mut(column as usize).filter(|(least, _)| variance <= *least) {
+                        *best = (variance, disparity);
+                    }
+                }
+                for ((kept, &disparity), &column) in kept.iter_mut().zip(disparities).zip(matches) {
+                    let best = best.get(column as usize).map_or(DisparityMap::UNKNOWN, |&(_, disparity)| disparity);
+                    *kept = if (best - disparity).abs() <= AGREE { disparity } else { DisparityMap::UNKNOWN };
+                }
+            },
+        );
+    }
+}
+
+/// Writes the columns that the pixels of a row match in the right image, or [`NONE`]. Both have columns up to a multiple of [`LANES`].
+#[inline(always)]
+fn write_matches<S: Simd>(simd: S, disparities: &[f32], matches: &mut [i32]) {
+    let (width, (matches, _)) = (disparities.len(), matches.as_chunks_mut::<LANES>());
+    for (x, (matches, disparities)) in matches.iter_mut().zip(disparities.chunks(LANES)).enumerate() {
+        let mut all = [DisparityMap::UNKNOWN; LANES];
+        all[..disparities.len()].copy_from_slice(disparities);
+        let columns = f32x8::from_fn(simd, |lane| (LANES * x + lane) as f32);
+        let column = (columns - f32x8::load_array(simd, all) + 0.5).floor();
+        // Unknown disparities are infinite. Negative columns stay negative, and those beyond the right border lie beyond all.
+        let inside = column.max(f32x8::splat(simd, NONE as f32)).min(f32x8::splat(simd, width as f32));
+        *matches = i32x8::truncate_from(inside).into();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, never};
+
+    /// A near square before a far wall, with noise of its own in each image, and what only the left image shows.
+    fn scene(size: Size) -> (StereoPair, impl Fn(usize, usize) -> f32) {
+        let near = move |x: usize, y: usize| (30..50).contains(&x) && (8..size.height - 6).contains(&y);
+        let grey = |x: usize, y: usize| (x * x * 31 + y * y * 17 + x * y * 7) as u8;
+        let mut right: Vec<u8> = size.nodes().map(|node| grey(node.x + 3, node.y)).collect();
+        let mut left: Vec<u8> = size.nodes().map(|node| grey(node.x, node.y)).collect();
+        for node in size.nodes().filter(|node| near(node.x, node.y)) {
+            let own = grey(node.x * 3 + 70, node.y + 90);
+            left[size.index(node)] = own;
+            right[node.y * size.width + node.x - 12] = own;
+        }
+        let view = |greys: Vec<u8>| Image::from_grey(size.width, size.height, greys).unwrap();
+        (StereoPair::new(view(left), view(right)).unwrap(), move |x, y| if near(x, y) { 12.0 } else { 3.0 })
+    }
+
+    /// Pixel by pixel.
+    fn expected(pair: &StereoPair, map: &[f32]) -> Vec<f32> {
+        let Size { width, height } = pair.size();
+        let column = |x: usize, y: usize| {
+            let column = (x as f32 - map[y * width + x] + 0.5).floor();
+            (column >= 0.0 && column < width as f32).then_some(column as usize)
+        };
+        let difference = |x: usize, y: usize| {
+            let [left, right] = [pair.left(), pair.right()].map(|image| &image.greys()[y * width..][..width]);
+            column(x, y).map_or(0, |column| i32::from(left[x]) - i32::from(right[column]))
+        };
+        let variance = |x: usize, y: usize| {
+            let near = |at: usize, end: usize| at.saturating_sub(REACH)..end.min(at + REACH + 1);
+            let all = near(y, height).flat_map(|y| near(x, width).map(move |x| difference(x, y)));
+            let (count, sum, squares) =
+                all.fold((0, 0, 0), |(count, sum, squares), d| (count + 1, sum + d, squares + d * d));
+            // Exact, but in units that depend on the number of pixels.
+            f64::from(squares) - f64::from(sum * sum) / f64::from(count)
+        };
+        let is_kept = |x: usize, y: usize| {
+            let own = column(x, y)?;
+            let rivals = (0..width).filter(|&x| column(x, y) == Some(own));
+            let best = rivals.rev().min_by(|&a, &b| variance(a, y).total_cmp(&variance(b, y)))?;
+            (map[y * width + best] - map[y * width + x]).abs().le(&AGREE).then_some(())
+        };
+        let value = |i: usize| is_kept(i % width, i / width).map_or(DisparityMap::UNKNOWN, |()| map[i]);
+        (0..map.len()).map(value).collect()
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "takes minutes")]
+    fn vectors_keep_what_single_pixels_do() {
+        for (width, height) in [(1, 1), (5, 3), (61, 19), (90, 2), (64, 120)] {
+            let size = Size { width, height };
+            let images = [7, 5].map(|factor| {
+                let grey = |i: usize| (i * i * factor + i) as u8;
+                Image::from_grey(width, height, (0..size.pixels()).map(grey).collect::<Vec<_>>()).unwrap()
+            });
+            let pair = StereoPair::new(images[0].clone(), images[1].clone()).unwrap();
+            let value = |i: usize| match i * 37 % 23 {
+                0 => DisparityMap::UNKNOWN,
+                1 => -3.0,
+                2 => 1000.0,
+                other => (other % 5) as f32 + (i / 9 % 3) as f32 * 4.25,
+            };
+            let map = DisparityMap::new(size, (0..size.pixels()).map(value).collect()).unwrap();
+            let expected = DisparityMap::of(size, expected(&pair, map.values()).into());
+            let expected = remove_speckles(expected, size.pixels() / SPECK).unwrap();
+            assert_eq!(check_unique(&pair, map, &never).unwrap(), expected, "{size}");
+        }
+    }
+
+    #[test]
+    fn hidden_pixels_with_any_disparity_are_dropped() {
+        let size = Size { width: 90, height: 40 };
+        let (pair, truth) = scene(size);
+        // The wall that the square hides from the right camera, left of the square.
+        let hidden = |x: usize, y: usize| truth(x, y) < 4.0 && truth((x + 9).min(size.width - 1), y) > 4.0;
+        for wrong in [3.0, 12.0, 25.0] {
+            let value = |i: usize| {
+                let (x, y) = (i % size.width, i / size.width);
+                if hidden(x, y) { wrong } else { truth(x, y) }
+            };
+            let map = DisparityMap::new(size, (0..size.pixels()).map(value).collect()).unwrap();
+            let kept = check_unique(&pair, map.clone(), &never).unwrap();
+            let at = |x: usize, y: usize| (hidden(x, y), kept.at(x, y).is_some());
+            let all = size.nodes().filter(|node| node.x >= 3).map(|node| at(node.x, node.y));
+            let (mut left, mut lost) = (0, 0);
+            for (is_hidden, is_kept) in all {
+                left += usize::from(is_hidden && is_kept);
+                lost += usize::from(!is_hidden && !is_kept);
+            }
+            // Windows of variances reach over borders of surfaces.
+            assert!(left <= 12 && lost <= 12, "{left} of 234 hidden ones are kept, {lost} others lost, at {wrong}");
+        }
+    }
+
+    #[test]
+    fn matches_outside_the_image_and_maps_of_other_sizes_are_refused() {
+        let size = Size { width: 4, height: 1 };
+        let image = || Image::from_grey(4, 1, [10, 90, 40, 200]).unwrap();
+        let pair = StereoPair::new(image(), image()).unwrap();
+        let map = DisparityMap::new(size, vec![1.0, 0.0, -2.0, 0.0]).unwrap();
+        let none = DisparityMap::UNKNOWN;
+        assert_eq!(check_unique(&pair, map, &never).unwrap().values(), [none, 0.0, none, 0.0]);
+        let other = DisparityMap::new(Size { width: 2, height: 1 }, vec![0.0; 2]).unwrap();
+        assert!(check_unique(&pair, other, &never).is_err());
+    }
+}
