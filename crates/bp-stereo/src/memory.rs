@@ -47,7 +47,7 @@ const CONFIDENCE: u64 = 12;
 const FRAME: usize = 8;
 
 /// Temporary bytes per pixel for finding surfaces in the speckle filter.
-const SPECKLE: u64 = 8;
+const SPECKLE: u64 = 16;
 
 /// What the program holds in memory beside the matcher, so that a memory limit includes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

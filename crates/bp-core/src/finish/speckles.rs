@@ -3,7 +3,15 @@
 use std::ops::Range;
 
 use super::check::AGREE;
-use crate::{DisparityMap, Error, memory::Buffer};
+use crate::{DisparityMap, Error};
+
+/// Adjacent pixels of a row that belong to the same surface, as many as there are.
+struct Run {
+    /// The first pixel. The next run begins after the last one.
+    start: usize,
+    /// An earlier run of the same surface, or this one.
+    before: usize,
+}
 
 /// Makes surfaces of fewer than `least` pixels unknown. A surface consists of adjacent pixels, each of which differs from
 /// the next by no more than [`AGREE`].
@@ -12,81 +20,81 @@ use crate::{DisparityMap, Error, memory::Buffer};
 /// [`Error::OutOfMemory`].
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
     let (width, pixels) = (map.size().width, map.size().pixels());
-    let mut surfaces = Buffer::filled("surfaces", pixels, 0)?;
-    join(map.values(), width, &mut surfaces);
+    let mut runs = joined_runs(map.values(), width)?;
     // Runs of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
     // first one holds the number of pixels, added to that of the image.
-    for Range { start, end } in runs(map.values(), width, 0) {
-        let before = surfaces[start];
-        let first = if before == start || surfaces[before] >= pixels { before } else { surfaces[before] };
-        surfaces[start] = if first == start { pixels } else { first };
-        surfaces[first] += end - start;
+    for index in 0..runs.len() {
+        let before = runs[index].before;
+        let first = if before == index || runs[before].before >= pixels { before } else { runs[before].before };
+        runs[index].before = if first == index { pixels } else { first };
+        runs[first].before += end(&runs, index, pixels) - runs[index].start;
     }
-    let count = |start: usize| {
-        let holds = surfaces[start];
-        (if holds >= pixels { holds } else { surfaces[holds] }) - pixels
-    };
+    let count = |run: &Run| (if run.before >= pixels { run.before } else { runs[run.before].before }) - pixels;
     Ok(map.replaced(|values| {
-        let mut start = 0;
-        for run in values.chunks_exact_mut(width).flat_map(|row| row.chunk_by_mut(agree)) {
-            let end = start + run.len();
-            if run[0].is_finite() && count(start) < least {
-                run.fill(DisparityMap::UNKNOWN);
-            }
-            start = end;
+        for (index, run) in runs.iter().enumerate().filter(|(_, run)| count(run) < least) {
+            values[run.start..end(&runs, index, pixels)].fill(DisparityMap::UNKNOWN);
         }
     }))
 }
 
-/// Whether adjacent pixels belong to the same surface. The difference of unknown pixels is infinite, or none.
-fn agree(a: &f32, b: &f32) -> bool {
-    (a - b).abs() <= AGREE
+/// Whether adjacent pixels belong to the same surface. Unknown ones form surfaces too, which stay unknown.
+fn agree(a: f32, b: f32) -> bool {
+    (a - b).abs() <= AGREE || a == b
 }
 
-/// The longest runs of pixels that belong to the same surface in each row, if the first pixel of the rows is the given one.
-fn runs(rows: &[f32], width: usize, first: usize) -> impl Iterator<Item = Range<usize>> {
-    let all = rows.chunks_exact(width).flat_map(|row| row.chunk_by(agree)).scan(first, |end, run| {
-        let start = *end;
-        *end += run.len();
-        Some((start..*end, run[0]))
-    });
-    all.filter(|(_, disparity)| disparity.is_finite()).map(|(run, _)| run)
-}
-
-/// Sets `surfaces` to the first pixel of an earlier run of the same surface for the first pixel of each run, or that pixel
-/// itself if there is none.
-fn join(values: &[f32], width: usize, surfaces: &mut [usize]) {
-    let (mut above, mut own) = (vec![], vec![]);
-    for (y, row) in values.chunks_exact(width).enumerate() {
-        own.extend(runs(row, width, y * width));
-        own.iter().for_each(|run: &Range<usize>| surfaces[run.start] = run.start);
-        let mut others = above.iter().map(|run: &Range<usize>| run.start + width..run.end + width).peekable();
-        for run in &own {
-            let mut touch = |other: &Range<usize>| {
-                let mut shared = run.start.max(other.start)..run.end.min(other.end);
-                if shared.any(|pixel| agree(&values[pixel - width], &values[pixel])) {
-                    let [a, b] = [run.start, other.start - width].map(|run| first(surfaces, run));
-                    surfaces[a.max(b)] = a.min(b);
-                }
-            };
-            while let Some(other) = others.next_if(|other| other.end <= run.end) {
-                touch(&other);
-            }
-            others.peek().into_iter().for_each(touch);
+/// The runs of all rows, joined with those above that they touch.
+fn joined_runs(values: &[f32], width: usize) -> Result<Vec<Run>, Error> {
+    let mut runs = Vec::new();
+    // Hardly ever are there so many, but memory that is not used is not held.
+    let needed = (values.len() as u64).saturating_mul(size_of::<Run>() as u64);
+    let refused = |_| Error::OutOfMemory { what: "surfaces", needed, available: None };
+    runs.try_reserve_exact(values.len()).map_err(refused)?;
+    let (mut above, mut start) = (0..0, 0);
+    for row in values.chunks_exact(width) {
+        let own = runs.len();
+        for run in row.chunk_by(|&a, &b| agree(a, b)) {
+            runs.push(Run { start, before: runs.len() });
+            start += run.len();
         }
-        std::mem::swap(&mut above, &mut own);
-        own.clear();
+        let own = own..runs.len();
+        join(values, width, &mut runs, above, own.clone());
+        above = own;
+    }
+    Ok(runs)
+}
+
+/// Joins the runs of a row, which are the last ones, with those of the row above.
+fn join(values: &[f32], width: usize, runs: &mut [Run], mut above: Range<usize>, own: Range<usize>) {
+    let row_end = runs[own.start].start + width;
+    for index in own {
+        let (start, end) = (runs[index].start, end(runs, index, row_end));
+        while !above.is_empty() {
+            let (other_start, other_end) = (runs[above.start].start + width, runs[above.start + 1].start + width);
+            if (start.max(other_start)..end.min(other_end)).any(|pixel| agree(values[pixel - width], values[pixel])) {
+                let [a, b] = [index, above.start].map(|run| first(runs, run));
+                runs[a.max(b)].before = a.min(b);
+            }
+            if other_end > end {
+                break;
+            }
+            above.start += 1;
+        }
     }
 }
 
-/// The first pixel of the surface that a run belongs to, as far as it is joined.
-fn first(surfaces: &mut [usize], mut pixel: usize) -> usize {
-    while surfaces[pixel] != pixel {
+/// Where a run ends, if the last one ends at `last`.
+fn end(runs: &[Run], index: usize, last: usize) -> usize {
+    runs.get(index + 1).map_or(last, |next| next.start)
+}
+
+/// The first run of the surface that a run belongs to, as far as it is joined.
+fn first(runs: &mut [Run], mut run: usize) -> usize {
+    while runs[run].before != run {
         // Every second step becomes one of two, so that paths stay short.
-        surfaces[pixel] = surfaces[surfaces[pixel]];
-        pixel = surfaces[pixel];
+        runs[run].before = runs[runs[run].before].before;
+        run = runs[run].before;
     }
-    pixel
+    run
 }
 
 #[cfg(test)]
