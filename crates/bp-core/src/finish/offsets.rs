@@ -10,7 +10,11 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use self::windows::Windows;
-use super::{means, rows::rows_together, variances::REACH};
+use super::{
+    means,
+    rows::rows_together,
+    variances::{Turn, turns},
+};
 use crate::{Error, IsStopped, Size, StereoPair, stop::go_on};
 
 /// Disparities are tried in steps of a quarter of a pixel.
@@ -69,16 +73,15 @@ impl Part<'_> {
         let (Size { width, height }, level) = (self.pair.size(), Level::new());
         let mut windows = Windows::new(width)?;
         let row_of = |y: usize| &self.map[y * width..][..width];
-        for coming in self.rows.start.saturating_sub(REACH)..self.rows.end + REACH {
+        for turn in turns(self.rows.clone(), height) {
             go_on(is_stopped)?;
-            if coming < height {
-                dispatch!(level, simd => windows.enter(simd, self.pair, coming, row_of(coming)));
-            }
-            let Some(y) = coming.checked_sub(REACH).filter(|y| self.rows.contains(y)) else { continue };
-            let refined = &mut refined[(y - self.rows.start) * width..][..width];
-            dispatch!(level, simd => windows.refine(simd, y, row_of(y), self.limits, refined));
-            if let Some(last) = y.checked_sub(REACH) {
-                dispatch!(level, simd => windows.leave(simd, last));
+            match turn {
+                Turn::Enter(y) => dispatch!(level, simd => windows.enter(simd, self.pair, y, row_of(y))),
+                Turn::Middle(y) => {
+                    let refined = &mut refined[(y - self.rows.start) * width..][..width];
+                    dispatch!(level, simd => windows.refine(simd, y, row_of(y), self.limits, refined));
+                }
+                Turn::Leave(y) => dispatch!(level, simd => windows.leave(simd, y)),
             }
         }
         Ok(())

@@ -9,7 +9,7 @@ use super::{
     check::AGREE,
     rows::rows_together,
     speckles::remove_speckles,
-    variances::{LANES, REACH, SIDE, Variances},
+    variances::{LANES, SIDE, Turn, Variances, turns},
 };
 use crate::{DisparityMap, Error, IsStopped, Size, StereoPair, memory::Buffer, metrics::check_size, stop::go_on};
 
@@ -56,16 +56,15 @@ impl Part<'_> {
         let (Size { width, height }, level) = (self.pair.size(), Level::new());
         let mut claims = Claims::new(width)?;
         let row_of = |y: usize| &self.map[y * width..][..width];
-        for coming in self.rows.start.saturating_sub(REACH)..self.rows.end + REACH {
+        for turn in turns(self.rows.clone(), height) {
             go_on(is_stopped)?;
-            if coming < height {
-                dispatch!(level, simd => claims.enter(simd, self.pair, coming, row_of(coming)));
-            }
-            let Some(y) = coming.checked_sub(REACH).filter(|y| self.rows.contains(y)) else { continue };
-            let kept = &mut kept[(y - self.rows.start) * width..][..width];
-            dispatch!(level, simd => claims.keep(simd, y, row_of(y), kept));
-            if let Some(last) = y.checked_sub(REACH) {
-                dispatch!(level, simd => claims.leave(simd, last));
+            match turn {
+                Turn::Enter(y) => dispatch!(level, simd => claims.enter(simd, self.pair, y, row_of(y))),
+                Turn::Middle(y) => {
+                    let kept = &mut kept[(y - self.rows.start) * width..][..width];
+                    dispatch!(level, simd => claims.keep(simd, y, row_of(y), kept));
+                }
+                Turn::Leave(y) => dispatch!(level, simd => claims.leave(simd, y)),
             }
         }
         Ok(())
@@ -177,7 +176,7 @@ fn write_matches<S: Simd>(simd: S, disparities: &[f32], matches: &mut [i32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, never};
+    use crate::{Image, finish::variances::REACH, never};
 
     /// A near square before a far wall, with noise of its own in each image, and what only the left image shows.
     fn scene(size: Size) -> (StereoPair, impl Fn(usize, usize) -> f32) {

@@ -1,5 +1,7 @@
 //! Variances of grey differences in windows, from sums that rows enter and leave.
 
+use std::ops::Range;
+
 use crate::{Error, memory::Buffer};
 
 /// How far windows reach from their centres.
@@ -8,6 +10,28 @@ pub(super) const SIDE: usize = 2 * REACH + 1;
 
 /// Rows have room for a multiple of so many columns.
 pub(super) const LANES: usize = 8;
+
+/// What happens to a row as windows move down an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// It comes into the windows.
+    Enter(usize),
+    /// All rows of the windows around it are there.
+    Middle(usize),
+    /// It is in no more windows.
+    Leave(usize),
+}
+
+/// The turns of rows, so that some of them are in the middle one after another.
+pub(super) fn turns(rows: Range<usize>, height: usize) -> impl Iterator<Item = Turn> {
+    let coming = rows.start.saturating_sub(REACH)..rows.end + REACH;
+    coming.flat_map(move |coming| {
+        let middle = coming.checked_sub(REACH).filter(|middle| rows.contains(middle));
+        let enter = (coming < height).then_some(Turn::Enter(coming));
+        let leave = middle.and_then(|middle| middle.checked_sub(REACH)).map(Turn::Leave);
+        [enter, middle.map(Turn::Middle), leave].into_iter().flatten()
+    })
+}
 
 /// The differences in the rows of windows whose centres lie in one row. Each pixel has one or several: those at the disparities
 /// that are tried.
@@ -110,4 +134,28 @@ impl Variances {
 /// A row of sums for one tried disparity: columns, and [`REACH`] more on both sides.
 fn wide(width: usize) -> usize {
     width.next_multiple_of(LANES) + 2 * REACH
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_middle_of_all_that_their_windows_reach() {
+        for (rows, height) in [(0..1, 1), (0..4, 9), (4..9, 9), (20..60, 100), (0..100, 100)] {
+            let (mut inside, mut next) = (Vec::new(), rows.start);
+            for turn in turns(rows.clone(), height) {
+                match turn {
+                    Turn::Enter(y) => inside.push(y),
+                    Turn::Leave(y) => assert_eq!(inside.remove(0), y),
+                    Turn::Middle(y) => {
+                        assert_eq!(inside, (y.saturating_sub(REACH)..height.min(y + REACH + 1)).collect::<Vec<_>>());
+                        assert_eq!(y, next);
+                        next += 1;
+                    }
+                }
+            }
+            assert_eq!(next, rows.end);
+        }
+    }
 }
