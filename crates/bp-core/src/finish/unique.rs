@@ -16,14 +16,17 @@ use crate::{DisparityMap, Error, IsStopped, Size, StereoPair, memory::Buffer, me
 /// Surfaces that cover less than `1 / SPECK` of the image are removed.
 const SPECK: usize = 3400;
 
+/// A nearer pixel hides a farther one with the same match, unless its variance is more than this many times as large.
+const LIKELIER: f32 = 2.0;
+
 /// A column that no pixel matches.
 const NONE: i32 = -1;
 
 /// Makes pixels unknown whose match in the right image fits another pixel better: a point of the right image is one
-/// point of the left one (Marr and Poggio 1976). Where several pixels match the same column `floor(x - d + 1/2)`, the one
-/// stays whose 7x7 window has the least variance of grey differences, and those whose disparity differs by no more than [`AGREE`]
-/// from its own. Pixels whose match lies outside the image become unknown too, and then surfaces of less than one part
-/// in 3400 of the image.
+/// point of the left one (Marr and Poggio 1976). Of several pixels that match the same column `floor(x - d + 1/2)`, one is the best. It is
+/// the nearest, because that hides the others, unless the variance of grey differences in its 7x7 window is more than twice that
+/// of a farther one. Pixels stay known whose disparity differs by no more than [`AGREE`] from that of the best one. Pixels whose
+/// match lies outside the image become unknown too, and then surfaces of less than one part in 3400 of the image.
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
@@ -143,9 +146,9 @@ impl Claims {
                 let Self { matches, variances, best, .. } = self;
                 let matches = &matches[range];
                 best.fill((f32::INFINITY, DisparityMap::UNKNOWN));
-                // Of equal variances, that of the nearest pixel counts: its disparity is larger, so it lies farther right.
+                // A nearer pixel comes later: its disparity is larger, so it lies farther right.
                 for ((&variance, &disparity), &column) in variances.compute().iter().zip(disparities).zip(matches) {
-                    if let Some(best) = best.get_mut(column as usize).filter(|(least, _)| variance <= *least) {
+                    if let Some(best) = best.get_mut(column as usize).filter(|(own, _)| variance <= LIKELIER * own) {
                         *best = (variance, disparity);
                     }
                 }
@@ -215,7 +218,10 @@ mod tests {
         let is_kept = |x: usize, y: usize| {
             let own = column(x, y)?;
             let rivals = (0..width).filter(|&x| column(x, y) == Some(own));
-            let best = rivals.rev().min_by(|&a, &b| variance(a, y).total_cmp(&variance(b, y)))?;
+            let best = rivals.reduce(|farther, nearer| {
+                let is_hidden = variance(nearer, y) <= f64::from(LIKELIER) * variance(farther, y);
+                if is_hidden { nearer } else { farther }
+            })?;
             (map[y * width + best] - map[y * width + x]).abs().le(&AGREE).then_some(())
         };
         let value = |i: usize| is_kept(i % width, i / width).map_or(DisparityMap::UNKNOWN, |()| map[i]);
@@ -265,8 +271,8 @@ mod tests {
                 left += usize::from(is_hidden && is_kept);
                 lost += usize::from(!is_hidden && !is_kept);
             }
-            // Windows of variances reach over borders of surfaces.
-            assert!(left <= 12 && lost <= 12, "{left} of 234 hidden ones are kept, {lost} others lost, at {wrong}");
+            // Windows of variances reach over borders of surfaces: one pixel of each of the square's 26 rows may be lost there.
+            assert!(left <= 26 && lost <= 26, "{left} of 234 hidden ones are kept, {lost} others lost, at {wrong}");
         }
     }
 
