@@ -26,8 +26,7 @@ const LITTLE: Kept = Kept { buffer: 64 << 10, all: 128 << 10 };
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MUCH: Kept = Kept { buffer: 8 << 20, all: 32 << 20 };
 
-/// Limits what glibc keeps: by default, buffers of up to 32 MiB once it
-/// has seen one freed, so the program would exceed its limit. It also reserves 64 MiB of addresses for every thread, which count
+/// Limits what glibc keeps: by default, buffers of up to 32 MiB once it has seen one freed, so the program would exceed its limit. It also reserves 64 MiB of addresses for every thread, which count
 /// where the system limits those (`ulimit -v`); one heap for all threads is enough here.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "only the C library can set its own allocator")]
