@@ -239,7 +239,7 @@ fn check_warm_start(options: &BatchOptions) -> Result<(), Error> {
         let what = "`warm_start` needs the messages of the frame before";
         let why = "the schedule sweep does not keep them, and matching both views overwrites them";
         let advice =
-            "use the `algorithm` cfbp with 10 `half_steps`, say, and neither a left-right check nor confidence";
+            "use the `algorithm` cfbp with 10 `half_steps`, say, and neither `check` (left-right) nor confidence";
         return Err(Error::Options(format!("{what}: {why}; {advice}")));
     }
     if matching.labels == Labels::Auto {
