@@ -233,16 +233,18 @@ impl Value for u16 {
             #[inline(always)]
             || {
                 let [none, one, near, far] = [0, 1, NEAR, FAR].map(|value| S::u16s::splat(simd, value));
-                let load = |row: &[u16], from: usize| S::u16s::from_slice(simd, &row[from..from + S::u16s::LEN]);
-                for (at, means) in (MARGIN..).step_by(S::u16s::LEN).zip(means.chunks_mut(S::u16s::LEN)) {
-                    let middle = load(rows[1], at);
+                // Slices of one known length let the compiler drop all bounds checks but one.
+                let columns = means.len().next_multiple_of(S::u16s::LEN);
+                let taps = rows.map(|row| [0, 1, 2].map(|i| &row[MARGIN - spacing + i * spacing..][..columns]));
+                for (at, means) in (0..columns).step_by(S::u16s::LEN).zip(means.chunks_mut(S::u16s::LEN)) {
+                    let load = |tap: &[u16]| S::u16s::from_slice(simd, &tap[at..at + S::u16s::LEN]);
+                    let middle = load(taps[1][1]);
                     let least = middle - near;
                     // From 1 to FAR where it is near, otherwise 0.
                     let (mut sums, mut counts) = (none, none);
-                    for row in rows {
-                        for column in 0..SIDE {
-                            let above = load(row, at + column * spacing - spacing) - least;
-                            let below = far.saturating_sub(above);
+                    for row in taps {
+                        for tap in row {
+                            let below = far.saturating_sub(load(tap) - least);
                             sums += below;
                             counts += below.min(one);
                         }

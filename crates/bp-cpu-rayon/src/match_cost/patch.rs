@@ -79,7 +79,7 @@ impl Matching<'_> {
         let rows = Rows::<S, Bytes<S>, CHANNELS, 1>::new(simd, self, y);
         let first = LANES * patch;
         let lanes = self.lanes(&rows, y, first);
-        run(simd, &Pixels { rows, lanes, cost }, first..first + LANES, self, to)
+        run(simd, &Pixels { rows: &rows, lanes: &lanes, cost }, first..first + LANES, self, to)
     }
 
     #[inline(always)]
@@ -110,7 +110,7 @@ impl Matching<'_> {
             #[inline(always)]
             |span| self.lanes(&rows, y, first + span * WIDEST),
         );
-        run(simd, &Squares { rows, spans, cost }, first..first + SPANS * WIDEST, self, to)
+        run(simd, &Squares { rows: &rows, spans: &spans, cost }, first..first + SPANS * WIDEST, self, to)
     }
 
     /// Loads the lanes of the left image from `first` on. Those beyond the image count as zeros. A row may lack a second span;
@@ -165,6 +165,7 @@ struct Rows<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize>
     columns: [i32; 2],
     /// Columns of the pair before the first node.
     margin: i32,
+    /// The costs of a column's pixels whose matches lie outside the image.
     outside: V,
 }
 
@@ -189,12 +190,14 @@ impl<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> Rows<'
             inside: [0, 1].map(|parity| features.inside(parity)),
             columns: [(width + 1) / 2, width / 2],
             margin,
-            outside: V::splat(simd, plan.model().profile().out_of_range_cost() as u8),
+            outside: V::splat(simd, ROWS as u8 * plan.model().profile().out_of_range_cost() as u8),
         }
     }
 
     #[inline(always)]
     fn load(&self, values: &[u8], at: usize) -> V {
+        // A message that names no numbers takes less code, and this is the innermost loop.
+        assert!(at + V::LEN <= values.len(), "rows have room for whole vectors on both sides");
         V::from_slice(self.simd, &values[at..at + V::LEN])
     }
 
@@ -219,12 +222,11 @@ impl<'a, S: Simd, V: Vector<S>, const CHANNELS: usize, const ROWS: usize> Rows<'
                 #[inline(always)]
                 |right| self.load(right, start),
             );
-            let mut cost = cost(lanes.left[plane][row], right);
-            if !INSIDE {
-                let inside = self.load(self.inside[parity], start);
-                cost = cost & inside | self.outside & !inside;
-            }
-            sum += cost;
+            sum += cost(lanes.left[plane][row], right);
+        }
+        if !INSIDE {
+            let inside = self.load(self.inside[parity], start);
+            sum = sum & inside | self.outside & !inside;
         }
         sum & lanes.exist[plane]
     }
@@ -238,8 +240,8 @@ trait Costs<S: Simd> {
 
 /// Nodes of grid 0.
 struct Pixels<'a, S: Simd, const CHANNELS: usize, F> {
-    rows: Rows<'a, S, Bytes<S>, CHANNELS, 1>,
-    lanes: Lanes<Bytes<S>, CHANNELS, 1>,
+    rows: &'a Rows<'a, S, Bytes<S>, CHANNELS, 1>,
+    lanes: &'a Lanes<Bytes<S>, CHANNELS, 1>,
     cost: F,
 }
 
@@ -251,15 +253,15 @@ where
     fn costs<const INSIDE: bool>(&self, disparity: i32, _: [&Block; 2]) -> [Bytes<S>; 2] {
         [0, 1].map(
             #[inline(always)]
-            |plane| self.rows.costs::<INSIDE>(&self.lanes, plane, disparity, &self.cost),
+            |plane| self.rows.costs::<INSIDE>(self.lanes, plane, disparity, &self.cost),
         )
     }
 }
 
 /// Nodes of grid 1, which cover one span of lanes, or of grid 2, which cover two.
 struct Squares<'a, S: Simd, const SPANS: usize, const ROWS: usize, const CHANNELS: usize, F> {
-    rows: Rows<'a, S, u8x64<S>, CHANNELS, ROWS>,
-    spans: [Lanes<u8x64<S>, CHANNELS, ROWS>; SPANS],
+    rows: &'a Rows<'a, S, u8x64<S>, CHANNELS, ROWS>,
+    spans: &'a [Lanes<u8x64<S>, CHANNELS, ROWS>; SPANS],
     cost: F,
 }
 

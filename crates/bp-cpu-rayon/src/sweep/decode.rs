@@ -134,7 +134,9 @@ impl Undecided<'_> {
             let better = best.simd_lt(before).select(Bytes::splat(simd, 1), Bytes::splat(simd, 0));
             let (better, nearest): ([u8; LANES], [u8; LANES]) = (better.into(), nearest.into());
             for ((label, better), nearest) in labels.iter_mut().zip(better).zip(nearest) {
-                *label = if better > 0 { from + u16::from(nearest) } else { *label };
+                // By masks, because compilers may make branches of conditions.
+                let better = u16::from(better).wrapping_neg();
+                *label = (from.wrapping_add(nearest.into()) & better) | (*label & !better);
             }
             entry = end;
         }

@@ -122,25 +122,25 @@ impl Source {
 
     /// The entry, if the value is that of an entry.
     #[inline(always)]
-    pub(crate) fn exact(self) -> Option<usize> {
+    pub(crate) fn exact(&self) -> Option<usize> {
         let is_exact = self.entries[0] == self.entries[1] && self.costs[0] == Steps::default();
         is_exact.then_some(usize::from(self.entries[0]))
     }
 
     /// The entry below.
-    pub(crate) fn below(self) -> u16 {
+    pub(crate) fn below(&self) -> u16 {
         self.entries[0]
     }
 
     /// Both entries and what the smoothness costs from them over edges of this level.
     #[inline(always)]
-    pub(crate) fn nearest(self, level: usize) -> [(usize, u8); 2] {
+    pub(crate) fn nearest(&self, level: usize) -> [(usize, u8); 2] {
         [0, 1].map(|i| (usize::from(self.entries[i]), self.costs[i][level]))
     }
 
     /// The value for this label.
     #[inline(always)]
-    pub(crate) fn value(self, level: usize, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
+    pub(crate) fn value(&self, level: usize, truncation: u8, message: impl Fn(usize) -> u8) -> u8 {
         // In 16 bits no sum saturates, and none above the truncation counts.
         let [below, above] = self.nearest(level).map(|(entry, cost)| u16::from(message(entry)) + u16::from(cost));
         below.min(above).min(truncation.into()) as u8
@@ -185,9 +185,6 @@ mod tests {
             source([2, 2], [11, 11]),
         ];
         assert_eq!(found, expected);
-        assert_eq!(
-            found.into_iter().map(Source::exact).collect::<Vec<_>>(),
-            [None, Some(0), None, Some(2), None, None]
-        );
+        assert_eq!(found.iter().map(Source::exact).collect::<Vec<_>>(), [None, Some(0), None, Some(2), None, None]);
     }
 }

@@ -91,8 +91,8 @@ impl Route<'_> {
 
     /// The entries that then have to be replaced, with their sources.
     #[inline(always)]
-    pub(crate) fn between(&self) -> impl Iterator<Item = (usize, Source)> {
+    pub(crate) fn between(&self) -> impl Iterator<Item = (usize, &Source)> {
         let all = self.between.iter().take_while(|between| between.entry != Between::END.entry);
-        all.map(|between| (usize::from(between.entry), between.source))
+        all.map(|between| (usize::from(between.entry), &between.source))
     }
 }

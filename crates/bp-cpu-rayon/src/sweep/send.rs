@@ -67,7 +67,9 @@ fn to_sides_of<S: Simd, const LEVELS: bool, const AHEAD: bool, const NEXT: isize
 ) {
     let len = nodes.list.labels.len();
     // Slices of one known length let the compiler drop the bounds checks in the loops.
-    let (costs, steps) = (&nodes.costs[..len], &nodes.list.steps[..len + 1]);
+    let costs = &nodes.costs[..len];
+    // Steps to each label, from below and from above.
+    let (upward, downward) = (&nodes.list.steps[..len], &nodes.list.steps[1..][..len]);
     let (same, next) = (&mut slots.same[..len], &mut slots.next[..len]);
     let (behind, ahead) = (&slots.behind[..len], &mut slots.ahead[..len]);
     let levels = nodes.levels::<S, LEVELS>(simd);
@@ -83,7 +85,7 @@ fn to_sides_of<S: Simd, const LEVELS: bool, const AHEAD: bool, const NEXT: isize
         let onward = cost.saturating_add(from_same + from_next).saturating_add(from_behind);
         let h = [vertical.saturating_add(from_next), vertical.saturating_add(from_same), onward];
         for side in 0..sent {
-            let step = of_edges::<S, LEVELS>(simd, levels[side], steps[entry]);
+            let step = of_edges::<S, LEVELS>(simd, levels[side], upward[entry]);
             envelope[side] = envelope[side].saturating_add(step).min(h[side]);
             least[side] = least[side].min(envelope[side]);
         }
@@ -101,7 +103,7 @@ fn to_sides_of<S: Simd, const LEVELS: bool, const AHEAD: bool, const NEXT: isize
             half[2] = ahead[entry].load(simd);
         }
         for side in 0..sent {
-            let step = of_edges::<S, LEVELS>(simd, levels[side], steps[entry + 1]);
+            let step = of_edges::<S, LEVELS>(simd, levels[side], downward[entry]);
             envelope[side] = envelope[side].saturating_add(step).min(half[side]);
         }
         same[entry].store((envelope[0] - least[0]).min(truncation[0]));
@@ -125,7 +127,9 @@ pub(crate) fn ahead<S: Simd, const LEVELS: bool>(simd: S, nodes: &Nodes<'_>, slo
 #[inline(always)]
 fn ahead_of<S: Simd, const LEVELS: bool, const NEXT: isize>(simd: S, nodes: &Nodes<'_>, slots: Slots<'_>) {
     let len = nodes.list.labels.len();
-    let (costs, steps) = (&nodes.costs[..len], &nodes.list.steps[..len + 1]);
+    let costs = &nodes.costs[..len];
+    // Steps to each label, from below and from above.
+    let (upward, downward) = (&nodes.list.steps[..len], &nodes.list.steps[1..][..len]);
     let (same, next) = (&slots.same[..len], &slots.next[..len]);
     let (behind, ahead) = (&slots.behind[..len], &mut slots.ahead[..len]);
     let levels = nodes.levels::<S, LEVELS>(simd);
@@ -134,14 +138,14 @@ fn ahead_of<S: Simd, const LEVELS: bool, const NEXT: isize>(simd: S, nodes: &Nod
     for entry in 0..len {
         let sides = same[entry].load(simd) + next[entry].load::<S, NEXT>(simd);
         let h = costs[entry].load(simd).saturating_add(sides).saturating_add(behind[entry].load(simd));
-        let reached = envelope.rise(of_edges::<S, LEVELS>(simd, levels[2], steps[entry]), h);
+        let reached = envelope.rise(of_edges::<S, LEVELS>(simd, levels[2], upward[entry]), h);
         least = least.min(reached);
         ahead[entry].store(reached);
     }
     let truncation = nodes.truncations::<S, LEVELS>(simd, levels);
     envelope = Envelope::new(simd);
     for entry in (0..len).rev() {
-        let step = of_edges::<S, LEVELS>(simd, levels[2], steps[entry + 1]);
+        let step = of_edges::<S, LEVELS>(simd, levels[2], downward[entry]);
         let reached = envelope.rise(step, ahead[entry].load(simd));
         ahead[entry].store((reached - least).min(truncation[2]));
     }

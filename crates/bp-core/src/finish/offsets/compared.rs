@@ -41,8 +41,11 @@ pub(super) fn differences<S: Simd>(simd: S, left: &[i16], first: &[i32; LANES], 
     let left = i16x8::from_slice(simd, left);
     // Consecutive steps of each pixel, `[lane][step]`.
     let mut steps = [left; LANES];
+    let last = right.len() - LANES;
     for (steps, &first) in steps.iter_mut().zip(first) {
-        *steps = i16x8::from_slice(simd, &right[first.max(0) as usize..][..LANES]);
+        // Without a first step, any will do. The compiler drops the bounds checks after this.
+        let first = (first as u32 as usize).min(last);
+        *steps = i16x8::from_slice(simd, &right[first..first + LANES]);
     }
     // Each round interleaves the first half of the rows with the second. Three make columns of rows.
     for _ in 0..LANES.ilog2() {

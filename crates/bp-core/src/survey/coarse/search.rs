@@ -1,5 +1,7 @@
 //! The search: costs of windows, in vectors of columns, for all disparities.
 
+use std::array;
+
 use fearless_simd::{Select, Simd, SimdBase, SimdInt};
 
 use crate::{Error, Size, memory::Buffer};
@@ -104,41 +106,52 @@ impl<'a> Search<'a> {
         self.right_codes[self.reach..][..width].copy_from_slice(&self.codes[1][below * width..][..width]);
         let row = (2 * self.reach + 1) * self.wide;
         let strips = (coming % SIDE) * row..(coming % SIDE + 1) * row;
+        // Slices of one known length let the compiler drop most bounds checks in the loops.
+        let columns = width.next_multiple_of(S::u8s::LEN);
+        let [left, own_inside] = [&self.left_codes[..columns], &self.inside[self.reach..][..columns]];
         // Two walks: sums need costs on both sides, which would not be at hand yet if they had just been stored.
         for (index, costs) in self.pixels.chunks_exact_mut(self.wide + 2 * RADIUS).enumerate() {
             let shift = 2 * self.reach - index;
-            for column in (0..width).step_by(S::u8s::LEN) {
-                let differing = load(simd, &self.left_codes, column) ^ load(simd, &self.right_codes, shift + column);
-                let inside = load(simd, &self.inside, self.reach + column) & load(simd, &self.inside, shift + column);
+            let [right, inside] = [&self.right_codes, &self.inside].map(|all| &all[shift..][..columns]);
+            let costs = &mut costs[RADIUS..][..columns];
+            for column in (0..columns).step_by(S::u8s::LEN) {
+                let differing = load(simd, left, column) ^ load(simd, right, column);
+                let inside = load(simd, own_inside, column) & load(simd, inside, column);
                 let cost = differing.count_ones() & inside | S::u8s::splat(simd, OUTSIDE) & !inside;
-                cost.store_slice(&mut costs[RADIUS + column..][..S::u8s::LEN]);
+                cost.store_slice(&mut costs[column..column + S::u8s::LEN]);
             }
         }
         let windows = self.windows[self.reach..].chunks_exact_mut(self.wide);
         let strips = self.strips[strips].chunks_exact_mut(self.wide);
         for ((costs, strips), windows) in self.pixels.chunks_exact(self.wide + 2 * RADIUS).zip(strips).zip(windows) {
-            for column in (0..width).step_by(S::u8s::LEN) {
-                let mut sum = load(simd, costs, column);
-                for shift in 1..SIDE {
-                    sum += load(simd, costs, column + shift);
+            let shifted: [_; SIDE] = array::from_fn(|shift| &costs[shift..][..columns]);
+            let (strips, windows) = (&mut strips[..columns], &mut windows[..columns]);
+            for column in (0..columns).step_by(S::u8s::LEN) {
+                let mut sum = S::u8s::splat(simd, 0);
+                for costs in shifted {
+                    sum += load(simd, costs, column);
                 }
                 let window = load(simd, windows, column) - load(simd, strips, column) + sum;
-                window.store_slice(&mut windows[column..][..S::u8s::LEN]);
-                sum.store_slice(&mut strips[column..][..S::u8s::LEN]);
+                window.store_slice(&mut windows[column..column + S::u8s::LEN]);
+                sum.store_slice(&mut strips[column..column + S::u8s::LEN]);
             }
         }
     }
 
-    /// Finds the best disparities of left pixels from `column` on, and their least costs elsewhere.
+    /// Finds the best disparities of left pixels from `column` on, and their least costs elsewhere. A disparity is impossible where the
+    /// right pixel would lie outside.
     #[inline(always)]
     fn find_left<S: Simd>(&mut self, simd: S, column: usize) {
         let [none, most, one] = [0, IMPOSSIBLE, 1].map(|value| S::u8s::splat(simd, value));
         let (mut best, mut least, mut second) = (none, most, most);
         // The costs of the disparity before, and the least of all disparities before that.
         let (mut adjacent, mut before) = (most, most);
-        for index in 0..=2 * self.reach {
-            let costs = self.left_costs(simd, column, index);
-            let index = S::u8s::splat(simd, index as u8);
+        // The right pixel of the first disparity lies farthest right.
+        let inside = self.inside[column..column + 2 * self.reach + S::u8s::LEN].windows(S::u8s::LEN).rev();
+        let windows = self.windows[self.reach..].chunks_exact(self.wide);
+        for ((costs, inside), index) in windows.zip(inside).zip(0..) {
+            let costs = load(simd, costs, column) | !load(simd, inside, 0);
+            let index = S::u8s::splat(simd, index);
             let (is_better, is_next) = (costs.simd_lt(least), index.simd_eq(best + one));
             second = is_better.select(before, is_next.select(second, second.min(costs)));
             best = is_better.select(index, best);
@@ -150,31 +163,19 @@ impl<'a> Search<'a> {
         second.store_slice(&mut self.second[column..][..S::u8s::LEN]);
     }
 
-    /// Finds the best disparities of right pixels from `column` on.
+    /// Finds the best disparities of right pixels from `column` on. A disparity is impossible where the left pixel would lie outside.
     #[inline(always)]
     fn find_right<S: Simd>(&mut self, simd: S, column: usize) {
         let (mut best, mut least) = (S::u8s::splat(simd, 0), S::u8s::splat(simd, IMPOSSIBLE));
-        for index in 0..=2 * self.reach {
-            let costs = self.right_costs(simd, column, index);
-            best = costs.simd_lt(least).select(S::u8s::splat(simd, index as u8), best);
+        let inside = self.inside[column..column + 2 * self.reach + S::u8s::LEN].windows(S::u8s::LEN);
+        // Right column x matches left column x + index - reach, one farther for each disparity.
+        let windows = self.windows[column..].chunks(self.wide + 1);
+        for ((costs, inside), index) in windows.zip(inside).zip(0..) {
+            let costs = load(simd, costs, 0) | !load(simd, inside, 0);
+            best = costs.simd_lt(least).select(S::u8s::splat(simd, index), best);
             least = least.min(costs);
         }
         best.store_slice(&mut self.right[column..][..S::u8s::LEN]);
-    }
-
-    /// The costs of left pixels from `column` on; impossible where the right pixel would lie outside.
-    #[inline(always)]
-    fn left_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> S::u8s {
-        let inside = load(simd, &self.inside, 2 * self.reach - index + column);
-        load(simd, &self.windows, self.reach + index * self.wide + column) | !inside
-    }
-
-    /// The costs of right pixels from `column` on; impossible where the left pixel would lie outside.
-    #[inline(always)]
-    fn right_costs<S: Simd>(&self, simd: S, column: usize, index: usize) -> S::u8s {
-        // Right column x matches left column x + index - reach.
-        let inside = load(simd, &self.inside, column + index);
-        load(simd, &self.windows, index * self.wide + column + index) | !inside
     }
 
     /// Writes the matches that are distinct and agree in both directions.
