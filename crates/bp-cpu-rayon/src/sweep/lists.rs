@@ -127,11 +127,6 @@ impl Source {
         is_exact.then_some(usize::from(self.entries[0]))
     }
 
-    /// The entry below.
-    pub(crate) fn below(&self) -> u16 {
-        self.entries[0]
-    }
-
     /// Both entries and what the smoothness costs from them over edges of this level.
     #[inline(always)]
     pub(crate) fn nearest(&self, level: usize) -> [(usize, u8); 2] {

@@ -13,7 +13,6 @@ use super::{
     messages::{Messages, Place},
     padded::Padded,
     refine::At,
-    routes::Route,
     send::{self, Slots, to_sides},
 };
 use crate::{
@@ -230,26 +229,12 @@ impl Pass<'_> {
         let end = LANES as isize - 1;
         let crossings = &self.work.crossings;
         if plane == 1 {
-            carry(level, truncation, crossings.of(self.lists, patch, 0), (left, end), (right, -1));
+            let route = crossings.of(self.lists, patch, 0);
+            route.carry(level, truncation, left, |sent| sent.lane(end), right, -1);
         } else {
-            carry(level, truncation, crossings.of(self.lists, before, 1), (right, -1), (left, end));
+            let route = crossings.of(self.lists, before, 1);
+            route.carry(level, truncation, right, |sent| sent.lane(-1), left, end);
         }
-    }
-}
-
-/// Writes the messages of a lane for the labels of another patch.
-fn carry(
-    level: usize,
-    truncation: u8,
-    route: Route<'_>,
-    (from, from_lane): (&mut [Padded], isize),
-    (to, to_lane): (&mut [Padded], isize),
-) {
-    for (entry, out) in route.nearest().zip(to.iter_mut()) {
-        *out.lane_mut(to_lane) = from[entry].lane(from_lane);
-    }
-    for (entry, source) in route.between() {
-        *to[entry].lane_mut(to_lane) = source.value(level, truncation, |entry| from[entry].lane(from_lane));
     }
 }
 

@@ -200,8 +200,10 @@ impl Reading<'_> {
     fn read<S: Simd, const SIDE: usize>(&self, simd: S, truncation: u8, routes: [Route<'_>; 3], values: &mut [Padded]) {
         let columns = Columns::<S, SIDE>::new(simd, self);
         let most = Bytes::splat(simd, truncation);
-        for (entry, out) in routes[0].nearest().zip(values.iter_mut()) {
-            out.store::<S, 0>(columns.of(entry));
+        for (to, from) in routes[0].runs() {
+            for (entry, out) in from.zip(&mut values[to]) {
+                out.store::<S, 0>(columns.of(entry));
+            }
         }
         for (entry, source) in routes[0].between() {
             let [(below, cost), (above, cost_above)] = source.nearest(0);
@@ -297,24 +299,14 @@ impl Reading<'_> {
         let in_pair = (SIDE == LEFT) == (plane == 1);
         if SIDE == BELOW {
             let below = &messages.vertical[(2 * self.row + 2 + plane) * entries..][range];
-            write_lane(truncation, routes[index], values, lane, |entry| below[entry].0[from]);
+            routes[index].carry(0, truncation, below, |block| block.0[from], values, lane);
         } else if in_pair {
             let same = &messages.same[inside];
-            write_lane(truncation, routes[index], values, lane, |entry| same[entry].0[from]);
+            routes[index].carry(0, truncation, same, |block| block.0[from], values, lane);
         } else {
             let (next, from) = (&messages.next[inside], from as isize - isize::from(plane == 0));
-            write_lane(truncation, routes[index], values, lane, |entry| next[entry].lane(from));
+            routes[index].carry(0, truncation, next, |block| block.lane(from), values, lane);
         }
-    }
-}
-
-/// Writes the messages of one node, given by entry of its list, to a lane.
-fn write_lane(truncation: u8, route: Route<'_>, values: &mut [Padded], lane: isize, message: impl Fn(usize) -> u8) {
-    for (entry, out) in route.nearest().zip(values.iter_mut()) {
-        *out.lane_mut(lane) = message(entry);
-    }
-    for (entry, source) in route.between() {
-        *values[entry].lane_mut(lane) = source.value(0, truncation, &message);
     }
 }
 
