@@ -1,13 +1,20 @@
 //! Filling the left border, which the right camera does not see.
 
+use std::array;
+
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
 use rayon::prelude::*;
 
 use super::check::AGREE;
-use crate::{DisparityMap, Error, memory};
+use crate::{DisparityMap, Error, Size, memory};
 
 /// How many rows above and below, and how many columns, a slope is estimated from.
 const ROWS: usize = 16;
 const COLUMNS: usize = 24;
+
+/// These columns in vectors.
+const LANES: usize = 8;
+const VECTORS: usize = COLUMNS / LANES;
 
 /// The shortest run of columns that is used.
 const FEWEST: usize = 8;
@@ -30,12 +37,12 @@ const CONTINUED: f64 = 0.75;
 /// # Errors
 /// [`Error::OutOfMemory`].
 pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
-    let Some((least, largest)) = map.range() else { return Ok(map) };
-    let (width, height) = (map.size().width, map.size().height);
+    let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
+    let (Size { width, height }, level) = (map.size(), Level::new());
     let mut anchors = memory::filled("anchors", height, None)?;
     anchors.par_iter_mut().enumerate().for_each(|(y, anchor)| {
         let x = map.values()[y * width..][..width].iter().position(|value| value.is_finite());
-        *anchor = x.filter(|&x| x > 0).map(|x| (x, slope(&map, x, y)));
+        *anchor = x.filter(|&x| x > 0).map(|x| (x, dispatch!(level, simd => slope(simd, &map, x, y))));
     });
     Ok(map.replaced(|values| {
         for (row, anchor) in values.chunks_exact_mut(width).zip(anchors) {
@@ -51,39 +58,73 @@ pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
 }
 
 /// The slope to be continued to the left of the anchor at (x, y).
-fn slope(map: &DisparityMap, x: usize, y: usize) -> f64 {
-    let (width, height) = (map.size().width, map.size().height);
-    let columns = x..width.min(x + COLUMNS);
-    let anchor = map.values()[y * width + x];
-    let (mut rise, mut spread) = (0.0, 0.0);
-    for row in map.values().chunks_exact(width).take(height.min(y + ROWS + 1)).skip(y.saturating_sub(ROWS)) {
-        let near = &row[columns.clone()];
-        let run = if (near[0] - anchor).abs() <= AGREE { run(near) } else { &[] };
-        if run.len() >= FEWEST {
-            let (own_rise, own_spread) = moments(run);
-            (rise, spread) = (rise + own_rise, spread + own_spread);
-        }
-    }
-    if spread > 0.0 { (CONTINUED * rise / spread).clamp(-STEEPEST, STEEPEST) } else { 0.0 }
+#[inline(always)]
+fn slope<S: Simd>(simd: S, map: &DisparityMap, x: usize, y: usize) -> f64 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Size { width, height } = map.size();
+            let anchor = map.values()[y * width + x];
+            let (mut rise, mut spread) = (f32x8::splat(simd, 0.0), 0.0);
+            for row in map.values().chunks_exact(width).take(height.min(y + ROWS + 1)).skip(y.saturating_sub(ROWS)) {
+                if (row[x] - anchor).abs() <= AGREE {
+                    let near = Near::new(simd, &row[x..]);
+                    let len = near.run();
+                    if len >= FEWEST {
+                        rise += near.rise(anchor, len);
+                        let count = len as f64;
+                        spread += count * (count * count - 1.0) / 12.0;
+                    }
+                }
+            }
+            let rise: f32 = rise.as_slice().iter().sum();
+            if spread > 0.0 { (CONTINUED * f64::from(rise) / spread).clamp(-STEEPEST, STEEPEST) } else { 0.0 }
+        },
+    )
 }
 
-/// The values before the first step of more than 1 px, or the first unknown value.
-fn run(values: &[f32]) -> &[f32] {
-    let end = values.windows(2).position(|pair| (pair[1] - pair[0]).abs() > AGREE);
-    end.map_or(values, |last| &values[..=last])
+/// The values of [`COLUMNS`] columns, and each one's next.
+struct Near<S: Simd> {
+    simd: S,
+    values: [f32x8<S>; VECTORS],
+    next: [f32x8<S>; VECTORS],
 }
 
-/// The sum of the values times their columns, and of the squared columns, both counted from the middle.
-fn moments(values: &[f32]) -> (f64, f64) {
-    let (count, middle) = (values.len() as f64, (values.len() - 1) as f64 / 2.0);
-    // Several sums at once, because each addition waits for the one before.
-    let mut rises = [0.0; 4];
-    for (four, first) in values.chunks(rises.len()).zip((0..).step_by(rises.len())) {
-        for ((rise, &value), column) in rises.iter_mut().zip(four).zip(first..) {
-            *rise += (f64::from(column) - middle) * f64::from(value);
-        }
+impl<S: Simd> Near<S> {
+    /// The first ones of a row. Those beyond its end count as unknown.
+    #[inline(always)]
+    fn new(simd: S, row: &[f32]) -> Self {
+        let mut own = [DisparityMap::UNKNOWN; COLUMNS + 1];
+        let len = row.len().min(COLUMNS);
+        own[..len].copy_from_slice(&row[..len]);
+        let load = |first: usize| array::from_fn(|i| f32x8::from_slice(simd, &own[first + i * LANES..][..LANES]));
+        Self { simd, values: load(0), next: load(1) }
     }
-    (rises.iter().sum(), count * (count * count - 1.0) / 12.0)
+
+    /// The number of values before the first step of more than 1 px, or the first unknown value.
+    #[inline(always)]
+    fn run(&self) -> usize {
+        let most = f32x8::splat(self.simd, AGREE);
+        let mut goes_on = 0;
+        for (i, (&value, &next)) in self.values.iter().zip(&self.next).enumerate() {
+            goes_on |= (next - value).abs().simd_le(most).to_bitmask() << (i * LANES);
+        }
+        goes_on.trailing_ones() as usize + 1
+    }
+
+    /// The sum of the first `len` values times their columns, which are counted from the middle one. What the values are compared
+    /// with does not change it; near them, sums stay small, and those of whole disparities are exact.
+    #[inline(always)]
+    fn rise(&self, anchor: f32, len: usize) -> f32x8<S> {
+        let [anchor, middle, end, none] =
+            [anchor, (len - 1) as f32 / 2.0, len as f32, 0.0].map(|value| f32x8::splat(self.simd, value));
+        let mut rise = none;
+        for (i, &values) in self.values.iter().enumerate() {
+            let columns = f32x8::from_fn(self.simd, |lane| (i * LANES + lane) as f32);
+            rise += columns.simd_lt(end).select((columns - middle) * (values - anchor), none);
+        }
+        rise
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,9 @@ use rayon::prelude::*;
 
 use crate::DisparityMap;
 
+/// Values that are looked through together.
+const PIECE: usize = 16;
+
 /// Fills every unknown pixel with the smaller of the nearest known disparities to its left and right, because a pixel
 /// that one camera does not see belongs to the surface behind. A row without known pixels is copied from the row above
 /// or, if that is unknown too, from the row below.
@@ -24,14 +27,22 @@ pub fn fill(map: DisparityMap) -> DisparityMap {
 
 fn fill_row(row: &mut [f32]) {
     let mut start = 0;
-    while let Some(first) = row[start..].iter().position(|value| !value.is_finite()) {
-        let first = start + first;
+    while let Some(first) = first_unknown(&row[start..]).map(|first| start + first) {
         let end = row[first..].iter().position(|value| value.is_finite()).map_or(row.len(), |len| first + len);
         let left = first.checked_sub(1).map_or(DisparityMap::UNKNOWN, |x| row[x]);
         let right = row.get(end).copied().unwrap_or(DisparityMap::UNKNOWN);
         row[first..end].fill(left.min(right));
         start = end;
     }
+}
+
+/// The first unknown value. Most pieces have none, which is found for all their values at once.
+fn first_unknown(values: &[f32]) -> Option<usize> {
+    let is_unknown = |value: &f32| !value.is_finite();
+    let known =
+        values.chunks(PIECE).take_while(|piece| !piece.iter().fold(false, |any, value| any | is_unknown(value)));
+    let known = known.count() * PIECE;
+    values.get(known..)?.iter().position(is_unknown).map(|first| known + first)
 }
 
 /// Copies row `from` to row `to` if `to` is unknown. At this point a row is either all known or all unknown.

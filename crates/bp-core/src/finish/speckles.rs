@@ -2,8 +2,13 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8};
+
 use super::check::AGREE;
 use crate::{DisparityMap, Error};
+
+/// Pixels that are compared at once.
+const LANES: usize = 8;
 
 /// Adjacent pixels of a row that belong to the same surface, as many as there are.
 struct Run {
@@ -49,18 +54,47 @@ fn joined_runs(values: &[f32], width: usize) -> Result<Vec<Run>, Error> {
     let needed = (values.len() as u64).saturating_mul(size_of::<Run>() as u64);
     let refused = |_| Error::OutOfMemory { what: "surfaces", needed, available: None };
     runs.try_reserve_exact(values.len()).map_err(refused)?;
-    let (mut above, mut start) = (0..0, 0);
-    for row in values.chunks_exact(width) {
+    let (mut above, level) = (0..0, Level::new());
+    for (start, row) in (0..).step_by(width).zip(values.chunks_exact(width)) {
         let own = runs.len();
-        for run in row.chunk_by(|&a, &b| agree(a, b)) {
-            runs.push(Run { start, before: runs.len() });
-            start += run.len();
-        }
+        dispatch!(level, simd => push_runs(simd, start, row, &mut runs));
         let own = own..runs.len();
         join(values, width, &mut runs, above, own.clone());
         above = own;
     }
     Ok(runs)
+}
+
+/// Adds the runs of a row, whose first pixel is `start`.
+#[inline(always)]
+fn push_runs<S: Simd>(simd: S, start: usize, row: &[f32], runs: &mut Vec<Run>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let most = f32x8::splat(simd, AGREE);
+            let mut push = |start| runs.push(Run { start, before: runs.len() });
+            push(start);
+            let pieces = row.chunks(LANES).zip(row[1..].chunks(LANES));
+            for (first, (before, own)) in (start + 1..).step_by(LANES).zip(pieces) {
+                let [before, own] = [&before[..own.len()], own].map(|values| lanes(simd, values));
+                let agree = (before - own).abs().simd_le(most) | before.simd_eq(own);
+                let mut steps = (!agree).to_bitmask();
+                while steps != 0 {
+                    push(first + steps.trailing_zeros() as usize);
+                    steps &= steps - 1;
+                }
+            }
+        },
+    );
+}
+
+/// At most [`LANES`] values, and zeros where there are fewer.
+#[inline(always)]
+fn lanes<S: Simd>(simd: S, values: &[f32]) -> f32x8<S> {
+    match values.first_chunk() {
+        Some(values) => f32x8::load_array(simd, *values),
+        None => f32x8::from_fn(simd, |lane| values.get(lane).copied().unwrap_or(0.0)),
+    }
 }
 
 /// Joins the runs of a row, which are the last ones, with those of the row above.
