@@ -1,10 +1,11 @@
 //! Operations on disparity maps after matching, the same for all backends: checks, filling, filters and confidence.
 //!
-//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, uniqueness, speckles, fill, median,
-//! sub-pixel.
+//! [`Finish`] selects some of them and applies them in a fixed order: left-right check, sub-pixel, uniqueness, speckles, fill,
+//! median.
 
 mod border;
 mod check;
+mod claims;
 mod confidence;
 mod fill;
 mod means;
@@ -23,7 +24,7 @@ pub use confidence::confidence;
 pub use fill::fill;
 pub use median::{MEDIANS, median};
 pub use offsets::window_bytes;
-pub use speckles::remove_speckles;
+pub use speckles::{remove_speckles, speckle_bytes};
 pub use subpixel::subpixel;
 pub use unique::check_unique;
 
@@ -38,7 +39,7 @@ pub struct Finish {
     pub unique: bool,
     /// Makes surfaces with fewer pixels than this unknown; see [`remove_speckles`].
     pub speckles: Option<usize>,
-    /// Whether unknown pixels are filled after the check and the speckles; see [`fill_border`]
+    /// Whether unknown pixels are filled after the checks and the speckles; see [`fill_border`]
     /// and [`fill()`].
     pub fill: bool,
     /// The side of the window of [`median`], one of [`MEDIANS`].
@@ -48,12 +49,26 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// Applies the selected operations to the left image's map. `right` is the right image's map, for the check.
+    /// Applies the selected operations to the left image's map: [`Finish::judge`], then [`Finish::complete`].
     ///
     /// # Errors
-    /// [`Error::WrongSize`] if the two maps or, for fractions, the pair differ in size; [`Error::Plan`] for a check without the right image's map,
-    /// or for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`]; [`Error::Stopped`].
+    /// As both.
     pub fn apply(
+        &self,
+        pair: &StereoPair,
+        left: DisparityMap,
+        right: Option<&DisparityMap>,
+        is_stopped: IsStopped<'_>,
+    ) -> Result<DisparityMap, Error> {
+        self.complete(self.judge(pair, left, right, is_stopped)?, is_stopped)
+    }
+
+    /// Applies those that find wrong pixels and fractions. `right` is the right image's map, for the check.
+    ///
+    /// # Errors
+    /// [`Error::WrongSize`] if the two maps or, for fractions and uniqueness, the pair differ in size; [`Error::Plan`] for a check
+    /// without the right image's map; [`Error::OutOfMemory`]; [`Error::Stopped`].
+    pub fn judge(
         &self,
         pair: &StereoPair,
         left: DisparityMap,
@@ -65,19 +80,24 @@ impl Finish {
             (true, Some(right)) => check_left_right(left, right)?,
             (true, None) => return Err(Error::Plan("a left-right check needs the right image's map too")),
         };
-        if self.unique {
+        if self.subpixel {
+            map = subpixel(pair, map, self.unique, is_stopped)?;
+        } else if self.unique {
             map = check_unique(pair, map, is_stopped)?;
         }
         if let Some(least) = self.speckles {
             map = remove_speckles(map, least)?;
         }
-        if self.fill {
-            map = fill(fill_border(map)?);
-        }
-        if let Some(side) = self.median {
-            map = median(&map, side, is_stopped)?;
-        }
-        if self.subpixel { subpixel(pair, map, is_stopped) } else { Ok(map) }
+        Ok(map)
+    }
+
+    /// Fills and filters a map that has been judged.
+    ///
+    /// # Errors
+    /// [`Error::Plan`] for a median that is not one of [`MEDIANS`]; [`Error::OutOfMemory`]; [`Error::Stopped`].
+    pub fn complete(&self, judged: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
+        let map = if self.fill { fill(fill_border(judged, !self.subpixel)?) } else { judged };
+        if let Some(side) = self.median { median(&map, side, is_stopped) } else { Ok(map) }
     }
 }
 

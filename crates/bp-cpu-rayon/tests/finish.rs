@@ -82,7 +82,8 @@ fn trusted_pixels_are_right_more_often() {
 fn fractions_are_nearer_to_the_truth_than_labels() {
     let [fractions, labels] = over_scenes(|scene| {
         let [left, _] = both(&scene.pair);
-        [&finish::subpixel(&scene.pair, left.clone(), &never).unwrap(), &left].map(|map| errors(scene, map).bad[0])
+        [&finish::subpixel(&scene.pair, left.clone(), false, &never).unwrap(), &left]
+            .map(|map| errors(scene, map).bad[0])
     });
     assert!(fractions < 0.9 * labels, "{fractions} % wrong by more than half a pixel against {labels} %");
 }

@@ -36,16 +36,17 @@ def test_colours_are_opencvs():
 def test_unknown_pixels_are_one_below_the_first_disparity():
     left, right = shifted(60, 80, 5)
     right[20:40, 20:40] = 255 - right[20:40, 20:40]
-    for first in (0, -8):
-        found = bpstereo.StereoBP.create(first, 24, disp12MaxDiff=1, speckleWindowSize=50).compute(left, right)
+    for first, check in [(0, "disp12MaxDiff"), (-8, "disp12MaxDiff"), (0, "uniquenessRatio")]:
+        found = bpstereo.StereoBP.create(first, 24, speckleWindowSize=50, **{check: 1}).compute(left, right)
         assert (found == (first - 1) * 16).any() and abs(numpy.median(found) - 80) <= 4
+    assert (bpstereo.StereoBP.create(0, 24).compute(left, right) >= 0).all()
     out = numpy.zeros((60, 80), numpy.int16)
     assert bpstereo.StereoBP.create(0, 16).compute(left, right, out) is out and out.any()
 
 
 def test_parameters_without_counterpart_are_told():
-    with pytest.warns(UserWarning, match="P1, uniquenessRatio"):
-        bpstereo.StereoBP.create(0, 16, P1=200, uniquenessRatio=10)
+    with pytest.warns(UserWarning, match="P1, preFilterCap"):
+        bpstereo.StereoBP.create(0, 16, P1=200, preFilterCap=10)
     with pytest.raises(ValueError, match="int16"):
         bpstereo.StereoBP.create(0, 4096)
     matcher = bpstereo.StereoBP.create(-3, 32)
@@ -124,7 +125,7 @@ def cloud(create):
 
 
 def test_opencvs_sample_runs_with_one_line_changed():
-    with pytest.warns(UserWarning, match="blockSize, P1, P2, uniquenessRatio, speckleRange"):
+    with pytest.warns(UserWarning, match="blockSize, P1, P2, speckleRange"):
         ours, is_known, shown = cloud(bpstereo.StereoBP.create)
     theirs, is_known_there, _ = cloud(cv2.StereoSGBM_create)
     assert 0 < is_known.mean() < 1 and shown[is_known].min() >= 0 and shown[is_known].max() <= 1

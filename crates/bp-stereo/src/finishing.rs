@@ -66,12 +66,11 @@ pub(crate) fn finished(
     let trust = right.as_ref().filter(|_| options.confidence);
     let mut confidence = trust.map(|right| finish::confidence(&left, right, is_stopped)).transpose()?;
     let finish: Finish = options.finish();
-    let judge = Finish { fill: false, median: None, subpixel: false, ..finish };
-    let judged = judge.apply(pair, left, right.as_ref(), is_stopped)?;
+    let judged = finish.judge(pair, left, right.as_ref(), is_stopped)?;
     for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
         *trust = 0.0;
     }
-    let map = Finish { check: false, unique: false, speckles: None, ..finish }.apply(pair, judged, None, is_stopped)?;
+    let map = finish.complete(judged, is_stopped)?;
     Ok(Finished {
         map,
         confidence,

@@ -1,6 +1,10 @@
 //! Predicts the memory that a match needs, and tiles its plan to stay within a limit.
 
-use bp_core::{Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling, finish, image::Samples};
+use bp_core::{
+    Energy, Image, Plan, Profile, Schedule, Size, StereoPair, Tiling,
+    finish::{self, Finish},
+    image::Samples,
+};
 
 use crate::{Error, Options, Watch, devices::Opened, error::iec, rectifying::POSITIONS, system::Memory, tiles::ANSWER};
 
@@ -45,9 +49,6 @@ const CONFIDENCE: u64 = 12;
 
 /// Rows and columns of the frames around maps that are filtered, on both sides together.
 const FRAME: usize = 8;
-
-/// Temporary bytes per pixel for finding surfaces in the speckle filter.
-const SPECKLE: u64 = 16;
 
 /// What the program holds in memory beside the matcher, so that a memory limit includes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -187,8 +188,9 @@ fn finishing(options: &Options, size: Size) -> u64 {
     let filtered = a_pixel(FINISHING) + framed;
     let refined = a_pixel(FINISHING) + finish::window_bytes(size, rayon::current_num_threads());
     let trusted = if options.confidence { a_pixel(CONFIDENCE) + 2 * framed } else { 0 };
-    let speckles = if options.speckle.is_some() || options.unique { a_pixel(SPECKLE) } else { 0 };
-    let refined = if options.finish().subpixel || options.unique { refined } else { 0 };
+    let Finish { unique, speckles, subpixel, .. } = options.finish();
+    let speckles = if unique || speckles.is_some() { finish::speckle_bytes(size) } else { 0 };
+    let refined = if subpixel || unique { refined } else { 0 };
     let judged = if options.energy { Energy::temporary_bytes(size, rayon::current_num_threads()) } else { 0 };
     filtered.max(refined).max(judged).max(trusted).max(speckles)
 }

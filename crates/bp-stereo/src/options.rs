@@ -49,8 +49,9 @@ pub struct Options {
     /// [`Options::quality`] says.
     pub check: Option<bool>,
     /// Whether pixels become unknown whose match in the right image fits another pixel better; see
-    /// [`check_unique`](bp_core::finish::check_unique). The right image need not be matched for that.
-    pub unique: bool,
+    /// [`check_unique`](bp_core::finish::check_unique). The right image need not be matched for that. `None` means as
+    /// [`Options::quality`] says, and no with [`Options::check`].
+    pub unique: Option<bool>,
     /// Surfaces with fewer pixels than this become unknown.
     pub speckle: Option<usize>,
     /// Whether pixels that a check or the speckle filter made unknown are filled from their row. At the left border, the
@@ -96,11 +97,11 @@ pub enum Labels {
 pub enum Quality {
     /// Whole pixels.
     Fast,
-    /// Fractions of a pixel.
+    /// Fractions of a pixel, and a uniqueness check: most of what only the left camera sees is filled from the surface behind.
     #[default]
     Balanced,
-    /// Also a left-right check, which fills occluded pixels from the surface behind, and a median of 3x3. Colour images are matched
-    /// in colour, with [`Profile::Census32`].
+    /// Fractions of a pixel, a left-right check, which finds more of it, and a median of 3x3. Colour images are matched in
+    /// colour, with [`Profile::Census32`].
     Best,
 }
 
@@ -146,7 +147,7 @@ impl Default for Options {
             labels: Labels::default(),
             min_disparity: None,
             check: None,
-            unique: false,
+            unique: None,
             speckle: None,
             fill: true,
             median: None,
@@ -195,7 +196,7 @@ setters! {
     /// With [`Options::check`].
     with_check: bool => check = Some;
     /// With [`Options::unique`].
-    with_unique: bool => unique = std::convert::identity;
+    with_unique: bool => unique = Some;
     /// With [`Options::speckle`].
     with_speckle: usize => speckle = Some;
     /// With [`Options::median`].
@@ -231,11 +232,12 @@ impl Options {
     #[must_use]
     pub fn finish(&self) -> Finish {
         let (is_best, check) = (self.quality == Quality::Best, self.checks());
+        let unique = self.unique.unwrap_or(self.quality == Quality::Balanced && !check);
         Finish {
             check,
-            unique: self.unique,
+            unique,
             speckles: self.speckle,
-            fill: self.fill && (check || self.unique || self.speckle.is_some()),
+            fill: self.fill && (check || unique || self.speckle.is_some()),
             median: self.median.or(is_best.then_some(3)),
             subpixel: self.subpixel.unwrap_or(self.quality != Quality::Fast),
         }

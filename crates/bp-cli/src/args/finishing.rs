@@ -11,14 +11,17 @@ use super::{named, switch};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "After matching, in this order")]
 pub(crate) struct FinishArgs {
-    /// Drop pixels that fail a check: left-right or unique.
+    /// Drop pixels that fail a check: unique, left-right or off. [default: unique; with --quality best left-right; with fast off]
     ///
-    /// left-right also matches the right image. The two maps disagree, by more than one pixel, at occluded pixels and at most wrong
-    /// ones. This takes half as long as the match, or as long where all labels are tried. unique needs no second match: of
-    /// pixels that match the same place of the right image, those that fit it less well are dropped, with small surfaces that are left
-    /// and pixels whose match lies outside the image. It finds fewer wrong pixels. Dropped pixels are filled, unless --fill off is given.
-    #[arg(long, value_parser = named(&[Check::LeftRight, Check::Unique], Check::name))]
+    /// unique: of pixels that match the same place of the right image, those that fit it less well are dropped, with small surfaces
+    /// that are left and pixels whose match lies outside the image. left-right finds more wrong pixels. It also matches the right
+    /// image: the two maps disagree, by more than one pixel, at occluded pixels and at most wrong ones. This takes half as long as
+    /// the match, or as long where all labels are tried. Dropped pixels are filled, unless --fill off is given.
+    #[arg(long, value_parser = named(&[Check::Unique, Check::LeftRight, Check::Off], Check::name))]
     pub(crate) check: Option<Check>,
+    /// Keep whole pixels instead of refining disparities to fractions from the images.
+    #[arg(long, hide_short_help = true)]
+    pub(crate) whole_pixels: bool,
     /// Drop surfaces with fewer than N pixels.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub(crate) speckle: Option<u32>,
@@ -31,9 +34,6 @@ pub(crate) struct FinishArgs {
     /// Apply a median filter of N x N pixels.
     #[arg(long, value_name = "N", value_parser = named(&MEDIANS, side))]
     pub(crate) median: Option<usize>,
-    /// Keep whole pixels instead of refining disparities to fractions from the images.
-    #[arg(long, hide_short_help = true)]
-    pub(crate) whole_pixels: bool,
     /// Write a confidence from 0 to 1 for each pixel.
     ///
     /// The confidence is about the probability that the disparity is right to one pixel. It follows from the share of a 9 x 9
@@ -50,6 +50,8 @@ pub(crate) enum Check {
     LeftRight,
     /// Against other pixels of the same map.
     Unique,
+    /// None.
+    Off,
 }
 
 impl Check {
@@ -57,6 +59,7 @@ impl Check {
         match self {
             Self::LeftRight => "left-right",
             Self::Unique => "unique",
+            Self::Off => "off",
         }
     }
 }

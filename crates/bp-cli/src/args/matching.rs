@@ -109,9 +109,9 @@ pub(crate) struct PlanArgs {
     pub(crate) align: AlignArg,
     /// What to trade for what: fast, balanced or best.
     ///
-    /// fast keeps whole pixels. best also checks the map against that of the right image, fills what only the left camera sees
-    /// from the surface behind, and matches colour images in colour; it takes about twice the time. Other options change
-    /// single parts of it.
+    /// fast keeps whole pixels and checks nothing. balanced fills most of what only the left camera sees from the surface behind.
+    /// best finds more of it by the map of the right image, and matches colour images in colour; it takes about twice the
+    /// time. Other options change single parts of it.
     #[arg(long, default_value = "balanced", value_parser = named(&Quality::ALL, Quality::name))]
     pub(crate) quality: Quality,
     /// Data cost and its default smoothness. [default: census16; for colour images with --quality best census32]

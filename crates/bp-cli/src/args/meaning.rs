@@ -25,6 +25,7 @@ impl MatchArgs {
     pub(crate) fn options(&self) -> Result<Options, Failure> {
         let (plan, finish) = (&self.plan, &self.finish);
         check_finish(self)?;
+        let checks = |by| finish.check.map(|check| check == by);
         let options = Options {
             algorithm: plan.meaning()?,
             quality: plan.quality,
@@ -36,8 +37,8 @@ impl MatchArgs {
             align: plan.align.meaning()?,
             labels: plan.labels.unwrap_or_default(),
             min_disparity: plan.min_disparity,
-            check: finish.check.map(|check| check == Check::LeftRight),
-            unique: finish.check == Some(Check::Unique),
+            check: checks(Check::LeftRight),
+            unique: checks(Check::Unique),
             speckle: finish.speckle.map(|least| least as usize),
             fill: finish.fill.unwrap_or(true),
             median: finish.median,
@@ -102,7 +103,7 @@ fn check_finish(args: &MatchArgs) -> Result<(), Failure> {
         ));
     }
     let finish = &args.finish;
-    let checks = finish.check.is_some() || args.plan.quality == Quality::Best;
+    let checks = finish.check.map_or(args.plan.quality != Quality::Fast, |check| check != Check::Off);
     if finish.fill.is_some() && !checks && finish.speckle.is_none() {
         return Err(Failure::usage("--fill needs --check or --speckle, which leave something to fill"));
     }

@@ -16,14 +16,25 @@ fn a_quality_is_a_set_of_options() {
         let report = folder.json(&format!("match {left}.png right.png --labels 12 -o map.pfm --json {options}"));
         (report["settings"]["profile"].clone(), report["settings"]["finish"].clone())
     };
-    let finish = |check: bool, median: Option<usize>, subpixel: bool| json!({ "check": check, "fill": check, "median": median, "speckles": null, "subpixel": subpixel });
+    let finish = |check: &str, median: Option<usize>, subpixel: bool| {
+        let fill = check != "off";
+        let mut finish = json!({ "check": check == "left-right", "fill": fill, "median": median, "speckles": null, "subpixel": subpixel });
+        if check == "unique" {
+            finish["unique"] = json!(true);
+        }
+        finish
+    };
     for (options, finish) in [
-        ("", finish(false, None, true)),
-        ("--quality balanced", finish(false, None, true)),
+        ("", finish("unique", None, true)),
+        ("--quality balanced", finish("unique", None, true)),
+        ("--check off", finish("off", None, true)),
+        ("--check left-right", finish("left-right", None, true)),
         ("--quality fast", Value::Null),
-        ("--quality fast --median 5", finish(false, Some(5), false)),
-        ("--quality best", finish(true, Some(3), true)),
-        ("--quality best --median 7 --whole-pixels", finish(true, Some(7), false)),
+        ("--quality fast --median 5", finish("off", Some(5), false)),
+        ("--quality fast --check unique", finish("unique", None, false)),
+        ("--quality best", finish("left-right", Some(3), true)),
+        ("--quality best --check unique", finish("unique", Some(3), true)),
+        ("--quality best --median 7 --whole-pixels", finish("left-right", Some(7), false)),
     ] {
         assert_eq!(settings("grey", options), (json!("census16"), finish), "{options}");
     }
@@ -31,4 +42,8 @@ fn a_quality_is_a_set_of_options() {
     assert_eq!(settings("colour", "--quality best").0, "census32");
     assert_eq!(settings("colour", "--quality best --profile census").0, "census");
     folder.fails("match left.png right.png -o map.pfm --quality good", 2, &["fast, balanced, best"]);
+    for off in ["--check off", "--quality fast"] {
+        let words = format!("match left.png right.png -o map.pfm --fill off {off}");
+        folder.fails(&words, 2, &["--fill needs --check or --speckle"]);
+    }
 }

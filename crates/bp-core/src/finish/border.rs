@@ -26,7 +26,7 @@ const STEEPEST: f64 = 0.5;
 const CONTINUED: f64 = 0.75;
 
 /// Fills unknown pixels at the left border. In each row, the surface that begins right of them is extended to the left with its
-/// slope, in whole pixels. A row without any known pixel stays unknown.
+/// slope, in `whole` pixels or fractions. A row without any known pixel stays unknown.
 ///
 /// The first known pixel of a row is its anchor. In the 16 rows above and below, and in its own, a run of up to 24 pixels begins
 /// in the anchor's column if the disparity there differs from the anchor's by at most 1 px; it ends before an unknown pixel or
@@ -36,7 +36,7 @@ const CONTINUED: f64 = 0.75;
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
-pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
+pub fn fill_border(map: DisparityMap, whole: bool) -> Result<DisparityMap, Error> {
     let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
     let (Size { width, height }, level) = (map.size(), Level::new());
     let mut anchors = memory::filled("anchors", height, None)?;
@@ -51,7 +51,8 @@ pub fn fill_border(map: DisparityMap) -> Result<DisparityMap, Error> {
             let hidden = f64::from(known[0]).max(0.0);
             for (away, value) in (1_u32..).zip(hole.iter_mut().rev()) {
                 let continued = f64::from(known[0]) - slope * f64::from(away).min(hidden);
-                *value = (continued.round() as f32).clamp(least, largest);
+                let continued = if whole { continued.round() } else { continued };
+                *value = (continued as f32).clamp(least, largest);
             }
         }
     }))
@@ -135,8 +136,21 @@ mod tests {
     const NONE: f32 = DisparityMap::UNKNOWN;
 
     fn filled(width: usize, values: Vec<f32>) -> Vec<f32> {
+        filled_in(width, values, true)
+    }
+
+    fn filled_in(width: usize, values: Vec<f32>, whole: bool) -> Vec<f32> {
         let size = Size { width, height: values.len() / width };
-        fill_border(DisparityMap::new(size, values).unwrap()).unwrap().values().to_vec()
+        fill_border(DisparityMap::new(size, values).unwrap(), whole).unwrap().values().to_vec()
+    }
+
+    #[test]
+    fn fractions_go_on_in_fractions() {
+        let known = (0..34).map(|x| if x < 4 { NONE } else { 20.0 + 0.4 * x as f32 });
+        let row = filled_in(34, known.chain([2.0; 34]).collect(), false);
+        for (x, expected) in [20.4, 20.7, 21.0, 21.3, 21.6].into_iter().enumerate() {
+            assert!((row[x] - expected).abs() < 1e-4, "{x}: {}", row[x]);
+        }
     }
 
     #[test]

@@ -8,16 +8,24 @@ use rayon::prelude::*;
 use super::{check::AGREE, rows::rows_together};
 use crate::{DisparityMap, Error, IsStopped, memory::Buffer, stop::go_on};
 
-/// Windows are 3x3 pixels that lie this far apart, in one pass after the other. Two passes make means over 9x9 pixels of two
-/// ninths of the differences, with the same errors. Such windows are the edge-avoiding wavelets of Dammertz et al. 2010.
-const SPACINGS: [usize; 4] = [1, 3, 1, 3];
+/// How far the pixels of a window lie apart, in one pass after the other. Windows have 3x3 of them. Such windows are the
+/// edge-avoiding wavelets of Dammertz et al. 2010.
+pub(super) struct Spacings {
+    first: &'static [usize],
+    last: usize,
+}
+
+/// Before offsets are found: together means over 11x11 pixels.
+pub(super) const BEFORE: Spacings = Spacings { first: &[4], last: 1 };
+/// After that: over 15x15. With fewer passes than these five, more disparities are whole on slopes.
+pub(super) const AFTER: Spacings = Spacings { first: &[4, 2], last: 1 };
 const SIDE: usize = 3;
 
-/// How far all passes together reach.
-const REACH: usize = 8;
+/// How far all passes together reach at most.
+const REACH: usize = 7;
 
 /// Unknown columns on both sides of a map.
-const MARGIN: usize = 3;
+const MARGIN: usize = 4;
 
 /// The most lanes of a vector. Rows have room for whole vectors.
 const MOST_LANES: usize = 32;
@@ -26,14 +34,16 @@ const MOST_LANES: usize = 32;
 const MOST: f32 = 1000.0;
 const PARTS: f32 = 32.0;
 
-/// Writes means of means of the disparities around each pixel, over 9x9 pixels. Only those count that differ from the one
-/// in the middle by no more than [`AGREE`]. Both maps are `[height][width]`; known disparities lie within `limits`.
+/// Writes means of the disparities around each pixel, then means of these, and so on: a pass for each of `spacings`. Only those
+/// count that differ from the one in the middle by no more than [`AGREE`]. Both maps are `[height][width]`; known
+/// disparities lie within `limits`.
 ///
 /// Disparities up to [`MOST`] are rounded to 1/32 px before each pass and added up as integers, which takes less time.
 pub(super) fn write_means(
     width: usize,
     map: &[f32],
     limits: &RangeInclusive<f32>,
+    spacings: &Spacings,
     means: &mut [f32],
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
@@ -41,9 +51,9 @@ pub(super) fn write_means(
     let rows = rows_together(map.len() / width, rayon::current_num_threads());
     means.par_chunks_mut(rows * width).enumerate().try_for_each(|(index, means)| {
         if all_small {
-            write_rows::<u16>(width, map, rows * index, means, is_stopped)
+            write_rows::<u16>(width, map, spacings, rows * index, means, is_stopped)
         } else {
-            write_rows::<f32>(width, map, rows * index, means, is_stopped)
+            write_rows::<f32>(width, map, spacings, rows * index, means, is_stopped)
         }
     })
 }
@@ -61,6 +71,7 @@ fn wide(width: usize) -> usize {
 fn write_rows<T: Value>(
     width: usize,
     map: &[f32],
+    spacings: &Spacings,
     first: usize,
     means: &mut [f32],
     is_stopped: IsStopped<'_>,
@@ -69,15 +80,16 @@ where
     f32: Mean<T>,
 {
     let (height, level) = (map.len() / width, Level::new());
-    let last = first + means.len() / width;
-    let around = |reach: usize| first.saturating_sub(reach)..(last + reach).min(height);
+    let end = first + means.len() / width;
+    let around = |reach: usize| first.saturating_sub(reach)..(end + reach).min(height);
     let place = |y: usize| y + REACH - first;
-    let [mut before, mut after] = [Block::<T>::around(last - first, width)?, Block::around(last - first, width)?];
-    for y in around(REACH) {
+    let [mut before, mut after] = [Block::<T>::around(end - first, width)?, Block::around(end - first, width)?];
+    let &Spacings { first: passes, last } = spacings;
+    let mut reach = last + passes.iter().sum::<usize>();
+    for y in around(reach) {
         dispatch!(level, simd => enter(simd, &map[y * width..][..width], before.row(place(y))));
     }
-    let ([passes @ .., spacing], mut reach) = (SPACINGS, REACH);
-    for spacing in passes {
+    for &spacing in passes {
         reach -= spacing;
         for y in around(reach) {
             go_on(is_stopped)?;
@@ -88,8 +100,8 @@ where
     }
     for (y, means) in (first..).zip(means.chunks_exact_mut(width)) {
         go_on(is_stopped)?;
-        let windows = before.windows(place(y), spacing);
-        dispatch!(level, simd => T::write_means(simd, windows, spacing, means));
+        let windows = before.windows(place(y), last);
+        dispatch!(level, simd => T::write_means(simd, windows, last, means));
     }
     Ok(())
 }
@@ -310,32 +322,36 @@ mod tests {
     }
 
     /// Pass after pass, pixel after pixel; rounded before each pass, if asked to.
-    fn expected(width: usize, map: &[f32], is_rounded: bool) -> Vec<f32> {
+    fn expected(width: usize, map: &[f32], spacings: &Spacings, is_rounded: bool) -> Vec<f32> {
         let round = |value: f32| if is_rounded { (PARTS * value).round_ties_even() / PARTS } else { value };
         let pass = |map: &[f32], spacing, round: &dyn Fn(f32) -> f32| -> Vec<f32> {
             (0..map.len()).map(|at| map[at] + round(offset(width, map, spacing, at))).collect()
         };
-        let [passes @ .., last] = SPACINGS;
+        let &Spacings { first: passes, last } = spacings;
         let start = map.iter().copied().map(round).collect::<Vec<_>>();
-        pass(&passes.into_iter().fold(start, |map, spacing| pass(&map, spacing, &round)), last, &|offset| offset)
+        pass(&passes.iter().fold(start, |map, &spacing| pass(&map, spacing, &round)), last, &|offset| offset)
     }
 
-    fn means(width: usize, map: &[f32]) -> Vec<f32> {
+    fn means(width: usize, map: &[f32], spacings: &Spacings) -> Vec<f32> {
         let mut means = vec![0.0; map.len()];
         let known = || map.iter().copied().filter(|value| value.is_finite());
         let limits = known().fold(0.0, f32::min)..=known().fold(0.0, f32::max);
-        write_means(width, map, &limits, &mut means, &never).unwrap();
+        write_means(width, map, &limits, spacings, &mut means, &never).unwrap();
         means
     }
 
     fn assert_means(width: usize, map: &[f32], is_rounded: bool) {
-        assert_eq!(means(width, map), expected(width, map, is_rounded), "{width}x{}", map.len() / width);
+        for spacings in [BEFORE, AFTER] {
+            let expected = expected(width, map, &spacings, is_rounded);
+            assert_eq!(means(width, map, &spacings), expected, "{width}x{}", map.len() / width);
+        }
     }
 
     #[test]
     fn passes_reach_as_far_as_their_windows() {
-        assert_eq!(REACH, SPACINGS.iter().sum());
-        assert!(SPACINGS.iter().all(|&spacing| spacing <= MARGIN));
+        let passes = [BEFORE, AFTER].map(|spacings| [spacings.first, &[spacings.last]].concat());
+        assert_eq!(Some(REACH), passes.iter().map(|spacings| spacings.iter().sum()).max());
+        assert!(passes.iter().flatten().all(|&spacing| spacing <= MARGIN));
     }
 
     #[test]
@@ -361,7 +377,7 @@ mod tests {
     fn means_in_parts_are_hardly_less_exact() {
         let value = |i: usize| (i % 97) as f32 * 0.0193 + (i * i * 29 % 101) as f32 / 400.0;
         let map: Vec<f32> = (0..97 * 40).map(value).collect();
-        let [means, exact] = [means(97, &map), expected(97, &map, false)];
+        let [means, exact] = [means(97, &map, &AFTER), expected(97, &map, &AFTER, false)];
         let squares: f32 = means.iter().zip(&exact).map(|(mean, exact)| (mean - exact).powi(2)).sum();
         assert!((squares / means.len() as f32).sqrt() < 0.006);
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use self::windows::Windows;
 use super::{
+    claims::Claims,
     means,
     rows::rows_together,
     variances::{Turn, turns},
@@ -33,12 +34,15 @@ const MIDDLE: usize = TRIED / 2;
 /// through the variances at the best one, the one before and the one after gives the fraction. A pixel keeps its disparity if
 /// one of the five matches lies outside the right image.
 ///
+/// If asked to, drops pixels whose match fits another pixel better, by these variances; see [`super::check_unique`].
+///
 /// # Errors
 /// [`Error::OutOfMemory`], [`Error::Stopped`].
 pub(super) fn write_offsets(
     pair: &StereoPair,
     map: &[f32],
     limits: &RangeInclusive<f32>,
+    unique: bool,
     refined: &mut [f32],
     is_stopped: IsStopped<'_>,
 ) -> Result<(), Error> {
@@ -46,7 +50,7 @@ pub(super) fn write_offsets(
     let rows = rows_together(map.len() / width, rayon::current_num_threads());
     refined.par_chunks_mut(rows * width).enumerate().try_for_each(|(index, refined)| {
         let first = rows * index;
-        let part = Part { pair, map, rows: first..first + refined.len() / width, limits };
+        let part = Part { pair, map, rows: first..first + refined.len() / width, limits, unique };
         part.refine(refined, is_stopped)
     })
 }
@@ -57,7 +61,7 @@ pub(super) fn write_offsets(
 pub fn window_bytes(size: Size, threads: usize) -> u64 {
     let rows = rows_together(size.height, threads);
     let parts = size.height.div_ceil(rows).min(threads) as u64;
-    parts * Windows::bytes(size.width).max(means::bytes(size.width, rows))
+    parts * (Windows::bytes(size.width) + Claims::bytes(size.width)).max(means::bytes(size.width, rows))
 }
 
 /// Some rows of a map.
@@ -66,12 +70,14 @@ struct Part<'a> {
     map: &'a [f32],
     rows: Range<usize>,
     limits: &'a RangeInclusive<f32>,
+    unique: bool,
 }
 
 impl Part<'_> {
     fn refine(&self, refined: &mut [f32], is_stopped: IsStopped<'_>) -> Result<(), Error> {
         let (Size { width, height }, level) = (self.pair.size(), Level::new());
         let mut windows = Windows::new(width)?;
+        let mut claims = self.unique.then(|| Claims::new(width)).transpose()?;
         let row_of = |y: usize| &self.map[y * width..][..width];
         for turn in turns(self.rows.clone(), height) {
             go_on(is_stopped)?;
@@ -79,7 +85,12 @@ impl Part<'_> {
                 Turn::Enter(y) => dispatch!(level, simd => windows.enter(simd, self.pair, y, row_of(y))),
                 Turn::Middle(y) => {
                     let refined = &mut refined[(y - self.rows.start) * width..][..width];
-                    dispatch!(level, simd => windows.refine(simd, y, row_of(y), self.limits, refined));
+                    dispatch!(level, simd => {
+                        let variances = windows.refine(simd, y, row_of(y), self.limits, refined);
+                        if let Some(claims) = &mut claims {
+                            claims.drop_hidden(simd, variances, refined);
+                        }
+                    });
                 }
                 Turn::Leave(y) => dispatch!(level, simd => windows.leave(simd, y)),
             }

@@ -1,45 +1,56 @@
 //! Removal of small surfaces, which are usually wrong.
 
-use std::ops::Range;
+use std::{mem, ops::Range};
 
 use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch, f32x8};
+use rayon::prelude::*;
 
 use super::check::AGREE;
-use crate::{DisparityMap, Error};
+use crate::{DisparityMap, Error, Size, memory};
 
-/// Pixels that are compared at once.
+/// Pixels that are compared in one step, and in one vector.
+const TOGETHER: usize = 32;
 const LANES: usize = 8;
 
 /// Adjacent pixels of a row that belong to the same surface, as many as there are.
+#[derive(Clone, Copy, Default)]
 struct Run {
-    /// The first pixel. The next run begins after the last one.
-    start: usize,
-    /// An earlier run of the same surface, or this one.
-    before: usize,
+    /// The column of the first pixel. The row's next run begins after the last one.
+    start: u32,
+    /// An earlier run of the same surface, or this one. [`count`] replaces it: the surface's first run holds [`COUNTED`] and the number of
+    /// pixels, and the others its index.
+    before: u32,
 }
 
-/// Makes surfaces of fewer than `least` pixels unknown. A surface consists of adjacent pixels, each of which differs from
-/// the next by no more than [`AGREE`].
+/// Larger than the index of a run. Surfaces of so many pixels are counted no further.
+const COUNTED: u32 = 1 << 31;
+
+/// Makes surfaces of fewer than `least` pixels unknown; those of 2^31 or more always stay. A surface consists of adjacent pixels, each of
+/// which differs from the next by no more than [`AGREE`].
 ///
 /// # Errors
 /// [`Error::OutOfMemory`].
 pub fn remove_speckles(map: DisparityMap, least: usize) -> Result<DisparityMap, Error> {
-    let (width, pixels) = (map.size().width, map.size().pixels());
-    let mut runs = joined_runs(map.values(), width)?;
-    // Runs of a surface come after its first one, so each is one step away from it, if those before are. From now on, the
-    // first one holds the number of pixels, added to that of the image.
-    for index in 0..runs.len() {
-        let before = runs[index].before;
-        let first = if before == index || runs[before].before >= pixels { before } else { runs[before].before };
-        runs[index].before = if first == index { pixels } else { first };
-        runs[first].before += end(&runs, index, pixels) - runs[index].start;
-    }
-    let count = |run: &Run| (if run.before >= pixels { run.before } else { runs[run.before].before }) - pixels;
+    let (width, least) = (map.size().width, least.min(COUNTED as usize - 1));
+    let (rows, mut runs) = joined_runs(map.values(), width)?;
+    count(&rows, &mut runs, width);
     Ok(map.replaced(|values| {
-        for (index, run) in runs.iter().enumerate().filter(|(_, run)| count(run) < least) {
-            values[run.start..end(&runs, index, pixels)].fill(DisparityMap::UNKNOWN);
-        }
+        values.par_chunks_exact_mut(width).zip(&rows).for_each(|(values, row)| {
+            for index in row.clone() {
+                let Run { before, .. } = runs[index];
+                let pixels = if before >= COUNTED { before } else { runs[before as usize].before } - COUNTED;
+                if (pixels as usize) < least {
+                    values[columns(&runs, row, index, width)].fill(DisparityMap::UNKNOWN);
+                }
+            }
+        });
     }))
+}
+
+/// The temporary bytes of [`remove_speckles`] for a map of this size: at most one run a pixel.
+#[must_use]
+pub fn speckle_bytes(size: Size) -> u64 {
+    (size.pixels() * size_of::<Run>() + size.height * size_of::<Range<usize>>()) as u64
 }
 
 /// Whether adjacent pixels belong to the same surface. Unknown ones form surfaces too, which stay unknown.
@@ -47,40 +58,143 @@ fn agree(a: f32, b: f32) -> bool {
     (a - b).abs() <= AGREE || a == b
 }
 
-/// The runs of all rows, joined with those above that they touch.
-fn joined_runs(values: &[f32], width: usize) -> Result<Vec<Run>, Error> {
-    let mut runs = Vec::new();
-    // Hardly ever are there so many, but memory that is not used is not held.
-    let needed = (values.len() as u64).saturating_mul(size_of::<Run>() as u64);
-    let refused = |_| Error::OutOfMemory { what: "surfaces", needed, available: None };
-    runs.try_reserve_exact(values.len()).map_err(refused)?;
-    let (mut above, level) = (0..0, Level::new());
-    for (start, row) in (0..).step_by(width).zip(values.chunks_exact(width)) {
-        let own = runs.len();
-        dispatch!(level, simd => push_runs(simd, start, row, &mut runs));
-        let own = own..runs.len();
-        join(values, width, &mut runs, above, own.clone());
-        above = own;
-    }
-    Ok(runs)
+/// The columns of a run, which is one of those of a row.
+fn columns(runs: &[Run], row: &Range<usize>, index: usize, width: usize) -> Range<usize> {
+    let end = if index + 1 < row.end { runs[index + 1].start as usize } else { width };
+    runs[index].start as usize..end
 }
 
-/// Adds the runs of a row, whose first pixel is `start`.
+/// Counts the pixels of joined runs.
+fn count(rows: &[Range<usize>], runs: &mut [Run], width: usize) {
+    for (index, row) in rows.iter().flat_map(|row| row.clone().map(move |index| (index, row))) {
+        // Runs of a surface come after its first one, so each is one step away from it, if those before are.
+        let before = runs[index].before;
+        let above = runs[before as usize].before;
+        let first = if before as usize == index || above >= COUNTED { before } else { above };
+        runs[index].before = if first as usize == index { COUNTED } else { first };
+        let pixels = columns(runs, row, index, width).len() as u32;
+        let counted = &mut runs[first as usize].before;
+        *counted = counted.saturating_add(pixels);
+    }
+}
+
+/// The runs of all rows, joined with those above that they touch, and which runs belong to each row.
+fn joined_runs(values: &[f32], width: usize) -> Result<(Vec<Range<usize>>, Vec<Run>), Error> {
+    let (height, level) = (values.len() / width, Level::new());
+    let mut rows = memory::filled("rows of a map", height, 0..0)?;
+    let by_row = rows.par_iter_mut().zip(values.par_chunks_exact(width));
+    by_row.for_each(|(row, values)| row.end = dispatch!(level, simd => count_runs(simd, values)));
+    let mut end = 0;
+    for row in &mut rows {
+        *row = end..end + row.end;
+        end = row.end;
+    }
+    if end > COUNTED as usize {
+        let needed = (end as u64).saturating_mul(size_of::<Run>() as u64);
+        return Err(Error::OutOfMemory { what: "surfaces", needed, available: Some(u64::from(COUNTED)) });
+    }
+    let mut runs = memory::filled("surfaces", end, Run::default())?;
+    let together = height.div_ceil(rayon::current_num_threads());
+    rayon::scope(|scope| {
+        let mut rest = &mut runs[..];
+        for (values, rows) in values.chunks(together * width).zip(rows.chunks(together)) {
+            let first = rows[0].start;
+            let (runs, others) = mem::take(&mut rest).split_at_mut(rows[rows.len() - 1].end - first);
+            rest = others;
+            scope.spawn(move |_| Part { values, width, rows, runs, first }.write());
+        }
+    });
+    let mut all = Part { values, width, rows: &rows, runs: &mut runs, first: 0 };
+    (together..height).step_by(together).for_each(|y| all.join(y));
+    Ok((rows, runs))
+}
+
+/// Some rows of a map.
+struct Part<'a> {
+    values: &'a [f32],
+    width: usize,
+    /// The runs of each row, counted from those of the map's first row.
+    rows: &'a [Range<usize>],
+    /// The runs of these rows, counted from `first`.
+    runs: &'a mut [Run],
+    first: usize,
+}
+
+impl Part<'_> {
+    /// Finds the runs and joins them.
+    fn write(mut self) {
+        let level = Level::new();
+        for (y, values) in self.values.chunks_exact(self.width).enumerate() {
+            let row = self.row(y);
+            dispatch!(level, simd => write_runs(simd, values, row.start as u32, &mut self.runs[row.clone()]));
+            if y > 0 {
+                self.join(y);
+            }
+        }
+        for run in self.runs {
+            run.before += self.first as u32;
+        }
+    }
+
+    /// The runs of a row.
+    fn row(&self, y: usize) -> Range<usize> {
+        self.rows[y].start - self.first..self.rows[y].end - self.first
+    }
+
+    /// Joins the runs of row y with those of the row above.
+    fn join(&mut self, y: usize) {
+        let (above, own) = (self.row(y - 1), self.row(y));
+        let [upper, lower] = [y - 1, y].map(|y| &self.values[y * self.width..][..self.width]);
+        let mut next = above.clone();
+        for index in own.clone() {
+            let run = columns(self.runs, &own, index, self.width);
+            while !next.is_empty() {
+                let other = columns(self.runs, &above, next.start, self.width);
+                let mut shared = run.start.max(other.start)..run.end.min(other.end);
+                if shared.any(|x| agree(upper[x], lower[x])) {
+                    let [a, b] = [index, next.start].map(|run| first(self.runs, run as u32));
+                    self.runs[a.max(b) as usize].before = a.min(b);
+                }
+                if other.end > run.end {
+                    break;
+                }
+                next.start += 1;
+            }
+        }
+    }
+}
+
+/// The number of runs of a row.
 #[inline(always)]
-fn push_runs<S: Simd>(simd: S, start: usize, row: &[f32], runs: &mut Vec<Run>) {
+fn count_runs<S: Simd>(simd: S, row: &[f32]) -> usize {
     simd.vectorize(
         #[inline(always)]
         || {
-            let most = f32x8::splat(simd, AGREE);
-            let mut push = |start| runs.push(Run { start, before: runs.len() });
-            push(start);
-            let pieces = row.chunks(LANES).zip(row[1..].chunks(LANES));
-            for (first, (before, own)) in (start + 1..).step_by(LANES).zip(pieces) {
-                let [before, own] = [&before[..own.len()], own].map(|values| lanes(simd, values));
-                let agree = (before - own).abs().simd_le(most) | before.simd_eq(own);
-                let mut steps = (!agree).to_bitmask();
+            let mut count = 1;
+            for (before, own) in row.chunks(TOGETHER).zip(row[1..].chunks(TOGETHER)) {
+                count += steps(simd, before, own).count_ones() as usize;
+            }
+            count
+        },
+    )
+}
+
+/// Writes the runs of a row, whose indices begin with `index`.
+#[inline(always)]
+fn write_runs<S: Simd>(simd: S, row: &[f32], index: u32, runs: &mut [Run]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            runs[0] = Run { start: 0, before: index };
+            let mut places = (index + 1..).zip(&mut runs[1..]);
+            for (first, (before, own)) in
+                (1..).step_by(TOGETHER).zip(row.chunks(TOGETHER).zip(row[1..].chunks(TOGETHER)))
+            {
+                let mut steps = steps(simd, before, own);
                 while steps != 0 {
-                    push(first + steps.trailing_zeros() as usize);
+                    if let Some((before, run)) = places.next() {
+                        *run = Run { start: first + steps.trailing_zeros(), before };
+                    }
                     steps &= steps - 1;
                 }
             }
@@ -88,45 +202,40 @@ fn push_runs<S: Simd>(simd: S, start: usize, row: &[f32], runs: &mut Vec<Run>) {
     );
 }
 
-/// At most [`LANES`] values, and zeros where there are fewer.
+/// Which of up to [`TOGETHER`] pixels of a row are the first of a run, as bits. `before` are those before them, and maybe one more.
 #[inline(always)]
-fn lanes<S: Simd>(simd: S, values: &[f32]) -> f32x8<S> {
-    match values.first_chunk() {
-        Some(values) => f32x8::load_array(simd, *values),
-        None => f32x8::from_fn(simd, |lane| values.get(lane).copied().unwrap_or(0.0)),
+fn steps<S: Simd>(simd: S, before: &[f32], own: &[f32]) -> u32 {
+    let whole = |values: &[f32]| {
+        let mut whole = [0.0; TOGETHER];
+        whole[..own.len()].copy_from_slice(&values[..own.len()]);
+        whole
+    };
+    match (before.first_chunk(), own.first_chunk()) {
+        (Some(before), Some(own)) => steps_of_all(simd, before, own),
+        _ => steps_of_all(simd, &whole(before), &whole(own)),
     }
 }
 
-/// Joins the runs of a row, which are the last ones, with those of the row above.
-fn join(values: &[f32], width: usize, runs: &mut [Run], mut above: Range<usize>, own: Range<usize>) {
-    let row_end = runs[own.start].start + width;
-    for index in own {
-        let (start, end) = (runs[index].start, end(runs, index, row_end));
-        while !above.is_empty() {
-            let (other_start, other_end) = (runs[above.start].start + width, runs[above.start + 1].start + width);
-            if (start.max(other_start)..end.min(other_end)).any(|pixel| agree(values[pixel - width], values[pixel])) {
-                let [a, b] = [index, above.start].map(|run| first(runs, run));
-                runs[a.max(b)].before = a.min(b);
-            }
-            if other_end > end {
-                break;
-            }
-            above.start += 1;
-        }
+#[inline(always)]
+fn steps_of_all<S: Simd>(simd: S, before: &[f32; TOGETHER], own: &[f32; TOGETHER]) -> u32 {
+    let most = f32x8::splat(simd, AGREE);
+    let mut steps = 0;
+    for first in (0..TOGETHER).step_by(LANES) {
+        let before = f32x8::from_slice(simd, &before[first..first + LANES]);
+        let own = f32x8::from_slice(simd, &own[first..first + LANES]);
+        let agree = (before - own).abs().simd_le(most) | before.simd_eq(own);
+        steps |= ((!agree).to_bitmask() as u32) << first;
     }
-}
-
-/// Where a run ends, if the last one ends at `last`.
-fn end(runs: &[Run], index: usize, last: usize) -> usize {
-    runs.get(index + 1).map_or(last, |next| next.start)
+    steps
 }
 
 /// The first run of the surface that a run belongs to, as far as it is joined.
-fn first(runs: &mut [Run], mut run: usize) -> usize {
-    while runs[run].before != run {
+fn first(runs: &mut [Run], mut run: u32) -> u32 {
+    while runs[run as usize].before != run {
         // Every second step becomes one of two, so that paths stay short.
-        runs[run].before = runs[runs[run].before].before;
-        run = runs[run].before;
+        let before = runs[run as usize].before;
+        runs[run as usize].before = runs[before as usize].before;
+        run = runs[run as usize].before;
     }
     run
 }
@@ -134,7 +243,6 @@ fn first(runs: &mut [Run], mut run: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Size;
 
     const NONE: f32 = DisparityMap::UNKNOWN;
 
@@ -186,8 +294,9 @@ mod tests {
             let value = |_| if random(5) == 0 { NONE } else { 2.5 * random(3) as f32 };
             let values = (0..width * height).map(value).collect();
             let map = DisparityMap::new(Size { width, height }, values).unwrap();
-            for least in [2, 5, 12] {
-                let left = remove_speckles(map.clone(), least).unwrap();
+            for (least, threads) in [(2, 1), (5, 2), (5, 3), (12, 8)] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let left = pool.install(|| remove_speckles(map.clone(), least)).unwrap();
                 for (pixel, (&left, &value)) in left.values().iter().zip(map.values()).enumerate() {
                     let expected = if flooded(&map, pixel).len() < least { NONE } else { value };
                     assert_eq!(left, expected, "{width}x{height}, {least}, pixel {pixel}");

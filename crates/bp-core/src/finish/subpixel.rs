@@ -1,25 +1,40 @@
 //! Sub-pixel refinement.
 
-use super::{means::write_means, offsets::write_offsets};
+use super::{
+    means::{AFTER, BEFORE, write_means},
+    offsets::write_offsets,
+    unique::remove_specks,
+};
 use crate::{DisparityMap, Error, IsStopped, StereoPair, memory::Buffer, metrics::check_size};
 
 /// Refines disparities to fractions of a pixel by the images.
 ///
-/// The labels of a slanted surface form steps. Means over 9x9 pixels follow the slope, roughly; means of these means follow it
-/// better. From there, the offset is found at which the images fit best, and means of means are taken again. The range of
-/// disparities stays. docs/algorithms.md compares this with other ways.
+/// The labels of a slanted surface form steps. Means over 11x11 pixels follow the slope, roughly. From there, the offset is found
+/// at which the images fit best, and means are taken again, over 15x15 pixels. The range of disparities stays.
+/// docs/algorithms.md compares this with other ways.
+///
+/// With `unique`, pixels are dropped that [`super::check_unique`] drops, but after the offsets and by the same variances: at the best
+/// one of the disparities that are tried.
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
-pub fn subpixel(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<'_>) -> Result<DisparityMap, Error> {
+pub fn subpixel(
+    pair: &StereoPair,
+    map: DisparityMap,
+    unique: bool,
+    is_stopped: IsStopped<'_>,
+) -> Result<DisparityMap, Error> {
     check_size("the disparity map", map.size(), pair.size())?;
     let Some((least, largest)) = map.range_by_threads() else { return Ok(map) };
     let (size, limits, mut values) = (map.size(), least..=largest, map.into_values());
     let mut means = Buffer::filled_unless(is_stopped, "a map of means", size.pixels(), 0.0)?;
-    write_means(size.width, &values, &limits, &mut means, is_stopped)?;
-    write_offsets(pair, &means, &limits, &mut values, is_stopped)?;
-    write_means(size.width, &values, &limits, &mut means, is_stopped)?;
-    Ok(DisparityMap::of(size, means))
+    write_means(size.width, &values, &limits, &BEFORE, &mut means, is_stopped)?;
+    write_offsets(pair, &means, &limits, unique, &mut values, is_stopped)?;
+    write_means(size.width, &values, &limits, &AFTER, &mut means, is_stopped)?;
+    // Makes room for the surfaces.
+    drop(values);
+    let map = DisparityMap::of(size, means);
+    if unique { remove_specks(map) } else { Ok(map) }
 }
 
 #[cfg(test)]
@@ -57,7 +72,7 @@ mod tests {
     fn errors(slope: f32, brighter: f32) -> Vec<f32> {
         let plane = |x: usize, y: usize| 12.0 + slope * x as f32 + 0.031 * y as f32;
         let labels = (0..SIZE.pixels()).map(|i| plane(i % SIZE.width, i / SIZE.width).round()).collect();
-        let map = subpixel(&views(plane, brighter), DisparityMap::new(SIZE, labels).unwrap(), &never).unwrap();
+        let map = subpixel(&views(plane, brighter), DisparityMap::new(SIZE, labels).unwrap(), false, &never).unwrap();
         let inside = (8..SIZE.height - 8).flat_map(|y| (40..SIZE.width - 8).map(move |x| (x, y)));
         inside.map(|(x, y)| map.at(x, y).unwrap() - plane(x, y)).collect()
     }
@@ -89,7 +104,7 @@ mod tests {
     fn all_fractions_occur_nearly_as_often() {
         let plane = |x: usize, y: usize| 10.0 + 0.05 * x as f32 + 0.0071 * y as f32;
         let labels = (0..SIZE.pixels()).map(|i| plane(i % SIZE.width, i / SIZE.width).round()).collect();
-        let map = subpixel(&views(plane, 0.0), DisparityMap::new(SIZE, labels).unwrap(), &never).unwrap();
+        let map = subpixel(&views(plane, 0.0), DisparityMap::new(SIZE, labels).unwrap(), false, &never).unwrap();
         let mut tenths = [0_usize; 10];
         // Five whole pixels of disparity, so every true fraction is as frequent.
         for (x, y) in (8..SIZE.height - 8).flat_map(|y| (48..148).map(move |x| (x, y))) {
@@ -105,7 +120,7 @@ mod tests {
         let slope = |x: usize| 10.0 + 0.25 * x as f32;
         let steps: Vec<f32> = (0..size.pixels()).map(|i| slope(i % size.width).round()).collect();
         let mut means = vec![0.0; size.pixels()];
-        write_means(size.width, &steps, &(10.0..=26.0), &mut means, &never).unwrap();
+        write_means(size.width, &steps, &(10.0..=26.0), &BEFORE, &mut means, &never).unwrap();
         let worst = (8..56).map(|x| (means[4 * size.width + x] - slope(x)).abs()).fold(0.0, f32::max);
         assert!(worst <= 0.25, "{worst}");
     }
@@ -118,7 +133,7 @@ mod tests {
         let mut values = vec![5.0; size.pixels()];
         values[0] = 0.0;
         let map = DisparityMap::new(size, values).unwrap();
-        let refined = subpixel(&StereoPair::new(blank(), blank()).unwrap(), map.clone(), &never).unwrap();
+        let refined = subpixel(&StereoPair::new(blank(), blank()).unwrap(), map.clone(), false, &never).unwrap();
         assert_eq!(refined, map);
     }
 
@@ -128,7 +143,10 @@ mod tests {
         let map = DisparityMap::new(Size { width: 5, height: 1 }, values).unwrap();
         let blank = || Image::from_grey(5, 1, [9; 5]).unwrap();
         let pair = StereoPair::new(blank(), blank()).unwrap();
-        assert_eq!(subpixel(&pair, map.clone(), &never).unwrap(), map);
-        assert!(subpixel(&pair, DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap(), &never).is_err());
+        assert_eq!(subpixel(&pair, map.clone(), false, &never).unwrap(), map);
+        assert!(
+            subpixel(&pair, DisparityMap::new(Size { width: 1, height: 1 }, vec![0.0]).unwrap(), false, &never)
+                .is_err()
+        );
     }
 }

@@ -2,25 +2,19 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Simd, SimdBase, SimdCvtTruncate, SimdFloat, dispatch, f32x8, i32x8};
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use super::{
-    check::AGREE,
+    claims::{Claims, write_matches},
     rows::rows_together,
     speckles::remove_speckles,
-    variances::{LANES, SIDE, Turn, Variances, turns},
+    variances::{LANES, Turn, Variances, turns},
 };
 use crate::{DisparityMap, Error, IsStopped, Size, StereoPair, memory::Buffer, metrics::check_size, stop::go_on};
 
 /// Surfaces that cover less than `1 / SPECK` of the image are removed.
 const SPECK: usize = 3400;
-
-/// A nearer pixel hides a farther one with the same match, unless its variance is more than this many times as large.
-const LIKELIER: f32 = 2.0;
-
-/// A column that no pixel matches.
-const NONE: i32 = -1;
 
 /// Makes pixels unknown whose match in the right image fits another pixel better: a point of the right image is one
 /// point of the left one (Marr and Poggio 1976). Of several pixels that match the same column `floor(x - d + 1/2)`, one is the best. It is
@@ -43,7 +37,16 @@ pub fn check_unique(pair: &StereoPair, map: DisparityMap, is_stopped: IsStopped<
     let size = map.size();
     // Makes room for the surfaces.
     drop(map);
-    remove_speckles(DisparityMap::of(size, kept), size.pixels() / SPECK)
+    remove_specks(DisparityMap::of(size, kept))
+}
+
+/// Makes the surfaces unknown that are too small to be left by [`check_unique`].
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub(super) fn remove_specks(map: DisparityMap) -> Result<DisparityMap, Error> {
+    let least = map.size().pixels() / SPECK;
+    remove_speckles(map, least)
 }
 
 /// Some rows of a map.
@@ -57,52 +60,36 @@ impl Part<'_> {
     /// Copies the pixels that stay known.
     fn keep(&self, kept: &mut [f32], is_stopped: IsStopped<'_>) -> Result<(), Error> {
         let (Size { width, height }, level) = (self.pair.size(), Level::new());
-        let mut claims = Claims::new(width)?;
+        let (mut windows, mut claims) = (Windows::new(width)?, Claims::new(width)?);
         let row_of = |y: usize| &self.map[y * width..][..width];
         for turn in turns(self.rows.clone(), height) {
             go_on(is_stopped)?;
             match turn {
-                Turn::Enter(y) => dispatch!(level, simd => claims.enter(simd, self.pair, y, row_of(y))),
+                Turn::Enter(y) => dispatch!(level, simd => windows.enter(simd, self.pair, y, row_of(y))),
                 Turn::Middle(y) => {
                     let kept = &mut kept[(y - self.rows.start) * width..][..width];
-                    dispatch!(level, simd => claims.keep(simd, y, row_of(y), kept));
+                    kept.copy_from_slice(row_of(y));
+                    dispatch!(level, simd => claims.drop_hidden(simd, windows.variances(simd), kept));
                 }
-                Turn::Leave(y) => dispatch!(level, simd => claims.leave(simd, y)),
+                Turn::Leave(y) => dispatch!(level, simd => windows.leave(simd, y)),
             }
         }
         Ok(())
     }
 }
 
-/// The best of the pixels that match a column of the right image: its variance and its disparity.
-type Claim = (f32, f32);
-
-/// The columns that the pixels of a row match.
-struct Claims {
+/// The rows of windows in which pixels are compared with their matches.
+struct Windows {
     width: usize,
-    /// The matching columns or [`NONE`], `[row mod 7][column]`.
+    /// See [`write_matches`].
     matches: Buffer<i32>,
     variances: Variances,
-    /// By column of the right image.
-    best: Buffer<Claim>,
 }
 
-impl Claims {
+impl Windows {
     fn new(width: usize) -> Result<Self, Error> {
-        let columns = width.next_multiple_of(LANES);
-        Ok(Self {
-            width,
-            matches: Buffer::filled("matching columns", SIDE * columns, NONE)?,
-            variances: Variances::new(width, 1)?,
-            best: Buffer::filled("matched columns", width, (0.0, 0.0))?,
-        })
-    }
-
-    /// The matches of row y.
-    #[inline(always)]
-    fn matches(&self, y: usize) -> Range<usize> {
-        let columns = self.width.next_multiple_of(LANES);
-        (y % SIDE) * columns..(y % SIDE + 1) * columns
+        let matches = Buffer::filled("matching columns", width.next_multiple_of(LANES), 0)?;
+        Ok(Self { width, matches, variances: Variances::new(width, 1)? })
     }
 
     /// Adds row y, which has these disparities.
@@ -111,13 +98,11 @@ impl Claims {
         simd.vectorize(
             #[inline(always)]
             || {
-                let range = self.matches(y);
-                let matches = &mut self.matches[range];
-                write_matches(simd, disparities, matches);
+                write_matches(simd, disparities, &mut self.matches);
                 let [left, right] =
                     [pair.left(), pair.right()].map(|image| &image.greys()[y * self.width..][..self.width]);
                 for row in self.variances.differences_mut(y) {
-                    for ((difference, &left), &column) in row.iter_mut().zip(left).zip(&*matches) {
+                    for ((difference, &left), &column) in row.iter_mut().zip(left).zip(&*self.matches) {
                         let right = right.get(column as usize).map_or(left, |&right| right);
                         *difference = i16::from(left) - i16::from(right);
                     }
@@ -136,50 +121,24 @@ impl Claims {
         );
     }
 
-    /// Copies the disparities of row y, which is in the middle, where they agree with the best ones.
+    /// The variances around the row in the middle.
     #[inline(always)]
-    fn keep<S: Simd>(&mut self, simd: S, y: usize, disparities: &[f32], kept: &mut [f32]) {
+    fn variances<S: Simd>(&mut self, simd: S) -> &[f32] {
         simd.vectorize(
             #[inline(always)]
-            || {
-                let range = self.matches(y);
-                let Self { matches, variances, best, .. } = self;
-                let matches = &matches[range];
-                best.fill((f32::INFINITY, DisparityMap::UNKNOWN));
-                // A nearer pixel comes later: its disparity is larger, so it lies farther right.
-                for ((&variance, &disparity), &column) in variances.compute().iter().zip(disparities).zip(matches) {
-                    if let Some(best) = best.get_mut(column as usize).filter(|(own, _)| variance <= LIKELIER * own) {
-                        *best = (variance, disparity);
-                    }
-                }
-                for ((kept, &disparity), &column) in kept.iter_mut().zip(disparities).zip(matches) {
-                    let best = best.get(column as usize).map_or(DisparityMap::UNKNOWN, |&(_, disparity)| disparity);
-                    *kept = if (best - disparity).abs() <= AGREE { disparity } else { DisparityMap::UNKNOWN };
-                }
-            },
-        );
-    }
-}
-
-/// Writes the columns that the pixels of a row match in the right image, or [`NONE`]. Both have columns up to a multiple of [`LANES`].
-#[inline(always)]
-fn write_matches<S: Simd>(simd: S, disparities: &[f32], matches: &mut [i32]) {
-    let (width, (matches, _)) = (disparities.len(), matches.as_chunks_mut::<LANES>());
-    for (x, (matches, disparities)) in matches.iter_mut().zip(disparities.chunks(LANES)).enumerate() {
-        let mut all = [DisparityMap::UNKNOWN; LANES];
-        all[..disparities.len()].copy_from_slice(disparities);
-        let columns = f32x8::from_fn(simd, |lane| (LANES * x + lane) as f32);
-        let column = (columns - f32x8::load_array(simd, all) + 0.5).floor();
-        // Unknown disparities are infinite. Negative columns stay negative, and those beyond the right border lie beyond all.
-        let inside = column.max(f32x8::splat(simd, NONE as f32)).min(f32x8::splat(simd, width as f32));
-        *matches = i32x8::truncate_from(inside).into();
+            || self.variances.compute(),
+        )
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, finish::variances::REACH, never};
+    use crate::{
+        Image,
+        finish::{AGREE, claims::LIKELIER, subpixel, variances::REACH},
+        never,
+    };
 
     /// A near square before a far wall, with noise of its own in each image, and what only the left image shows.
     fn scene(size: Size) -> (StereoPair, impl Fn(usize, usize) -> f32) {
@@ -246,7 +205,7 @@ mod tests {
             };
             let map = DisparityMap::new(size, (0..size.pixels()).map(value).collect()).unwrap();
             let expected = DisparityMap::of(size, expected(&pair, map.values()).into());
-            let expected = remove_speckles(expected, size.pixels() / SPECK).unwrap();
+            let expected = remove_specks(expected).unwrap();
             assert_eq!(check_unique(&pair, map, &never).unwrap(), expected, "{size}");
         }
     }
@@ -263,16 +222,19 @@ mod tests {
                 if hidden(x, y) { wrong } else { truth(x, y) }
             };
             let map = DisparityMap::new(size, (0..size.pixels()).map(value).collect()).unwrap();
-            let kept = check_unique(&pair, map.clone(), &never).unwrap();
-            let at = |x: usize, y: usize| (hidden(x, y), kept.at(x, y).is_some());
-            let all = size.nodes().filter(|node| node.x >= 3).map(|node| at(node.x, node.y));
-            let (mut left, mut lost) = (0, 0);
-            for (is_hidden, is_kept) in all {
-                left += usize::from(is_hidden && is_kept);
-                lost += usize::from(!is_hidden && !is_kept);
+            let in_fractions = subpixel(&pair, map.clone(), true, &never).unwrap();
+            for (kept, what) in [(check_unique(&pair, map, &never).unwrap(), "whole"), (in_fractions, "fractions")] {
+                let at = |x: usize, y: usize| (hidden(x, y), kept.at(x, y).is_some());
+                let all = size.nodes().filter(|node| node.x >= 3).map(|node| at(node.x, node.y));
+                let (mut left, mut lost) = (0, 0);
+                for (is_hidden, is_kept) in all {
+                    left += usize::from(is_hidden && is_kept);
+                    lost += usize::from(!is_hidden && !is_kept);
+                }
+                // Windows of variances reach over borders of surfaces: one pixel of each of the square's 26 rows may be lost there.
+                let lost_at = format!("{left} of 234 hidden ones are kept, {lost} others lost, at {wrong}, {what}");
+                assert!(left <= 26 && lost <= 26, "{lost_at}");
             }
-            // Windows of variances reach over borders of surfaces: one pixel of each of the square's 26 rows may be lost there.
-            assert!(left <= 26 && lost <= 26, "{left} of 234 hidden ones are kept, {lost} others lost, at {wrong}");
         }
     }
 

@@ -66,7 +66,7 @@ def options(environment: dict[str, str]) -> dict[str, Any]:
     >>> options({"MEDIAN": "1", "REMOVESMALLCC": "25", "OMP_NUM_THREADS": "4"})
     {'check': True, 'fill': False, 'median': 3, 'speckle': 25, 'threads': 4}
     >>> options({"TESTLRRL": "0"})
-    {}
+    {'unique': False}
     """
     def number(name: str, default: int = 0) -> int:
         value = environment.get(name, "").strip() or str(default)
@@ -77,6 +77,8 @@ def options(environment: dict[str, str]) -> dict[str, Any]:
     meant: dict[str, Any] = {}
     if number("TESTLRRL", default=1):
         meant |= {"check": True, "fill": False}
+    else:
+        meant["unique"] = False
     if number("MEDIAN"):
         meant["median"] = 2 * min(number("MEDIAN"), 3) + 1
     if number("REMOVESMALLCC") > 0:

@@ -15,7 +15,7 @@ SIXTEENTHS = 16
 
 #: Parameters of StereoSGBM that have no counterpart here, with OpenCV's defaults.
 WITHOUT_COUNTERPART = {
-    "blockSize": 3, "P1": 0, "P2": 0, "preFilterCap": 0, "uniquenessRatio": 0, "speckleRange": 0, "mode": 0,
+    "blockSize": 3, "P1": 0, "P2": 0, "preFilterCap": 0, "speckleRange": 0, "mode": 0,
 }
 
 
@@ -58,9 +58,10 @@ class StereoBP:
     ) -> "StereoBP":
         """A matcher with OpenCV's parameters. Further keywords are options of `Matcher`.
 
-        minDisparity and numDisparities give the labels. A disp12MaxDiff above 0 turns the left-right check on, and
-        speckleWindowSize the speckle filter; what they remove stays unknown, as in OpenCV. The other parameters have no
-        counterpart: a warning says so if one is given another value than OpenCV's default.
+        minDisparity and numDisparities give the labels. A disp12MaxDiff above 0 turns the left-right check on,
+        uniquenessRatio the uniqueness check, and speckleWindowSize the speckle filter; what they remove stays unknown, as in
+        OpenCV. The other parameters have no counterpart: a warning says so if one is given another value than OpenCV's
+        default.
         """
         values = dict(
             minDisparity=minDisparity, numDisparities=numDisparities, blockSize=blockSize, P1=P1, P2=P2,
@@ -121,7 +122,7 @@ class StereoBP:
         last = first + labels - 1
         if not -2047 <= first or not last <= 2047:
             raise ValueError(f"disparities from {first} to {last} do not fit into int16 sixteenths: -2047 to 2047 do")
-        meant: dict[str, Any] = {"fill": False}
+        meant: dict[str, Any] = {"fill": False, "unique": self._values["uniquenessRatio"] > 0}
         if self._values["disp12MaxDiff"] > 0:
             meant["check"] = True
         if self._values["speckleWindowSize"] > 0:

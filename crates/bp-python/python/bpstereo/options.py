@@ -22,7 +22,7 @@ class Options(TypedDict, total=False):
     labels: Literal["auto", "quarter_of_width"] | int | dict[str, int]
     min_disparity: int | None
     check: bool | None
-    unique: bool
+    unique: bool | None
     speckle: int | None
     fill: bool
     median: int | None

@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use super::{MIDDLE, STEPS, TRIED};
 
-/// Writes disparities at the least variances, `[tried][column]`, where the tried disparities have a first step.
+/// Writes disparities at the least variances, `[tried][column]`, where the tried disparities have a first step, and these
+/// variances; elsewhere disparities stay, and variances are infinite.
 #[inline(always)]
 pub(super) fn write_best(
     variances: &[f32],
@@ -12,6 +13,7 @@ pub(super) fn write_best(
     disparities: &[f32],
     limits: &RangeInclusive<f32>,
     refined: &mut [f32],
+    least: &mut [f32],
 ) {
     let width = disparities.len();
     // Slices of one known length let the compiler drop the bounds checks in the loop.
@@ -19,19 +21,19 @@ pub(super) fn write_best(
     for (row, of_step) in rows.iter_mut().zip(variances.chunks_exact(width)) {
         *row = of_step;
     }
-    let (first, refined) = (&first[..width], &mut refined[..width]);
+    let (first, refined, least) = (&first[..width], &mut refined[..width], &mut least[..width]);
     for x in 0..width {
-        let steps = best_step([rows[0][x], rows[1][x], rows[2][x], rows[3][x], rows[4][x]]);
+        let (steps, variance) = best_step([rows[0][x], rows[1][x], rows[2][x], rows[3][x], rows[4][x]]);
         let nearest = (STEPS * x) as i32 - MIDDLE as i32 - first[x];
         let found = (nearest as f32 + steps) / STEPS as f32;
         let found = found.max(*limits.start()).min(*limits.end());
-        refined[x] = if first[x] >= 0 { found } else { disparities[x] };
+        (refined[x], least[x]) = if first[x] >= 0 { (found, variance) } else { (disparities[x], f32::INFINITY) };
     }
 }
 
-/// The place of the least variance, in steps from the middle one.
+/// The place of the least variance, in steps from the middle one, and the least one of those that were tried.
 #[inline(always)]
-fn best_step(variances: [f32; TRIED]) -> f32 {
+fn best_step(variances: [f32; TRIED]) -> (f32, f32) {
     let [a, b, c, d, e] = variances;
     // Where all offsets fit equally, as in a blank area, the disparity stays.
     let mut best = [b, c, d, 0.0];
@@ -44,5 +46,5 @@ fn best_step(variances: [f32; TRIED]) -> f32 {
     let [before, least, after, place] = best;
     let curvature = before - 2.0 * least + after;
     let fraction = ((before - after) / (2.0 * curvature)).clamp(-1.0, 1.0);
-    place + if curvature > 0.0 { fraction } else { 0.0 }
+    (place + if curvature > 0.0 { fraction } else { 0.0 }, least)
 }

@@ -33,6 +33,8 @@ pub(super) struct Windows {
     first: Buffer<i32>,
     /// Of grey differences in [`UNIT`]s.
     variances: Variances,
+    /// The least ones of each pixel of the row that was refined last.
+    least: Buffer<f32>,
 }
 
 impl Windows {
@@ -46,6 +48,7 @@ impl Windows {
             right: Buffer::filled(what, STEPS * columns, 0)?,
             first: Buffer::filled(what, SIDE * columns, 0)?,
             variances: Variances::new(width, TRIED)?,
+            least: Buffer::filled(what, width, 0.0)?,
         })
     }
 
@@ -53,7 +56,8 @@ impl Windows {
     pub(super) fn bytes(width: usize) -> u64 {
         let columns = width.next_multiple_of(LANES);
         let of = |len: usize, bytes: usize| len as u64 * bytes as u64;
-        let rows = of(BORDER[0] + width + BORDER[1], 1) + of((1 + STEPS) * columns, 2) + of(SIDE * columns, 4);
+        let rows =
+            of(BORDER[0] + width + BORDER[1], 1) + of((1 + STEPS) * columns, 2) + of(SIDE * columns, 4) + of(width, 4);
         rows + Variances::bytes(width, TRIED)
     }
 
@@ -107,7 +111,7 @@ impl Windows {
         }
     }
 
-    /// Writes the refined disparities of row y, which is in the middle.
+    /// Writes the refined disparities of row y, which is in the middle. Returns the variances there.
     #[inline(always)]
     pub(super) fn refine<S: Simd>(
         &mut self,
@@ -116,13 +120,14 @@ impl Windows {
         disparities: &[f32],
         limits: &RangeInclusive<f32>,
         refined: &mut [f32],
-    ) {
+    ) -> &[f32] {
         simd.vectorize(
             #[inline(always)]
             || {
                 let first = &self.first[(y % SIDE) * self.columns..][..self.width];
-                write_best(self.variances.compute(), first, disparities, limits, refined);
+                write_best(self.variances.compute(), first, disparities, limits, refined, &mut self.least);
+                &*self.least
             },
-        );
+        )
     }
 }
