@@ -80,20 +80,9 @@ fn count(rows: &[Range<usize>], runs: &mut [Run], width: usize) {
 
 /// The runs of all rows, joined with those above that they touch, and which runs belong to each row.
 fn joined_runs(values: &[f32], width: usize) -> Result<(Vec<Range<usize>>, Vec<Run>), Error> {
-    let (height, level) = (values.len() / width, Level::new());
-    let mut rows = memory::filled("rows of a map", height, 0..0)?;
-    let by_row = rows.par_iter_mut().zip(values.par_chunks_exact(width));
-    by_row.for_each(|(row, values)| row.end = dispatch!(level, simd => count_runs(simd, values)));
-    let mut end = 0;
-    for row in &mut rows {
-        *row = end..end + row.end;
-        end = row.end;
-    }
-    if end > COUNTED as usize {
-        let needed = (end as u64).saturating_mul(size_of::<Run>() as u64);
-        return Err(Error::OutOfMemory { what: "surfaces", needed, available: Some(u64::from(COUNTED)) });
-    }
-    let mut runs = memory::filled("surfaces", end, Run::default())?;
+    let rows = rows_of_runs(values, width)?;
+    let (height, all) = (rows.len(), rows.last().map_or(0, |row| row.end));
+    let mut runs = memory::filled("surfaces", all, Run::default())?;
     let together = height.div_ceil(rayon::current_num_threads());
     rayon::scope(|scope| {
         let mut rest = &mut runs[..];
@@ -107,6 +96,24 @@ fn joined_runs(values: &[f32], width: usize) -> Result<(Vec<Range<usize>>, Vec<R
     let mut all = Part { values, width, rows: &rows, runs: &mut runs, first: 0 };
     (together..height).step_by(together).for_each(|y| all.join(y));
     Ok((rows, runs))
+}
+
+/// Which runs belong to each row. They are counted before they are written, because one might be needed for each pixel.
+fn rows_of_runs(values: &[f32], width: usize) -> Result<Vec<Range<usize>>, Error> {
+    let level = Level::new();
+    let mut rows = memory::filled("rows of a map", values.len() / width, 0..0)?;
+    let by_row = rows.par_iter_mut().zip(values.par_chunks_exact(width));
+    by_row.for_each(|(row, values)| row.end = dispatch!(level, simd => count_runs(simd, values)));
+    let mut end = 0;
+    for row in &mut rows {
+        *row = end..end + row.end;
+        end = row.end;
+    }
+    if end <= COUNTED as usize {
+        return Ok(rows);
+    }
+    let [needed, available] = [end, COUNTED as usize].map(|runs| runs as u64 * size_of::<Run>() as u64);
+    Err(Error::OutOfMemory { what: "surfaces", needed, available: Some(available) })
 }
 
 /// Some rows of a map.
