@@ -2,7 +2,8 @@
 
 Each block is matched with a halo around it, and joined with its neighbours along a border where their maps agree, as the
 library does with its tiles. A block extends further left by the largest disparity. The answer is close to that of the whole
-image but not the same; the project's page on big images says how close.
+image but not the same; the project's page on big images says how close. Which surfaces are too small for the uniqueness
+check depends on the size of a block, so the left border may be filled from others.
 """
 
 from __future__ import annotations
