@@ -17,10 +17,11 @@ use crate::{DisparityMap, Error, IsStopped, Size, StereoPair, memory::Buffer, me
 const SPECK: usize = 3400;
 
 /// Makes pixels unknown whose match in the right image fits another pixel better: a point of the right image is one
-/// point of the left one (Marr and Poggio 1976). Of several pixels that match the same column `floor(x - d + 1/2)`, one is the best. It is
-/// the nearest, because that hides the others, unless the variance of grey differences in its 7x7 window is more than twice that
-/// of a farther one. Pixels stay known whose disparity differs by no more than [`AGREE`](super::AGREE) from that of the best one. Pixels whose
-/// match lies outside the image become unknown too, and then surfaces of less than one part in 3400 of the image.
+/// point of the left one (Marr and Poggio 1976). Of several pixels that match the same column `floor(x - d + 1/2)`, one is the
+/// best. It is the nearest, because that hides the others, unless the variance of grey differences in its 7x7 window is more
+/// than twice that of a farther one. Pixels stay known whose disparity differs by no more than [`AGREE`](super::AGREE) from
+/// that of the best one. Pixels whose match lies outside the image become unknown too, and then surfaces of less than one part
+/// in 3400 of the image.
 ///
 /// # Errors
 /// [`Error::WrongSize`] if the map has another size than the pair, [`Error::OutOfMemory`], [`Error::Stopped`].
