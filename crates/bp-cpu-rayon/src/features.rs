@@ -6,10 +6,13 @@ use bp_core::{
     image::APRON,
     memory::{self, Buffer},
 };
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
 use rayon::prelude::*;
 
-use crate::shape::{MIN_ROWS, WIDEST, deal, every_second};
+use crate::shape::{MIN_ROWS, Piece, WIDEST, deal};
+
+/// Bytes behind the last neighbours' values: whole pieces of them are read.
+const BEHIND: usize = size_of::<Piece>();
 
 /// The features of both images of a pair, `[height][channel][parity][lane]`. The parity is that of the column.
 pub(crate) struct Features {
@@ -83,7 +86,8 @@ impl Features {
 
 /// Writes the features of an image.
 fn load_image(level: Level, profile: Profile, image: &Image, padded: &mut [u8], out: Rows<'_>) {
-    let rows = padded.par_chunks_mut(image.size().width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
+    let end = padded.len().saturating_sub(BEHIND);
+    let rows = padded[..end].par_chunks_mut(image.size().width + 2 * APRON).with_min_len(MIN_ROWS).enumerate();
     rows.for_each(|(index, row)| dispatch!(level, simd => pad_row(simd, profile, image, index, row)));
     let Rows { values, lanes, offset } = out;
     let rows = values.par_chunks_mut(2 * lanes * profile.channels()).with_min_len(MIN_ROWS).enumerate();
@@ -105,7 +109,8 @@ pub(crate) fn bytes(plan: &Plan) -> u64 {
 }
 
 fn padded_bytes(size: Size, profile: Profile) -> usize {
-    padded_planes(profile) * (size.height + 2 * APRON) * (size.width + 2 * APRON)
+    let planes = padded_planes(profile);
+    planes * (size.height + 2 * APRON) * (size.width + 2 * APRON) + if planes > 0 { BEHIND } else { 0 }
 }
 
 /// The number of planes in which a profile compares neighbours: one of grey values, or one per colour channel and one of grey values.
@@ -163,38 +168,51 @@ impl View<'_> {
     fn fill<S: Simd>(&self, simd: S, y: usize, rows: &mut [u8]) {
         let (lanes, offset) = (self.lanes, self.offset);
         let width = self.image.size().width;
-        let greys = &self.image.greys()[y * width..][..width];
-        let colours = self.image.colours().map(|colours| &colours[y * width..][..width]);
         for (channel, out) in rows.chunks_exact_mut(2 * lanes).enumerate() {
             let (even, odd) = out.split_at_mut(lanes);
             let (even, odd) = (&mut even[offset..][..width.div_ceil(2)], &mut odd[offset..][..width / 2]);
             simd.vectorize(
                 #[inline(always)]
-                || match self.profile {
-                    Profile::Thesis | Profile::Mrf => match colours.filter(|_| self.profile == Profile::Mrf) {
-                        Some(colours) => {
-                            every_second(even, colours, |pixel| pixel[channel]);
-                            every_second(odd, &colours[1..], |pixel| pixel[channel]);
-                        }
-                        None => {
-                            every_second(even, greys, |&grey| grey);
-                            every_second(odd, &greys[1..], |&grey| grey);
-                        }
-                    },
-                    Profile::Census => deal(even, odd, |x, out| self.census(&INNER, 0, Node { x, y }, out)),
-                    Profile::Gradient => deal(even, odd, |x, out| self.gradient(channel, Node { x, y }, out)),
-                    Profile::BirchfieldTomasi => {
-                        deal(even, odd, |x, out| self.half_samples(channel, Node { x, y }, out))
-                    }
-                    Profile::Census16 => {
-                        deal(even, odd, |x, out| self.census([&INNER, &OUTER][channel], 0, Node { x, y }, out))
-                    }
-                    Profile::Census32 => deal(even, odd, |x, out| {
-                        self.census([&INNER, &INNER, &INNER, &OUTER][channel], channel, Node { x, y }, out)
-                    }),
+                || {
+                    deal(
+                        simd,
+                        even,
+                        odd,
+                        #[inline(always)]
+                        |x, columns, out| self.piece(simd, channel, Node { x, y }, columns, out),
+                    );
                 },
             );
         }
+    }
+
+    /// Computes the features of so many pixels from `at` on.
+    #[inline(always)]
+    fn piece<S: Simd>(&self, simd: S, channel: usize, at: Node, columns: usize, out: &mut Piece) {
+        let plain = &mut out[..columns];
+        match self.profile {
+            Profile::Thesis => plain.copy_from_slice(&self.greys(at)[..columns]),
+            Profile::Mrf => match self.image.colours() {
+                Some(colours) => {
+                    let colours = &colours[at.y * self.image.size().width + at.x..][..columns];
+                    plain.iter_mut().zip(colours).for_each(|(out, pixel)| *out = pixel[channel]);
+                }
+                None => plain.copy_from_slice(&self.greys(at)[..columns]),
+            },
+            Profile::Gradient => self.gradient(channel, at, plain),
+            Profile::BirchfieldTomasi => self.half_samples(channel, at, plain),
+            Profile::Census => self.census(simd, &INNER, 0, at, out),
+            Profile::Census16 => self.census(simd, [&INNER, &OUTER][channel], 0, at, out),
+            Profile::Census32 => {
+                self.census(simd, [&INNER, &INNER, &INNER, &OUTER][channel], channel, at, out);
+            }
+        }
+    }
+
+    /// The grey values of a row from a pixel on.
+    fn greys(&self, at: Node) -> &[u8] {
+        let width = self.image.size().width;
+        &self.image.greys()[at.y * width..][at.x..width]
     }
 
     /// The values of a plane `dx` columns and `dy` rows away from consecutive pixels, starting at `at`.
@@ -205,16 +223,20 @@ impl View<'_> {
         &self.padded[(row * padded_planes(self.profile) + plane) * width + column..][..columns]
     }
 
-    /// Computes a byte of the census codes of pixels from `at` on, from the values of a plane; see [`bp_core::census`].
+    /// Computes a byte of the census codes of pixels from `at` on, from the values of a plane; see [`bp_core::census`]. Behind the
+    /// end of a row, it is computed from what happens to follow.
     #[inline(always)]
-    fn census(&self, neighbours: &Neighbours, plane: usize, at: Node, codes: &mut [u8]) {
+    fn census<S: Simd>(&self, simd: S, neighbours: &Neighbours, plane: usize, at: Node, codes: &mut Piece) {
         let middle = self.near(plane, at, (0, 0), codes.len());
-        for &offset in neighbours {
-            let neighbours = self.near(plane, at, offset, codes.len());
-            for ((code, neighbour), middle) in codes.iter_mut().zip(neighbours).zip(middle) {
-                // Eight shifts push out any earlier bits.
-                *code = *code << 1 | u8::from(neighbour > middle);
+        let near = neighbours.map(|offset| self.near(plane, at, offset, codes.len()));
+        let [none, one] = [0, 1].map(|bit| S::u8s::splat(simd, bit));
+        for (x, codes) in (0..).step_by(S::u8s::LEN).zip(codes.chunks_exact_mut(S::u8s::LEN)) {
+            let load = |values: &[u8]| S::u8s::from_slice(simd, &values[x..x + S::u8s::LEN]);
+            let (middle, mut code) = (load(middle), none);
+            for near in near {
+                code = code + code | load(near).simd_gt(middle).select(one, none);
             }
+            code.store_slice(codes);
         }
     }
 

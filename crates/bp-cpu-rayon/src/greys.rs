@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     compare::Vector,
-    shape::{MIN_ROWS, Shape, WIDEST, deal, every_second},
+    shape::{MIN_ROWS, Shape, WIDEST, deal},
 };
 
 /// Grey values `[height][plane][lane]`, with [`WIDEST`] lanes of padding on both sides of every row of lanes. Empty if all
@@ -48,8 +48,8 @@ impl Greys {
             let [even, odd] = planes_mut(&shape, row);
             dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || deal(even, odd, |first, means| {
-                    let inside = first..first + means.len();
+                || deal(simd, even, odd, |first, columns, means| {
+                    let inside = first..first + columns;
                     let children = a[inside.clone()].iter().zip(&b[inside.clone()]).zip(c[inside.clone()].iter().zip(&d[inside]));
                     means.iter_mut().zip(children).for_each(|(mean, ((&a, &b), (&c, &d)))| *mean = mean_of([a, b, c, d]));
                 }),
@@ -119,10 +119,7 @@ fn mean_of(children: [u8; 4]) -> u8 {
 fn load_row<S: Simd>(simd: S, greys: &[u8], even: &mut [u8], odd: &mut [u8]) {
     simd.vectorize(
         #[inline(always)]
-        || {
-            every_second(even, greys, |&grey| grey);
-            every_second(odd, &greys[1..], |&grey| grey);
-        },
+        || deal(simd, even, odd, |first, columns, piece| piece[..columns].copy_from_slice(&greys[first..][..columns])),
     );
 }
 

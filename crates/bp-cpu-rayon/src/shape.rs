@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bp_core::{Plan, Size};
+use fearless_simd::{Simd, SimdBase, u8x64};
 
 use crate::block::{Block, LANES};
 
@@ -91,20 +92,19 @@ impl PlaneRow {
     }
 }
 
-/// Writes a value for every second pixel, starting with the first. These are the pixels of one plane.
-#[inline(always)]
-pub(crate) fn every_second<T>(plane: &mut [u8], pixels: &[T], value: impl Fn(&T) -> u8) {
-    plane.iter_mut().zip(pixels.iter().step_by(2)).for_each(|(out, pixel)| *out = value(pixel));
-}
+/// Consecutive columns of a row. Where a row ends sooner, the rest is arbitrary.
+pub(crate) type Piece = [u8; 2 * WIDEST];
 
-/// Writes a row piece by piece. `values(x, out)` computes the values of consecutive columns from x on, which alternate
-/// between the even and the odd plane.
+/// Writes a row piece by piece. `values(x, columns, piece)` computes the values of so many consecutive columns from x on, which
+/// alternate between the even and the odd plane.
 #[inline(always)]
-pub(crate) fn deal(even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, &mut [u8])) {
+pub(crate) fn deal<S: Simd>(simd: S, even: &mut [u8], odd: &mut [u8], values: impl Fn(usize, usize, &mut Piece)) {
     let mut piece = [0; 2 * WIDEST];
     for (index, (even, odd)) in even.chunks_mut(WIDEST).zip(odd.chunks_mut(WIDEST).chain([&mut [][..]])).enumerate() {
-        values(2 * WIDEST * index, &mut piece[..even.len() + odd.len()]);
-        even.iter_mut().zip(piece.iter().step_by(2)).for_each(|(out, &value)| *out = value);
-        odd.iter_mut().zip(piece[1..].iter().step_by(2)).for_each(|(out, &value)| *out = value);
+        values(2 * WIDEST * index, even.len() + odd.len(), &mut piece);
+        let [first, second] = [0, WIDEST].map(|from| u8x64::from_slice(simd, &piece[from..from + WIDEST]));
+        let (evens, odds) = first.deinterleave(second);
+        even.copy_from_slice(&evens.as_slice()[..even.len()]);
+        odd.copy_from_slice(&odds.as_slice()[..odd.len()]);
     }
 }

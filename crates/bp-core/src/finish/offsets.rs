@@ -75,8 +75,9 @@ struct Part<'a> {
 
 impl Part<'_> {
     fn refine(&self, refined: &mut [f32], is_stopped: IsStopped<'_>) -> Result<(), Error> {
-        let (Size { width, height }, level) = (self.pair.size(), Level::new());
-        let mut windows = Windows::new(width)?;
+        let (size, level) = (self.pair.size(), Level::new());
+        let Size { width, height } = size;
+        let mut windows = Windows::new(size)?;
         let mut claims = self.unique.then(|| Claims::new(width)).transpose()?;
         let row_of = |y: usize| &self.map[y * width..][..width];
         for turn in turns(self.rows.clone(), height) {

@@ -61,7 +61,7 @@ impl Part<'_> {
     /// Copies the pixels that stay known.
     fn keep(&self, kept: &mut [f32], is_stopped: IsStopped<'_>) -> Result<(), Error> {
         let (Size { width, height }, level) = (self.pair.size(), Level::new());
-        let (mut windows, mut claims) = (Windows::new(width)?, Claims::new(width)?);
+        let (mut windows, mut claims) = (Windows::new(self.pair.size())?, Claims::new(width)?);
         let row_of = |y: usize| &self.map[y * width..][..width];
         for turn in turns(self.rows.clone(), height) {
             go_on(is_stopped)?;
@@ -70,7 +70,7 @@ impl Part<'_> {
                 Turn::Middle(y) => {
                     let kept = &mut kept[(y - self.rows.start) * width..][..width];
                     kept.copy_from_slice(row_of(y));
-                    dispatch!(level, simd => claims.drop_hidden(simd, windows.variances(simd), kept));
+                    dispatch!(level, simd => claims.drop_hidden(simd, windows.variances(simd, y), kept));
                 }
                 Turn::Leave(y) => dispatch!(level, simd => windows.leave(simd, y)),
             }
@@ -88,9 +88,9 @@ struct Windows {
 }
 
 impl Windows {
-    fn new(width: usize) -> Result<Self, Error> {
-        let matches = Buffer::filled("matching columns", width.next_multiple_of(LANES), 0)?;
-        Ok(Self { width, matches, variances: Variances::new(width, 1)? })
+    fn new(size: Size) -> Result<Self, Error> {
+        let matches = Buffer::filled("matching columns", size.width.next_multiple_of(LANES), 0)?;
+        Ok(Self { width: size.width, matches, variances: Variances::new(size, 1)? })
     }
 
     /// Adds row y, which has these disparities.
@@ -102,7 +102,7 @@ impl Windows {
                 write_matches(simd, disparities, &mut self.matches);
                 let [left, right] =
                     [pair.left(), pair.right()].map(|image| &image.greys()[y * self.width..][..self.width]);
-                for row in self.variances.differences_mut(y) {
+                for row in self.variances.entering_mut() {
                     for ((difference, &left), &column) in row.iter_mut().zip(left).zip(&*self.matches) {
                         let right = right.get(column as usize).map_or(left, |&right| right);
                         *difference = i16::from(left) - i16::from(right);
@@ -122,12 +122,12 @@ impl Windows {
         );
     }
 
-    /// The variances around the row in the middle.
+    /// The variances around row y, which is in the middle.
     #[inline(always)]
-    fn variances<S: Simd>(&mut self, simd: S) -> &[f32] {
+    fn variances<S: Simd>(&mut self, simd: S, y: usize) -> &[f32] {
         simd.vectorize(
             #[inline(always)]
-            || self.variances.compute(),
+            || self.variances.compute(y),
         )
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::{Error, memory::Buffer};
+use crate::{Error, Size, memory::Buffer};
 
 /// How far windows reach from their centres.
 pub(super) const REACH: usize = 3;
@@ -14,34 +14,32 @@ pub(super) const LANES: usize = 8;
 /// What happens to a row as windows move down an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
-    /// It comes into the windows.
+    /// It comes into the windows, and the row that is [`SIDE`] rows above leaves them.
     Enter(usize),
-    /// All rows of the windows around it are there.
-    Middle(usize),
-    /// It is in no more windows.
+    /// It leaves them at the lower border, where no row comes.
     Leave(usize),
+    /// The windows around it hold all of their rows.
+    Middle(usize),
 }
 
 /// The turns of rows, so that some of them are in the middle one after another.
 pub(super) fn turns(rows: Range<usize>, height: usize) -> impl Iterator<Item = Turn> {
     let coming = rows.start.saturating_sub(REACH)..rows.end + REACH;
     coming.flat_map(move |coming| {
+        let moved = if coming < height { Some(Turn::Enter(coming)) } else { coming.checked_sub(SIDE).map(Turn::Leave) };
         let middle = coming.checked_sub(REACH).filter(|middle| rows.contains(middle));
-        let enter = (coming < height).then_some(Turn::Enter(coming));
-        let leave = middle.and_then(|middle| middle.checked_sub(REACH)).map(Turn::Leave);
-        [enter, middle.map(Turn::Middle), leave].into_iter().flatten()
+        [moved, middle.map(Turn::Middle)].into_iter().flatten()
     })
 }
 
 /// The differences in the rows of windows whose centres lie in one row. Each pixel has one or several: those at the disparities
 /// that are tried.
 pub(super) struct Variances {
-    width: usize,
-    tried: usize,
-    /// How many rows there are.
-    rows: usize,
+    size: Size,
     /// Grey differences, `[row mod 7][tried][column]`. Rows have [`REACH`] more columns on both sides, with zeros.
     differences: Buffer<i16>,
+    /// Those of the row that enters next.
+    entering: Buffer<i16>,
     /// Sums of the differences in each column, and of their squares, `[tried][column]`.
     sums: Buffer<i32>,
     squares: Buffer<i32>,
@@ -50,13 +48,12 @@ pub(super) struct Variances {
 }
 
 impl Variances {
-    pub(super) fn new(width: usize, tried: usize) -> Result<Self, Error> {
-        let (what, all) = ("grey differences", tried * wide(width));
+    pub(super) fn new(size: Size, tried: usize) -> Result<Self, Error> {
+        let (what, all, width) = ("grey differences", tried * wide(size.width), size.width);
         Ok(Self {
-            width,
-            tried,
-            rows: 0,
+            size,
             differences: Buffer::filled(what, SIDE * all, 0)?,
+            entering: Buffer::filled(what, all, 0)?,
             sums: Buffer::filled(what, all, 0)?,
             squares: Buffer::filled(what, all, 0)?,
             variances: Buffer::filled(what, tried * width, 0.0)?,
@@ -67,50 +64,45 @@ impl Variances {
     pub(super) fn bytes(width: usize, tried: usize) -> u64 {
         let of = |len: usize, bytes: usize| len as u64 * bytes as u64;
         let all = tried * wide(width);
-        of(SIDE * all, 2) + of(2 * all, 4) + of(tried * width, 4)
+        of((SIDE + 1) * all, 2) + of(2 * all, 4) + of(tried * width, 4)
     }
 
-    /// The differences of row y at each tried disparity, `[tried][column]`, to be written before it enters. A multiple of [`LANES`]
+    /// The differences of a row at each tried disparity, `[tried][column]`, to be written before it enters. A multiple of [`LANES`]
     /// columns.
     #[inline(always)]
-    pub(super) fn differences_mut(&mut self, y: usize) -> impl Iterator<Item = &mut [i16]> {
-        let all = self.tried * wide(self.width);
-        let rows = self.differences[(y % SIDE) * all..][..all].chunks_exact_mut(wide(self.width));
-        rows.map(|row| {
+    pub(super) fn entering_mut(&mut self) -> impl Iterator<Item = &mut [i16]> {
+        self.entering.chunks_exact_mut(wide(self.size.width)).map(|row| {
             let end = row.len() - REACH;
             &mut row[REACH..end]
         })
     }
 
-    /// Adds row y.
+    /// Adds row y, and removes the one that is [`SIDE`] rows above.
     #[inline(always)]
     pub(super) fn enter(&mut self, y: usize) {
-        self.rows += 1;
-        self.add::<1>(y);
+        let all = self.entering.len();
+        let row = self.differences[(y % SIDE) * all..][..all].iter_mut().zip(&*self.entering);
+        for (((held, &entering), sum), square) in row.zip(&mut self.sums).zip(&mut self.squares) {
+            let change = i32::from(entering - *held);
+            *sum += change;
+            // The difference of two squares.
+            *square += change * i32::from(entering + *held);
+            *held = entering;
+        }
     }
 
     /// Removes row y.
     #[inline(always)]
     pub(super) fn leave(&mut self, y: usize) {
-        self.rows -= 1;
-        self.add::<-1>(y);
+        self.entering.fill(0);
+        self.enter(y);
     }
 
+    /// The variances in the windows around row y, which is in the middle, times their pixels, `[tried][column]`.
     #[inline(always)]
-    fn add<const SIGN: i32>(&mut self, y: usize) {
-        let all = self.tried * wide(self.width);
-        let row = &self.differences[(y % SIDE) * all..][..all];
-        for ((&difference, sum), square) in row.iter().zip(&mut self.sums).zip(&mut self.squares) {
-            let difference = i32::from(difference);
-            *sum += SIGN * difference;
-            *square += SIGN * difference * difference;
-        }
-    }
-
-    /// The variances in the windows around the row in the middle, times their pixels, `[tried][column]`.
-    #[inline(always)]
-    pub(super) fn compute(&mut self) -> &[f32] {
-        let (width, wide, rows) = (self.width, wide(self.width), self.rows as f32);
+    pub(super) fn compute(&mut self, y: usize) -> &[f32] {
+        let Size { width, height } = self.size;
+        let (wide, rows) = (wide(width), (height.min(y + REACH + 1) - y.saturating_sub(REACH)) as f32);
         // A product takes less time than a quotient.
         let shared = 1.0 / (rows * SIDE as f32);
         for (step, variances) in self.variances.chunks_exact_mut(width).enumerate() {
@@ -146,8 +138,11 @@ mod tests {
             let (mut inside, mut next) = (Vec::new(), rows.start);
             for turn in turns(rows.clone(), height) {
                 match turn {
-                    Turn::Enter(y) => inside.push(y),
-                    Turn::Leave(y) => assert_eq!(inside.remove(0), y),
+                    Turn::Enter(y) => {
+                        inside.retain(|&row| row + SIDE != y);
+                        inside.push(y);
+                    }
+                    Turn::Leave(y) => inside.retain(|&row| row != y),
                     Turn::Middle(y) => {
                         assert_eq!(inside, (y.saturating_sub(REACH)..height.min(y + REACH + 1)).collect::<Vec<_>>());
                         assert_eq!(y, next);

@@ -10,7 +10,7 @@ use super::{
     compared::{UNIT, differences, first_steps, interpolate},
 };
 use crate::{
-    Error, StereoPair,
+    Error, Size, StereoPair,
     finish::variances::{LANES, SIDE, Variances},
     memory::Buffer,
 };
@@ -38,8 +38,9 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    pub(super) fn new(width: usize) -> Result<Self, Error> {
-        let (what, columns) = ("grey differences", width.next_multiple_of(LANES));
+    pub(super) fn new(size: Size) -> Result<Self, Error> {
+        let (what, width) = ("grey differences", size.width);
+        let columns = width.next_multiple_of(LANES);
         Ok(Self {
             width,
             columns,
@@ -47,7 +48,7 @@ impl Windows {
             greys: Buffer::filled(what, BORDER[0] + width + BORDER[1], 0)?,
             right: Buffer::filled(what, STEPS * columns, 0)?,
             first: Buffer::filled(what, SIDE * columns, 0)?,
-            variances: Variances::new(width, TRIED)?,
+            variances: Variances::new(size, TRIED)?,
             least: Buffer::filled(what, width, 0.0)?,
         })
     }
@@ -101,7 +102,7 @@ impl Windows {
     #[inline(always)]
     fn compare<S: Simd>(&mut self, simd: S, y: usize) {
         let (first, _) = self.first[(y % SIDE) * self.columns..][..self.columns].as_chunks::<LANES>();
-        let mut rows = self.variances.differences_mut(y);
+        let mut rows = self.variances.entering_mut();
         let mut rows: [&mut [i16]; TRIED] = std::array::from_fn(|_| rows.next().unwrap_or_default());
         for ((x, first), left) in (0..).step_by(LANES).zip(first).zip(self.left.chunks_exact(LANES)) {
             let differences = differences(simd, left, first, &self.right);
@@ -125,7 +126,7 @@ impl Windows {
             #[inline(always)]
             || {
                 let first = &self.first[(y % SIDE) * self.columns..][..self.width];
-                write_best(self.variances.compute(), first, disparities, limits, refined, &mut self.least);
+                write_best(self.variances.compute(y), first, disparities, limits, refined, &mut self.least);
                 &*self.least
             },
         )
