@@ -6,7 +6,7 @@ use bp_core::{
     image::APRON,
     memory::{self, Buffer},
 };
-use fearless_simd::{Level, Select, Simd, SimdBase, SimdInt, dispatch};
+use fearless_simd::{Level, Select, Simd, SimdBase, dispatch};
 use rayon::prelude::*;
 
 use crate::shape::{MIN_ROWS, Piece, WIDEST, deal};

@@ -1,6 +1,6 @@
 //! Filling the left border, which the right camera does not see.
 
-use std::array;
+use std::{array, ops::RangeInclusive};
 
 use fearless_simd::{Level, Select, Simd, SimdBase, SimdMask, dispatch, f32x8};
 use rayon::prelude::*;
@@ -45,17 +45,23 @@ pub fn fill_border(map: DisparityMap, whole: bool) -> Result<DisparityMap, Error
         *anchor = x.filter(|&x| x > 0).map(|x| (x, dispatch!(level, simd => slope(simd, &map, x, y))));
     });
     Ok(map.replaced(|values| {
-        for (row, anchor) in values.chunks_exact_mut(width).zip(anchors) {
-            let Some((x, slope)) = anchor else { continue };
-            let (hole, known) = row.split_at_mut(x);
-            let hidden = f64::from(known[0]).max(0.0);
-            for (away, value) in (1_u32..).zip(hole.iter_mut().rev()) {
-                let continued = f64::from(known[0]) - slope * f64::from(away).min(hidden);
-                let continued = if whole { continued.round() } else { continued };
-                *value = (continued as f32).clamp(least, largest);
+        values.par_chunks_exact_mut(width).zip(anchors).for_each(|(row, anchor)| {
+            if let Some((x, slope)) = anchor {
+                extend(row, x, slope, least..=largest, whole);
             }
-        }
+        });
     }))
+}
+
+/// Extends the surface at column x of a row to the left.
+fn extend(row: &mut [f32], x: usize, slope: f64, limits: RangeInclusive<f32>, whole: bool) {
+    let (hole, known) = row.split_at_mut(x);
+    let hidden = f64::from(known[0]).max(0.0);
+    for (away, value) in (1_u32..).zip(hole.iter_mut().rev()) {
+        let continued = f64::from(known[0]) - slope * f64::from(away).min(hidden);
+        let continued = if whole { continued.round() } else { continued };
+        *value = (continued as f32).clamp(*limits.start(), *limits.end());
+    }
 }
 
 /// The slope to be continued to the left of the anchor at (x, y).
