@@ -189,15 +189,11 @@ impl View<'_> {
     /// Computes the features of so many pixels from `at` on.
     #[inline(always)]
     fn piece<S: Simd>(&self, simd: S, channel: usize, at: Node, columns: usize, out: &mut Piece) {
-        let plain = &mut out[..columns];
+        let (plain, first) = (&mut out[..columns], at.y * self.image.size().width + at.x);
         match self.profile {
-            Profile::Thesis => plain.copy_from_slice(&self.greys(at)[..columns]),
-            Profile::Mrf => match self.image.colours() {
-                Some(colours) => {
-                    let colours = &colours[at.y * self.image.size().width + at.x..][..columns];
-                    plain.iter_mut().zip(colours).for_each(|(out, pixel)| *out = pixel[channel]);
-                }
-                None => plain.copy_from_slice(&self.greys(at)[..columns]),
+            Profile::Thesis | Profile::Mrf => match self.image.colours().filter(|_| self.profile == Profile::Mrf) {
+                Some(colours) => plain.iter_mut().zip(&colours[first..]).for_each(|(out, pixel)| *out = pixel[channel]),
+                None => plain.copy_from_slice(&self.image.greys()[first..][..columns]),
             },
             Profile::Gradient => self.gradient(channel, at, plain),
             Profile::BirchfieldTomasi => self.half_samples(channel, at, plain),
@@ -207,12 +203,6 @@ impl View<'_> {
                 self.census(simd, [&INNER, &INNER, &INNER, &OUTER][channel], channel, at, out);
             }
         }
-    }
-
-    /// The grey values of a row from a pixel on.
-    fn greys(&self, at: Node) -> &[u8] {
-        let width = self.image.size().width;
-        &self.image.greys()[at.y * width..][at.x..width]
     }
 
     /// The values of a plane `dx` columns and `dy` rows away from consecutive pixels, starting at `at`.
