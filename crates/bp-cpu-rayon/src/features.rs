@@ -224,7 +224,7 @@ impl View<'_> {
             let load = |values: &[u8]| S::u8s::from_slice(simd, &values[x..x + S::u8s::LEN]);
             let (middle, mut code) = (load(middle), none);
             for near in near {
-                code = code + code | load(near).simd_gt(middle).select(one, none);
+                code = (code + code) | load(near).simd_gt(middle).select(one, none);
             }
             code.store_slice(codes);
         }
