@@ -20,7 +20,7 @@ mod window;
 
 pub use border::fill_border;
 pub use check::{AGREE, check_left_right};
-pub use confidence::confidence;
+pub use confidence::{FILLED, confidence};
 pub use fill::fill;
 pub use median::{MEDIANS, median};
 pub use offsets::window_bytes;

@@ -28,11 +28,11 @@ STEPS = [
     """),
     ("How sure it is", """
         confidence = matcher.confidence
-        print(f"{(confidence > 0.5).mean():.0%} of the pixels have a confidence above 0.5")
+        print(f"{(confidence > 0.75).mean():.0%} of the pixels have a confidence above 0.75")
         bpstereo.write_picture(folder / "confidence.png", confidence)
     """),
     ("What is sure", """
-        sure = numpy.where(confidence > 0.5, disparity, numpy.float32(numpy.nan))
+        sure = numpy.where(confidence > 0.75, disparity, numpy.float32(numpy.nan))
         bpstereo.write_picture(folder / "sure.png", sure)
     """),
     ("Depth and points", """

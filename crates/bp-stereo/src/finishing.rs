@@ -31,8 +31,8 @@ impl AnswerTimes {
 /// A finished map.
 pub(crate) struct Finished {
     pub(crate) map: DisparityMap,
-    /// See [`finish::confidence`]; 0 where the check or the speckle filter made the disparity unknown. `None` unless
-    /// the options ask for it.
+    /// See [`finish::confidence`]; [`finish::FILLED`] where the disparity was filled, and 0 where it is unknown. `None` unless the
+    /// options ask for it.
     pub(crate) confidence: Option<Vec<f32>>,
     pub(crate) times: AnswerTimes,
 }
@@ -67,10 +67,13 @@ pub(crate) fn finished(
     let mut confidence = trust.map(|right| finish::confidence(&left, right, is_stopped)).transpose()?;
     let finish: Finish = options.finish();
     let judged = finish.judge(pair, left, right.as_ref(), is_stopped)?;
-    for (trust, _) in confidence.iter_mut().flatten().zip(judged.values()).filter(|(_, value)| !value.is_finite()) {
-        *trust = 0.0;
-    }
+    let mut trust_unknown = |map: &DisparityMap, to: f32| {
+        let pixels = confidence.iter_mut().flatten().zip(map.values());
+        pixels.filter(|(_, value)| !value.is_finite()).for_each(|(trust, _)| *trust = to);
+    };
+    trust_unknown(&judged, finish::FILLED);
     let map = finish.complete(judged, is_stopped)?;
+    trust_unknown(&map, 0.0);
     Ok(Finished {
         map,
         confidence,

@@ -317,15 +317,18 @@ fn only_sidecars_of_this_program_are_removed() {
 }
 
 #[test]
-fn what_the_check_made_unknown_is_not_trusted() {
+fn what_is_unknown_is_not_trusted_and_what_was_filled_a_little() {
     for check in ["left-right", "unique"] {
         let folder = Folder::new();
         succeeds(&folder, &format!("{MATCH} holes.pfm --check {check} --fill off --confidence c.pfm"));
-        succeeds(&folder, &format!("{MATCH} filled.pfm --check {check} --median 3 --confidence same.pfm"));
-        let (map, trust) = (floats(&folder.path("holes.pfm")), floats(&folder.path("c.pfm")));
+        succeeds(&folder, &format!("{MATCH} filled.pfm --check {check} --median 3 --confidence filled-c.pfm"));
+        let [map, trust, filled, of_filled] =
+            ["holes.pfm", "c.pfm", "filled.pfm", "filled-c.pfm"].map(|name| floats(&folder.path(name)));
         assert!(map.iter().any(|value| !value.is_finite()) && trust.iter().any(|&trust| trust > 0.9));
-        assert!(map.iter().zip(&trust).all(|(value, &trust)| value.is_finite() || trust == 0.0));
-        assert_eq!(floats(&folder.path("same.pfm")), trust);
-        assert!(floats(&folder.path("filled.pfm")).iter().all(|value| value.is_finite()));
+        assert!(filled.iter().all(|value| value.is_finite()));
+        for ((value, trust), of_filled) in map.iter().zip(trust).zip(of_filled) {
+            let expected = if value.is_finite() { (trust, trust) } else { (0.0, bp_core::finish::FILLED) };
+            assert_eq!((trust, of_filled), expected);
+        }
     }
 }

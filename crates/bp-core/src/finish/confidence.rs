@@ -19,6 +19,10 @@ const PIXELS: f32 = ((2 * REACH + 1) * (2 * REACH + 1)) as f32;
 /// thesis's six pairs at half size. `scripts/evaluate-confidence` checks this on others.
 const PROBABILITIES: [f32; 5] = [0.22, 0.53, 0.7, 0.93, 1.0];
 
+/// The confidence of pixels that a check or the speckle filter made unknown and that were then filled: the share of them that
+/// are right to one pixel, of the thesis's six pairs at half size. `scripts/evaluate-confidence` checks it on others.
+pub const FILLED: f32 = 0.56;
+
 /// The confidence of each pixel of the left map, `[height][width]`: about the probability that its disparity is right to one
 /// pixel; 0 if it is unknown.
 ///
