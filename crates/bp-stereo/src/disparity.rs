@@ -11,7 +11,8 @@ use crate::{AnswerTimes, Tiles, Warning, description};
 pub struct Disparity {
     /// The disparity map of the left image.
     pub map: DisparityMap,
-    /// The confidence of each pixel, 0 to 1, `[height][width]`; `None` unless [`Options::confidence`](crate::Options::confidence) asks for it.
+    /// The confidence of each pixel, 0 to 1, `[height][width]`: [`bp_core::finish::FILLED`] where the disparity was filled, and 0 where it
+    /// is unknown. `None` unless [`Options::confidence`](crate::Options::confidence) asks for it.
     pub confidence: Option<Vec<f32>>,
     /// Wall-clock times.
     pub times: AnswerTimes,
