@@ -1,5 +1,6 @@
 //! Disparity maps.
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use crate::{Error, Model, Size, memory::Buffer};
@@ -129,6 +130,9 @@ impl DisparityMap {
 /// How many values one thread works on at a time.
 const TOGETHER: usize = 1 << 15;
 
+/// How many of them are compared in one step.
+const PIECE: usize = 32;
+
 /// The range of no values.
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
@@ -143,15 +147,26 @@ fn joined(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
 
 /// The smallest and the largest known value.
 fn range_of(values: &[f32]) -> (f32, f32) {
-    // Several ranges at once, because each step of one waits for the step before.
-    let mut ranges = [NOTHING; 16];
-    for values in values.chunks(ranges.len()) {
-        for ((low, high), &value) in ranges.iter_mut().zip(values) {
+    let (pieces, rest) = values.as_chunks();
+    let mut last = [DisparityMap::UNKNOWN; PIECE];
+    last[..rest.len()].copy_from_slice(rest);
+    dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || range_of_pieces(pieces.iter().chain([&last])),
+    ))
+}
+
+#[inline(always)]
+fn range_of_pieces<'a>(pieces: impl Iterator<Item = &'a [f32; PIECE]>) -> (f32, f32) {
+    // A range for every place in a piece, because each step of one waits for the step before.
+    let (mut lows, mut highs) = ([NOTHING.0; PIECE], [NOTHING.1; PIECE]);
+    for piece in pieces {
+        for ((low, high), &value) in lows.iter_mut().zip(&mut highs).zip(piece) {
             let known = if value == DisparityMap::UNKNOWN { f32::NEG_INFINITY } else { value };
             // Unlike `min` and `max`, these need not look for NaN.
             *low = if value < *low { value } else { *low };
             *high = if known > *high { known } else { *high };
         }
     }
-    ranges.into_iter().fold(NOTHING, joined)
+    lows.into_iter().zip(highs).fold(NOTHING, joined)
 }

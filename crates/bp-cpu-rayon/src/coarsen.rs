@@ -11,8 +11,9 @@
 //!
 //! Here one lane of a vector is one coarse node.
 
-use bp_core::{Patch, Plan};
+use bp_core::Plan;
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
+use rayon::prelude::*;
 
 use crate::{
     block::{Block, Bytes, LANES},
@@ -41,17 +42,19 @@ pub(crate) fn coarsen(level: Level, plan: &Plan, grid: usize, layouts: [&Layout;
     }
 }
 
-/// As [`coarsen`], for a `grid` whose finer grid's costs are not stored: computes them again, patch by patch.
+/// As [`coarsen`], for a `grid` whose finer grid's costs are not stored yet: computes them again, patch by patch. If they are to be
+/// stored, but not their sums, `fine` is where.
 pub(crate) fn coarsen_unstored(
     matching: &Matching<'_>,
     windows: &Windows,
     grid: usize,
-    layout: &Layout,
+    layouts: [&Layout; 2],
+    fine: &mut Costs,
     coarse: &mut Costs,
 ) {
     match grid {
-        1 | 2 => matching.narrow_rows(grid, layout, coarse),
-        _ => Unstored { matching, windows, grid, layout }.rows(coarse),
+        1 | 2 => matching.narrow_rows(grid, layouts[1], coarse),
+        _ => Unstored { matching, windows, grid, layouts }.rows(fine, coarse),
     }
 }
 
@@ -60,17 +63,19 @@ struct Unstored<'a> {
     matching: &'a Matching<'a>,
     windows: &'a Windows,
     grid: usize,
-    layout: &'a Layout,
+    layouts: [&'a Layout; 2],
 }
 
 impl Unstored<'_> {
-    fn rows(&self, coarse: &mut Costs) {
-        let (layout, clip) = (self.layout, self.matching.plan.clip(self.grid));
+    fn rows(&self, fine: &mut Costs, coarse: &mut Costs) {
+        let (layout, clip) = (self.layouts[1], self.matching.plan.clip(self.grid));
         let Costs { stored, sums } = coarse;
-        costs::rows(layout, stored, u16::of(sums), |y, stored, mut keep| {
+        let fine = Some(&mut *fine.stored).filter(|stored| !stored.is_empty());
+        let fine = costs::optional_rows(layout, fine, 2 * self.layouts[0].row());
+        costs::rows(layout, stored, u16::of(sums)).zip(fine).for_each(|((y, stored, mut keep), mut fine)| {
             self.windows.with(|window| {
                 for block in 0..layout.blocks {
-                    let halves = self.halves(block, y, &mut window.work.costs);
+                    let halves = self.halves(block, y, &mut window.work.costs, fine.as_deref_mut());
                     let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
                     let stored = layout.blocks_of(stored, block);
                     dispatch!(self.matching.level, simd => store_sums(simd, clip, &halves, stored, keep));
@@ -79,21 +84,32 @@ impl Unstored<'_> {
         });
     }
 
-    /// As [`Grids::halves`], for row y: computes what that finds.
-    fn halves<'a>(&self, block: usize, y: usize, costs: &'a mut [Block]) -> [[&'a [Block]; 4]; 2] {
-        let finer = self.matching.plan.size(self.grid - 1);
-        let labels = all_labels(self.layout);
+    /// As [`Grids::halves`], for row y: computes what that finds, and stores it in two rows of `fine`.
+    fn halves<'a>(
+        &self,
+        block: usize,
+        y: usize,
+        costs: &'a mut [Block],
+        mut fine: Option<&mut [Block]>,
+    ) -> [[&'a [Block]; 4]; 2] {
+        let finer = self.layouts[0];
+        let labels = all_labels(finer);
         let mut halves = [[&[][..]; 4]; 2];
         let patches = halves
             .iter_mut()
             .flat_map(|half| half.as_chunks_mut::<2>().0)
             .zip(costs.chunks_exact_mut(2 * labels.len()));
         for (index, (planes, costs)) in patches.enumerate() {
-            let at = PatchRow { grid: self.grid - 1, patch: 2 * block + index / 2, y: 2 * y + index % 2 };
-            if Patch::COLUMNS * at.patch < finer.width && at.y < finer.height {
+            let (patch, row) = (2 * block + index / 2, index % 2);
+            let at = PatchRow { grid: self.grid - 1, patch, y: 2 * y + row };
+            if patch < finer.blocks && at.y < finer.size.height {
                 let (even, odd) = costs.split_at_mut(labels.len());
-                self.matching.unclipped(at, labels, [&mut *even, &mut *odd]);
+                let least = self.matching.unclipped(at, labels, [&mut *even, &mut *odd]);
                 *planes = [even, odd];
+                if let Some(fine) = fine.as_deref_mut() {
+                    let to = finer.blocks_of(&mut fine[row * finer.row()..][..finer.row()], patch);
+                    self.matching.store_clipped(at, &least, *planes, to);
+                }
             }
         }
         halves
@@ -109,7 +125,7 @@ struct Grids<'a> {
 impl Grids<'_> {
     fn rows<F: Sum + Widen<C>, C: Kept>(&self, fine: &[Block<F>], coarse: &mut Costs) {
         let (layout, Costs { stored, sums }) = (self.layouts[1], coarse);
-        costs::rows(layout, stored, C::of(sums), |y, stored, mut keep| {
+        costs::rows(layout, stored, C::of(sums)).for_each(|(y, stored, mut keep)| {
             let children = self.children(fine, y);
             for block in 0..layout.blocks {
                 let halves = self.halves(children, block);
@@ -123,7 +139,7 @@ impl Grids<'_> {
     /// As [`Grids::rows`], for sums that fit 8 bits, as those of the largest grids do.
     fn narrow_rows(&self, fine: &[Block], coarse: &mut Costs) {
         let (layout, Costs { stored, sums }) = (self.layouts[1], coarse);
-        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
+        costs::rows(layout, stored, u8::of(sums)).for_each(|(y, stored, mut keep)| {
             let children = self.children(fine, y);
             for block in 0..layout.blocks {
                 let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, block));
@@ -222,14 +238,12 @@ fn sums_of_children<S: Simd, F: Sum + Widen<C>, C: Sum>(
     halves: &[[&[Block<F>]; 4]; 2],
     label: usize,
 ) -> [[C; LANES]; 2] {
-    let mut dealt = [[C::default(); LANES]; 2];
-    for (half, blocks) in halves.iter().enumerate() {
-        let none = Block([F::default(); LANES]);
-        let [a, b, c, d] = blocks.map(|labels| labels.get(label).unwrap_or(&none));
-        let sums = F::sum_by_parity(simd, [a, b, c, d]);
-        for (dealt, sums) in dealt.iter_mut().zip(sums) {
-            dealt[half * sums.len()..(half + 1) * sums.len()].copy_from_slice(&sums);
-        }
-    }
-    dealt
+    let none = &Block([F::default(); LANES]);
+    F::sum_by_parity(
+        simd,
+        halves.map(
+            #[inline(always)]
+            |blocks| blocks.map(|labels| labels.get(label).unwrap_or(none)),
+        ),
+    )
 }

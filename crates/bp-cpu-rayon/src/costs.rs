@@ -1,11 +1,12 @@
 //! The data costs of one grid.
 
 use bp_core::{Error, IsStopped, Plan, memory::Buffer};
-use fearless_simd::{Bytes as _, Simd, SimdBase, u16x16};
-use rayon::prelude::*;
+use fearless_simd::{Bytes as _, Simd, SimdBase, SimdCombine, u16x16, u16x32};
+use rayon::{iter::Either, prelude::*};
 
 use crate::{
     block::{Block, Bytes, LANES},
+    match_cost::is_made_with_next,
     shape::Shape,
 };
 
@@ -32,7 +33,7 @@ impl Costs {
     pub(crate) fn new(plan: &Plan, grid: usize, is_stopped: IsStopped<'_>) -> Result<Self, Error> {
         let (what, len) = ("data cost sums", volume(&Shape::new(plan, grid)));
         let sums = match plan.sum_bytes(grid) {
-            _ if !plan.keeps_sums(grid) => Sums::None,
+            _ if !keeps_sums(plan, grid) => Sums::None,
             1 => Sums::U8(Buffer::filled_unless(is_stopped, what, len, Block::ZERO)?),
             2 => Sums::U16(Buffer::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
             4 => Sums::U32(Buffer::filled_unless(is_stopped, what, len, Block([0; LANES]))?),
@@ -59,6 +60,11 @@ impl Costs {
     }
 }
 
+/// Whether a grid keeps its sums. Once the next coarser grid is made, nobody needs them.
+fn keeps_sums(plan: &Plan, grid: usize) -> bool {
+    plan.keeps_sums(grid) && !is_made_with_next(plan, grid)
+}
+
 /// The number of blocks of costs of a grid.
 fn volume(shape: &Shape) -> usize {
     shape.row().saturating_mul(shape.size.height)
@@ -67,24 +73,30 @@ fn volume(shape: &Shape) -> usize {
 /// The bytes that [`Costs`] will hold.
 pub(crate) fn bytes(plan: &Plan, grid: usize) -> u64 {
     let len = volume(&Shape::new(plan, grid));
-    let sums = if plan.keeps_sums(grid) { plan.sum_bytes(grid) } else { 0 };
+    let sums = if keeps_sums(plan, grid) { plan.sum_bytes(grid) } else { 0 };
     (len as u64).saturating_mul((LANES * (1 + sums)) as u64)
 }
 
-/// Calls `row(y, stored, sums)` for all rows of a grid, on several threads.
-pub(crate) fn rows<T: Send>(
+/// All rows of a grid, for several threads: y, the stored costs and the sums.
+pub(crate) fn rows<'a, T: Send>(
     shape: &Shape,
-    stored: &mut [Block],
-    sums: Option<&mut [Block<T>]>,
-    row: impl Fn(usize, &mut [Block], Option<&mut [Block<T>]>) + Sync,
-) {
+    stored: &'a mut [Block],
+    sums: Option<&'a mut [Block<T>]>,
+) -> impl IndexedParallelIterator<Item = (usize, &'a mut [Block], Option<&'a mut [Block<T>]>)> {
     let stored = stored.par_chunks_exact_mut(shape.row());
-    match sums {
-        Some(sums) => {
-            let both = stored.zip(sums.par_chunks_exact_mut(shape.row())).enumerate();
-            both.for_each(|(y, (stored, sums))| row(y, stored, Some(sums)));
-        }
-        None => stored.enumerate().for_each(|(y, stored)| row(y, stored, None)),
+    let rows = stored.zip(optional_rows(shape, sums, shape.row())).enumerate();
+    rows.map(|(y, (stored, sums))| (y, stored, sums))
+}
+
+/// So many blocks for each row of a grid, if there are any. The last row may have fewer.
+pub(crate) fn optional_rows<'a, T: Send>(
+    shape: &Shape,
+    blocks: Option<&'a mut [Block<T>]>,
+    row: usize,
+) -> impl IndexedParallelIterator<Item = Option<&'a mut [Block<T>]>> {
+    match blocks {
+        Some(blocks) => Either::Left(blocks.par_chunks_mut(row).map(Some)),
+        None => Either::Right((0..shape.size.height).into_par_iter().map(|_| None)),
     }
 }
 
@@ -102,15 +114,17 @@ pub(crate) trait Sum:
 pub(crate) trait Widen<T: Sum>: Sum {
     fn widen(self) -> T;
 
-    /// Sums four blocks: first their even lanes, then their odd ones.
+    /// Sums the four blocks of each half: lane i of the first sum has lane 2i of both halves together, that of the second lane 2i + 1.
     #[inline(always)]
-    fn sum_by_parity<S: Simd>(_: S, blocks: [&Block<Self>; 4]) -> [[T; LANES / 2]; 2] {
-        let [a, b, c, d] = blocks.map(|block| &block.0);
-        let mut sums = [T::default(); LANES];
-        for (i, sum) in sums.iter_mut().enumerate() {
-            *sum = a[i].widen() + b[i].widen() + (c[i].widen() + d[i].widen());
+    fn sum_by_parity<S: Simd>(_: S, halves: [[&Block<Self>; 4]; 2]) -> [[T; LANES]; 2] {
+        let mut sums = [[T::default(); LANES]; 2];
+        for (sums, blocks) in sums.iter_mut().zip(halves) {
+            let [a, b, c, d] = blocks.map(|block| &block.0);
+            for (i, sum) in sums.iter_mut().enumerate() {
+                *sum = a[i].widen() + b[i].widen() + (c[i].widen() + d[i].widen());
+            }
         }
-        let pairs = sums.as_chunks::<2>().0;
+        let pairs = sums.as_flattened().as_chunks::<2>().0;
         [0, 1].map(|parity| std::array::from_fn(|i| pairs[i][parity]))
     }
 }
@@ -123,14 +137,38 @@ impl Widen<u16> for u8 {
 
     /// Two bytes make a number of 16 bits; the even lane is its lower half, or on some machines its upper half.
     #[inline(always)]
-    fn sum_by_parity<S: Simd>(simd: S, blocks: [&Block; 4]) -> [[u16; LANES / 2]; 2] {
-        let (mut even, mut odd) = (u16x16::splat(simd, 0), u16x16::splat(simd, 0));
-        for block in blocks {
-            let pairs: u16x16<S> = block.load(simd).bitcast();
-            even += pairs & u16x16::splat(simd, 0xff);
-            odd += pairs >> 8;
+    fn sum_by_parity<S: Simd>(simd: S, halves: [[&Block; 4]; 2]) -> [[u16; LANES]; 2] {
+        // Loops are inlined where `map` is not.
+        let mut sums = [[u16x16::splat(simd, 0); 2]; 2];
+        for (blocks, [lower, upper]) in halves.iter().zip(&mut sums) {
+            for block in blocks {
+                let pairs: u16x16<S> = block.load(simd).bitcast();
+                *lower += pairs & u16x16::splat(simd, 0xff);
+                *upper += pairs >> 8;
+            }
         }
-        if cfg!(target_endian = "big") { [odd.into(), even.into()] } else { [even.into(), odd.into()] }
+        let [[lower, upper], [next_lower, next_upper]] = sums;
+        let [lower, upper] = [lower.combine(next_lower).into(), upper.combine(next_upper).into()];
+        if cfg!(target_endian = "big") { [upper, lower] } else { [lower, upper] }
+    }
+}
+
+impl Widen<u16> for u16 {
+    #[inline(always)]
+    fn widen(self) -> u16 {
+        self
+    }
+
+    #[inline(always)]
+    fn sum_by_parity<S: Simd>(simd: S, halves: [[&Block<u16>; 4]; 2]) -> [[u16; LANES]; 2] {
+        let mut sums = [u16x32::splat(simd, 0); 2];
+        for (blocks, sum) in halves.iter().zip(&mut sums) {
+            for block in blocks {
+                *sum += u16x32::load_array_ref(simd, &block.0);
+            }
+        }
+        let (even, odd) = sums[0].deinterleave(sums[1]);
+        [even.into(), odd.into()]
     }
 }
 
@@ -160,7 +198,7 @@ macro_rules! widen {
     )* };
 }
 
-widen!(u16 => u16, u16 => u32, u32 => u32, u32 => u64, u64 => u64);
+widen!(u16 => u32, u32 => u32, u32 => u64, u64 => u64);
 
 /// A type of sums that a grid may keep.
 pub(crate) trait Kept: Sum {
@@ -242,4 +280,11 @@ pub(crate) fn store_block<T: Sum>(
 pub(crate) fn clip_above<S: Simd>(simd: S, least: &Block, clip: u8, costs: &mut [Block]) {
     let (least, clip) = (least.load(simd), Bytes::splat(simd, clip));
     costs.iter_mut().for_each(|block| block.store((block.load(simd) - least).min(clip)));
+}
+
+/// As [`clip_above`], and writes the result to other blocks.
+#[inline(always)]
+pub(crate) fn copy_clipped<S: Simd>(simd: S, least: &Block, clip: u8, costs: &[Block], to: &mut [Block]) {
+    let (least, clip) = (least.load(simd), Bytes::splat(simd, clip));
+    to.iter_mut().zip(costs).for_each(|(to, block)| to.store((block.load(simd) - least).min(clip)));
 }

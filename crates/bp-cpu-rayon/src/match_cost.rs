@@ -18,10 +18,11 @@ use std::array;
 
 use bp_core::{MAX_LABELS, Plan, Schedule, Seed};
 use fearless_simd::{Level, Simd, dispatch};
+use rayon::prelude::*;
 
 use crate::{
     block::{Block, LANES},
-    costs::{self, Costs, Kept, clip_above},
+    costs::{self, Costs, Kept, clip_above, copy_clipped},
     features::Features,
     layout::Layout,
     shape::{PlaneRow, WIDEST},
@@ -51,6 +52,12 @@ pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
     }
 }
 
+/// Whether the costs of a grid are stored while the next coarser one is made, in one pass: those of grid 2 if those of grid 1 are not
+/// stored and the sums of grid 3 fit 16 bits.
+pub(crate) fn is_made_with_next(plan: &Plan, grid: usize) -> bool {
+    grid == 2 && plan.grids() > 3 && !is_stored(plan, 1) && is_stored(plan, 2) && plan.sum_bytes(3) == 2
+}
+
 /// Whether all costs of grid 0 fit 8 bits.
 fn is_narrow(plan: &Plan) -> bool {
     plan.sum_bytes(0) == 1
@@ -76,7 +83,8 @@ pub(crate) fn match_cost(matching: &Matching<'_>, costs: &mut Costs) {
         return matching.narrow_rows(0, matching.layout, costs);
     }
     let Costs { stored, sums } = costs;
-    costs::rows(matching.layout, stored, u16::of(sums), |y, stored, sums| matching.wide_row(y, stored, sums));
+    costs::rows(matching.layout, stored, u16::of(sums))
+        .for_each(|(y, stored, sums)| matching.wide_row(y, stored, sums));
 }
 
 impl Matching<'_> {
@@ -84,37 +92,39 @@ impl Matching<'_> {
     pub(crate) fn narrow_rows(&self, grid: usize, layout: &Layout, costs: &mut Costs) {
         let labels = all_labels(layout);
         let Costs { stored, sums } = costs;
-        costs::rows(layout, stored, u8::of(sums), |y, stored, mut keep| {
+        costs::rows(layout, stored, u8::of(sums)).for_each(|(y, stored, mut keep)| {
             for patch in 0..layout.blocks {
                 let at = PatchRow { grid, patch, y };
-                let costs = layout.blocks_of(stored, patch);
-                let keep = keep.as_deref_mut().map(|keep| layout.blocks_of(keep, patch));
-                dispatch!(self.level, simd => self.patch(simd, at, labels, costs, keep));
+                let stored = layout.blocks_of(stored, patch);
+                if let Some(keep) = &mut keep {
+                    let [even, odd] = layout.blocks_of(keep, patch);
+                    let least = self.unclipped(at, labels, [&mut *even, &mut *odd]);
+                    self.store_clipped(at, &least, [even, odd], stored);
+                } else {
+                    dispatch!(self.level, simd => self.patch(simd, at, labels, stored));
+                }
             }
         });
     }
 
-    /// Writes the costs of both planes of a patch of grid 0, 1 or 2 for these labels, `[entry]`, and before they are clipped
-    /// also to `keep`. They must fit 8 bits.
+    /// Writes the costs of both planes of a patch of grid 0, 1 or 2 for these labels, `[entry]`. They must fit 8 bits.
     #[inline(always)]
-    pub(crate) fn patch<S: Simd>(
-        &self,
-        simd: S,
-        at: PatchRow,
-        labels: &[u16],
-        [even, odd]: [&mut [Block]; 2],
-        keep: Option<[&mut [Block]; 2]>,
-    ) {
+    pub(crate) fn patch<S: Simd>(&self, simd: S, at: PatchRow, labels: &[u16], [even, odd]: [&mut [Block]; 2]) {
         let least = self.unclipped(at, labels, [&mut *even, &mut *odd]);
-        if let Some(keep) = keep {
-            keep.into_iter().zip([&*even, &*odd]).for_each(|(keep, costs)| keep.copy_from_slice(costs));
-        } else if at.grid == 0 && self.fits() {
-            return self.fix(at, labels, [even, odd]);
+        if at.grid > 0 || !self.fits() {
+            let clip = self.plan.clip(at.grid);
+            clip_above(simd, &least[0], clip, even);
+            clip_above(simd, &least[1], clip, odd);
         }
-        let clip = self.plan.clip(at.grid);
-        clip_above(simd, &least[0], clip, even);
-        clip_above(simd, &least[1], clip, odd);
         self.fix(at, labels, [even, odd]);
+    }
+
+    /// Stores the costs of both planes of a patch, given unclipped ones and the least of each node.
+    pub(crate) fn store_clipped(&self, at: PatchRow, least: &[Block; 2], costs: [&[Block]; 2], to: [&mut [Block]; 2]) {
+        let clip = self.plan.clip(at.grid);
+        for ((least, costs), to) in least.iter().zip(costs).zip(to) {
+            dispatch!(self.level, simd => copy_clipped(simd, least, clip, costs, to));
+        }
     }
 
     /// Whether unclipped costs need not be normalised and clipped. That never changes a message. It keeps sums within 8 bits.

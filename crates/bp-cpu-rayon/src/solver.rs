@@ -1,6 +1,6 @@
 //! The buffers of one plan, and the kernels that run on them.
 
-use std::ops::Range;
+use std::{mem, ops::Range};
 
 use bp_core::{Error, IsStopped, Plan, Schedule, Seed, Side, Solver, Stage, StereoPair};
 use fearless_simd::Level;
@@ -11,7 +11,7 @@ use crate::{
     features::{self, Features},
     half_steps::{self, Coarser, Edges, Labels, Last, Pass, Rows},
     layout::{self, Layout},
-    match_cost::{Matching, is_stored, match_cost},
+    match_cost::{Matching, is_made_with_next, is_stored, match_cost},
     shape::Shape,
     sweep::{self, CostSource, Grid, Passed, Swept},
 };
@@ -142,8 +142,8 @@ impl RayonSolver {
 
     /// Passes messages in half-steps or loops.
     fn run_steps(&mut self, grid: usize, steps: Range<u32>, last: Last) {
-        let mut messages = std::mem::replace(&mut self.messages[grid % 2], Messages::none());
-        let mut labels = std::mem::replace(&mut self.labels, Labels::none());
+        let mut messages = mem::replace(&mut self.messages[grid % 2], Messages::none());
+        let mut labels = mem::replace(&mut self.labels, Labels::none());
         let (layout, costs) = (&self.layouts[grid], &self.costs[grid].stored);
         let coarser = self.coarser(grid);
         let keeps_messages = grid == 0 && self.keeps_messages;
@@ -179,7 +179,7 @@ impl Solver for RayonSolver {
         self.layouts[0].greys.load(self.level, pair.left(), self.plan.margin());
         self.seed = seed;
         if is_stored(&self.plan, 0) {
-            let mut costs = std::mem::replace(&mut self.costs[0], Costs::none());
+            let mut costs = mem::replace(&mut self.costs[0], Costs::none());
             match_cost(&self.matching(), &mut costs);
             self.costs[0] = costs;
         }
@@ -187,15 +187,16 @@ impl Solver for RayonSolver {
     }
 
     fn coarsen(&mut self, grid: usize) -> Result<(), Error> {
-        let mut coarse = std::mem::replace(&mut self.costs[grid], Costs::none());
-        if !is_stored(&self.plan, grid) {
-            // Its costs are computed when needed.
-        } else if is_stored(&self.plan, grid - 1) {
-            let layouts = [&self.layouts[grid - 1], &self.layouts[grid]];
-            coarsen(self.level, &self.plan, grid, layouts, &self.costs[grid - 1], &mut coarse);
+        let [mut fine, mut coarse] = [grid - 1, grid].map(|grid| mem::replace(&mut self.costs[grid], Costs::none()));
+        let layouts = [&self.layouts[grid - 1], &self.layouts[grid]];
+        if !is_stored(&self.plan, grid) || is_made_with_next(&self.plan, grid) {
+            // Its costs are computed when needed, or with those of the next grid.
+        } else if is_stored(&self.plan, grid - 1) && !is_made_with_next(&self.plan, grid - 1) {
+            coarsen(self.level, &self.plan, grid, layouts, &fine, &mut coarse);
         } else {
-            coarsen_unstored(&self.matching(), self.swept.windows(), grid, &self.layouts[grid], &mut coarse);
+            coarsen_unstored(&self.matching(), self.swept.windows(), grid, layouts, &mut fine, &mut coarse);
         }
+        self.costs[grid - 1] = fine;
         self.costs[grid] = coarse;
         let (fine, coarse) = self.layouts.split_at_mut(grid);
         coarse[0].greys.coarsen(self.level, &fine[grid - 1].greys);
@@ -247,7 +248,7 @@ impl Solver for RayonSolver {
     /// Passes the messages of grid 0 once more, if some of them were not kept, and under `sweep` those of all grids.
     fn read_messages(&mut self, side: Side, messages: &mut [u8]) -> Result<(), Error> {
         if self.plan.settings().schedule == Schedule::Sweep {
-            let mut swept = std::mem::take(&mut self.swept);
+            let mut swept = mem::take(&mut self.swept);
             let result = swept.read_messages(&self.plan, |index| self.grid(index), side, messages);
             self.swept = swept;
             return result;
@@ -297,7 +298,7 @@ impl Solver for RayonSolver {
 impl RayonSolver {
     /// Sweeps these grids, if there is room.
     fn sweep(&mut self, grids: Range<usize>, passed: &mut Passed<'_>) -> Result<(), Error> {
-        let mut swept = std::mem::take(&mut self.swept);
+        let mut swept = mem::take(&mut self.swept);
         let room = self.limit.saturating_sub(self.allocated_bytes());
         let result = swept.run(&self.plan, grids, |index| self.grid(index), room, passed);
         self.swept = swept;

@@ -101,9 +101,8 @@ impl<S: Simd> Near<S> {
     /// The first ones of a row. Those beyond its end count as unknown.
     #[inline(always)]
     fn new(simd: S, row: &[f32]) -> Self {
-        let mut own = [DisparityMap::UNKNOWN; COLUMNS + 1];
-        let len = row.len().min(COLUMNS);
-        own[..len].copy_from_slice(&row[..len]);
+        let rest = || array::from_fn(|i| row.get(i).copied().unwrap_or(DisparityMap::UNKNOWN));
+        let own: [f32; COLUMNS + 1] = row.first_chunk().copied().unwrap_or_else(rest);
         let load = |first: usize| array::from_fn(|i| f32x8::from_slice(simd, &own[first + i * LANES..][..LANES]));
         Self { simd, values: load(0), next: load(1) }
     }
@@ -116,7 +115,7 @@ impl<S: Simd> Near<S> {
         for (i, (&value, &next)) in self.values.iter().zip(&self.next).enumerate() {
             goes_on |= (next - value).abs().simd_le(most).to_bitmask() << (i * LANES);
         }
-        goes_on.trailing_ones() as usize + 1
+        (goes_on.trailing_ones() as usize + 1).min(COLUMNS)
     }
 
     /// The sum of the first `len` values times their columns, which are counted from the middle one. What the values are compared

@@ -1,30 +1,35 @@
 //! Filling unknown pixels.
 
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
 use crate::DisparityMap;
 
 /// Values that are looked through together.
-const PIECE: usize = 16;
+const PIECE: usize = 32;
 
 /// Fills every unknown pixel with the smaller of the nearest known disparities to its left and right, because a pixel
 /// that one camera does not see belongs to the surface behind. A row without known pixels is copied from the row above
 /// or, if that is unknown too, from the row below.
 #[must_use]
 pub fn fill(map: DisparityMap) -> DisparityMap {
-    let width = map.size().width;
+    let (width, level) = (map.size().width, Level::new());
     map.replaced(|values| {
-        values.par_chunks_exact_mut(width).for_each(fill_row);
-        let height = values.len() / width;
-        for y in 1..height {
-            take_over(values, width, y - 1, y);
-        }
-        for y in (1..height).rev() {
-            take_over(values, width, y, y - 1);
+        let rows = values.par_chunks_exact_mut(width);
+        let all_known = rows.map(|row| {
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || fill_row(row),
+            ));
+            row[0].is_finite()
+        });
+        if !all_known.reduce(|| true, |a, b| a && b) {
+            take_over_rows(values, width);
         }
     })
 }
 
+#[inline(always)]
 fn fill_row(row: &mut [f32]) {
     let mut start = 0;
     while let Some(first) = first_unknown(&row[start..]).map(|first| start + first) {
@@ -37,19 +42,29 @@ fn fill_row(row: &mut [f32]) {
 }
 
 /// The first unknown value. Most pieces have none, which is found for all their values at once.
+#[inline(always)]
 fn first_unknown(values: &[f32]) -> Option<usize> {
     let is_unknown = |value: &f32| !value.is_finite();
-    let known =
-        values.chunks(PIECE).take_while(|piece| !piece.iter().fold(false, |any, value| any | is_unknown(value)));
-    let known = known.count() * PIECE;
+    let mut known = 0;
+    for piece in values.as_chunks::<PIECE>().0 {
+        if piece.iter().fold(false, |any, value| any | is_unknown(value)) {
+            break;
+        }
+        known += PIECE;
+    }
     values.get(known..)?.iter().position(is_unknown).map(|first| known + first)
 }
 
-/// Copies row `from` to row `to` if `to` is unknown. At this point a row is either all known or all unknown.
-fn take_over(values: &mut [f32], width: usize, from: usize, to: usize) {
-    if !values[to * width].is_finite() {
-        values.copy_within(from * width..(from + 1) * width, to * width);
-    }
+/// Copies rows to rows that are unknown. At this point a row is either all known or all unknown.
+fn take_over_rows(values: &mut [f32], width: usize) {
+    let height = values.len() / width;
+    let mut take_over = |from: usize, to: usize| {
+        if !values[to * width].is_finite() {
+            values.copy_within(from * width..(from + 1) * width, to * width);
+        }
+    };
+    (1..height).for_each(|y| take_over(y - 1, y));
+    (1..height).rev().for_each(|y| take_over(y, y - 1));
 }
 
 #[cfg(test)]

@@ -42,9 +42,7 @@ impl CostSource<'_> {
         costs: [&mut [Block]; 2],
     ) {
         match self {
-            Self::Computed(matching) => {
-                matching.patch(simd, PatchRow { grid: sweep.grid, patch, y }, labels, costs, None)
-            }
+            Self::Computed(matching) => matching.patch(simd, PatchRow { grid: sweep.grid, patch, y }, labels, costs),
             Self::Stored(stored) => {
                 for (plane, costs) in costs.into_iter().enumerate() {
                     let first = (2 * y + plane) * sweep.layout.plane() + sweep.layout.block(patch).start;
