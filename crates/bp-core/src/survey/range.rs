@@ -13,6 +13,9 @@ const BEYOND: usize = 1000;
 /// If so many disparities that were found at full resolution lie at an end of the range, or beyond, it ends with them.
 const ENOUGH: usize = 4;
 
+/// So many are enough half a small pixel farther inside, because coarse matches may be a small pixel off.
+const MANY: usize = 16;
+
 /// The margin at either end is one part in this many of the range, and 1 px.
 const MARGIN: i32 = 20;
 
@@ -121,9 +124,12 @@ fn joined([least, largest]: [i32; 2], step: i32, exact: &[i32]) -> [i32; 2] {
     let distance = ((largest - least) / COMPANION).max(2);
     let far = exact.windows(2).find(|pair| pair[1] - pair[0] <= distance).map(|pair| pair[0]);
     let near = exact.last().copied();
-    let enough =
-        |is_near: &dyn Fn(i32) -> bool| exact.iter().filter(|&&disparity| is_near(disparity)).count() >= ENOUGH;
-    let (far_enough, near_enough) = (enough(&|d| d <= least + step), enough(&|d| d >= largest - step));
+    let enough = |is_near: &dyn Fn(i32, i32) -> bool| {
+        let within = |reach: i32| exact.iter().filter(|&&disparity| is_near(disparity, reach)).count();
+        within(step) >= ENOUGH || within(step + step / 2) >= MANY
+    };
+    let far_enough = enough(&|disparity, reach| disparity <= least + reach);
+    let near_enough = enough(&|disparity, reach| disparity >= largest - reach);
     // Few pairs have negative disparities, so false matches are likelier.
     let far_enough = far_enough || least < 0;
     let outside = outside([least, largest], step);
@@ -153,6 +159,9 @@ mod tests {
         assert_eq!(joined(&[]), [18, 62], "half a small pixel farther out");
         assert_eq!(joined(&[23, 23, 24, 24, 56, 56, 57, 57]), [23, 57]);
         assert_eq!(joined(&[23, 23, 24, 25, 55, 56, 57, 57]), [18, 62], "too few");
+        assert_eq!(joined(&[[26; 15], [54; 15]].concat()), [18, 62], "not enough, farther inside");
+        assert_eq!(joined(&[[26; 16], [54; 16]].concat()), [26, 54]);
+        assert_eq!(joined(&[[27; 16], [53; 16]].concat()), [18, 62], "too far inside");
         assert_eq!(joined(&[12, 14, 40, 71]), [12, 71], "few count if they lie beyond");
         assert_eq!(joined(&[11, 14, 40, 44]), [18, 62], "a far one needs another one near by");
     }
