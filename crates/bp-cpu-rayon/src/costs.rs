@@ -6,8 +6,8 @@ use rayon::{iter::Either, prelude::*};
 
 use crate::{
     block::{Block, Bytes, LANES},
-    match_cost::is_made_with_next,
     shape::Shape,
+    stored::keeps_sums,
 };
 
 /// Data costs `[height][plane][block][label]`, in the forms that messages and the sums of coarser grids need.
@@ -58,11 +58,6 @@ impl Costs {
                 Sums::U64(sums) => sums.bytes(),
             }
     }
-}
-
-/// Whether a grid keeps its sums. Once the next coarser grid is made, nobody needs them.
-fn keeps_sums(plan: &Plan, grid: usize) -> bool {
-    plan.keeps_sums(grid) && !is_made_with_next(plan, grid)
 }
 
 /// The number of blocks of costs of a grid.

@@ -27,6 +27,7 @@ mod layout;
 mod match_cost;
 mod shape;
 mod solver;
+mod stored;
 mod sweep;
 
 use bp_core::{Backend, Device, DeviceInfo, DeviceKind, Error, IsStopped, Plan, Solver, memory};

@@ -16,7 +16,7 @@ mod patch;
 
 use std::array;
 
-use bp_core::{MAX_LABELS, Plan, Schedule, Seed};
+use bp_core::{MAX_LABELS, Plan, Seed};
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 
@@ -26,6 +26,7 @@ use crate::{
     features::Features,
     layout::Layout,
     shape::{PlaneRow, WIDEST},
+    stored::is_narrow,
 };
 
 pub(crate) use patch::PatchRow;
@@ -38,29 +39,6 @@ pub(crate) struct Matching<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) features: &'a Features,
     pub(crate) seed: Option<Seed>,
-}
-
-/// Whether the costs of a grid are stored. Under `sweep`, those of grid 0 are computed when needed if they fit 8 bits, and so
-/// are those of grid 1 if it has label sets and the sums of grid 2 fit too, and those of grid 2 if it has label sets, its own sums fit 8
-/// bits and those of grid 3 fit 16.
-pub(crate) fn is_stored(plan: &Plan, grid: usize) -> bool {
-    match grid {
-        0 => plan.settings().schedule != Schedule::Sweep || !is_narrow(plan),
-        1 => !plan.has_label_sets(1) || plan.sum_bytes(2) > 1,
-        2 => !plan.has_label_sets(2) || plan.sum_bytes(2) > 1 || plan.sum_bytes(3) != 2,
-        _ => true,
-    }
-}
-
-/// Whether the costs of a grid are stored while the next coarser one is made, in one pass: those of grid 2 if those of grid 1 are not
-/// stored and the sums of grid 3 fit 16 bits.
-pub(crate) fn is_made_with_next(plan: &Plan, grid: usize) -> bool {
-    grid == 2 && plan.grids() > 3 && !is_stored(plan, 1) && is_stored(plan, 2) && plan.sum_bytes(3) == 2
-}
-
-/// Whether all costs of grid 0 fit 8 bits.
-fn is_narrow(plan: &Plan) -> bool {
-    plan.sum_bytes(0) == 1
 }
 
 /// The list that has every label of a grid.

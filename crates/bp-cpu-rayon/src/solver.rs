@@ -11,8 +11,9 @@ use crate::{
     features::{self, Features},
     half_steps::{self, Coarser, Edges, Labels, Last, Pass, Rows},
     layout::{self, Layout},
-    match_cost::{Matching, is_made_with_next, is_stored, match_cost},
+    match_cost::{Matching, match_cost},
     shape::Shape,
+    stored::{is_made_with_next, is_stored},
     sweep::{self, CostSource, Grid, Passed, Swept},
 };
 
