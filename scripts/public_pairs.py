@@ -20,6 +20,7 @@ OLD_PAIRS = {"tsukuba": (16, f"{OLD}/tsukuba", OLD_FILES), "cones": (64, f"{OLD}
 NAMES = ("Baby1", "Aloe", "Cloth1", "Flowerpots", "Bowling2", "Books")
 SIX = {name: (112, f"{NEW}/{name}", NEW_FILES) for name in NAMES}
 THIRDS = {name: (80, f"{NEW}-thirdsize/{name}", NEW_FILES) for name in NAMES}
+FULL = {"Books, full size": (240, f"{NEW}-fullsize/Books", NEW_FILES)}
 
 
 def parser(description, has_data=True):

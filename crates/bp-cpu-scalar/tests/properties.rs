@@ -42,12 +42,13 @@ fn any_settings(size: Size) -> impl Strategy<Value = Settings> {
     let schedule = prop::sample::select(Schedule::ALL.to_vec());
     let start = prop::sample::select(MessageStart::ALL.to_vec());
     let cut = prop::option::of((0..size.width, 0..size.height, any::<bool>()));
-    (1..5_u32, 1..6_u32, schedule, start, cut, any::<bool>()).prop_map(
-        |(grids, steps, schedule, start, cut, coarse_clip)| {
+    (1..5_u32, 1..6_u32, schedule, start, cut, any::<(bool, bool)>()).prop_map(
+        |(grids, steps, schedule, start, cut, (coarse_clip, label_sets))| {
             let cut = cut.map(|(x, y, seed_start)| Cut { x, y, seed_start });
             let grids = if cut.is_some() { 1 } else { grids };
             let message_start = if schedule == Schedule::Sweep { MessageStart::Receiver } else { start };
-            Settings { grids, steps, schedule, message_start, cut, coarse_clip, label_sets: false }
+            let label_sets = label_sets && schedule == Schedule::Sweep;
+            Settings { grids, steps, schedule, message_start, cut, coarse_clip, label_sets }
         },
     )
 }

@@ -37,8 +37,9 @@ pub(crate) struct FinishArgs {
     /// Write a confidence from 0 to 1 for each pixel.
     ///
     /// The confidence is about the probability that the disparity is right to one pixel. It follows from the share of a 9 x 9
-    /// window that agrees with its centre and with the right image's map, as matched. It is 0 where --check or --speckle dropped the pixel, even if it was filled. .pfm, .tif and .npy hold
-    /// 32-bit floats, .png holds 65535 times the value. This option matches the right image too.
+    /// window that agrees with its centre and with the right image's map, as matched. A pixel that --check or --speckle dropped and
+    /// that was filled has 0.56, and one that stays unknown 0. .pfm, .tif and .npy hold 32-bit floats, .png holds 65535 times
+    /// the value. This option matches the right image too.
     #[arg(long, value_name = "MAP", hide_short_help = true)]
     pub(crate) confidence: Option<PathBuf>,
 }
