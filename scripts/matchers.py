@@ -32,9 +32,12 @@ def greys(left, right):
 def write_map(path, sixteenths):
     """Writes a map of OpenCV as PFM. Negative values are unanswered."""
     import numpy
-    disparities = numpy.where(sixteenths < 0, numpy.inf, sixteenths / numpy.float32(16)).astype("<f4")
+    write_pfm(path, numpy.where(sixteenths < 0, numpy.inf, sixteenths / numpy.float32(16)))
+
+
+def write_pfm(path, disparities):
     height, width = disparities.shape
-    path.write_bytes(f"Pf\n{width} {height}\n-1.0\n".encode() + disparities[::-1].tobytes())
+    path.write_bytes(f"Pf\n{width} {height}\n-1.0\n".encode() + disparities[::-1].astype("<f4").tobytes())
 
 
 def aligned(left, right, labels, output):
