@@ -98,10 +98,10 @@ KNOWN = {
 } | {f"OpenCV SGBM, {mode}, aligned rows": Sgbm(mode, is_aligned=True) for mode in SGBM_MODES}
 
 
-def add_option(parser):
+def add_option(parser, usual="all of these"):
     parser.add_argument("--matcher", action="append", metavar="NAME[=COMMAND]",
                         help="a matcher; may be repeated. COMMAND has {left}, {right}, {output} (a PFM file) and {labels}. "
-                             f"Without COMMAND one of: {'; '.join(KNOWN)} [all of these]")
+                             f"Without COMMAND one of: {'; '.join(KNOWN)} [{usual}]")
 
 
 def chosen(options):
